@@ -12,8 +12,9 @@
 
 namespace tilegrad::train {
 
-// kAuto: the visual hull where there are masks, at least kLeastHullViews views and cameras that are
-// not fitted; the sphere otherwise, and where masks have no point in common.
+// kAuto: the visual hull where there are masks, at least kLeastHullViews views that are in no
+// narrow cone, and cameras that are not fitted; the sphere otherwise, and where masks have no point
+// in common.
 enum class StartShape { kAuto, kHull, kSphere };
 inline constexpr int kLeastHullViews = 4;
 

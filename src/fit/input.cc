@@ -2,11 +2,6 @@
 #include "fit/input.h"
 
 #include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-#include <numbers>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -257,47 +252,6 @@ TargetImages Reduce(const TargetImages& images, int factor) {
     }
   }
   return out;
-}
-
-Result<Sphere> GuessSphere(const FitInput& input) {
-  // sum over axes (c, d) of (1 - d d^T) (p - c) = 0
-  glm::dmat3 sum(0);
-  glm::dvec3 right(0);
-  for (const int i : input.training) {
-    const Camera& camera = input.cameras[static_cast<std::size_t>(i)];
-    const float *r = camera.rotation, *t = camera.translation;
-    const glm::dvec3 d(r[6], r[7], r[8]);
-    glm::dvec3 c(0);
-    for (int k = 0; k < 3; ++k)
-      c -= static_cast<double>(t[k]) * glm::dvec3(r[3 * k], r[3 * k + 1], r[3 * k + 2]);
-    const glm::dmat3 across = glm::dmat3(1) - glm::outerProduct(d, d);
-    sum += across, right += across * c;
-  }
-  // All axes parallel: any point on them serves; the least trace keeps it near the cameras' middle.
-  sum += glm::dmat3(1e-9);
-  const glm::dvec3 centre = glm::inverse(sum) * right;
-  double radius = 0;
-  const std::size_t plane = input.images.pixels();
-  for (const int i : input.training) {
-    const auto n = static_cast<std::size_t>(i);
-    const Camera& camera = input.cameras[n];
-    const float* r = camera.rotation + 6;
-    const double depth = -(r[0] * centre.x + r[1] * centre.y + r[2] * centre.z +
-                           static_cast<double>(camera.translation[2]));
-    if (!(depth > static_cast<double>(camera.near_plane))) {
-      return InvalidArgument(
-          "{}: the point that all cameras look at is behind it: check the "
-          "cameras' convention, or give a mesh to start from",
-          input.names[n]);
-    }
-    double area = 0;
-    for (std::size_t p = 0; p < plane; ++p) area += input.images.alpha[n * plane + p];
-    radius += depth / std::sqrt(static_cast<double>(camera.fx) * camera.fy) *
-              std::sqrt(area / std::numbers::pi);
-  }
-  radius /= static_cast<double>(input.training.size());
-  if (!(radius > 0)) return InvalidArgument("all masks are empty: there is nothing to fit");
-  return Sphere{glm::vec3(centre), static_cast<float>(radius)};
 }
 
 }  // namespace tilegrad::train

@@ -89,13 +89,4 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size);
 // `factor`.
 TargetImages Reduce(const TargetImages& images, int factor);
 
-// The sphere that looks from all training views about as large as the object: around the point
-// closest to all their optical axes, of the radius that gives the mean area of the masks. An error
-// if that is nowhere in front of the cameras.
-struct Sphere {
-  glm::vec3 centre = {0, 0, 0};
-  float radius = 1;
-};
-Result<Sphere> GuessSphere(const FitInput& input);
-
 }  // namespace tilegrad::train

@@ -12,6 +12,7 @@
 #include "fit/hull/hull_mesh.h"
 #include "fit/material.h"
 #include "fit/run.h"
+#include "fit/sphere.h"
 #include "scene/shapes.h"
 #include "scene/unwrap.h"
 
@@ -33,8 +34,8 @@ Status CheckConfig(const FitConfig& config) {
   const auto& d = c.light_direction;
   if (!(std::isfinite(d[0]) && std::isfinite(d[1]) && std::isfinite(d[2])) ||
       (d[0] == 0 && d[1] == 0 && d[2] == 0)) {
-    return InvalidArgument("light_direction is {} {} {}, must be finite and not 0 0 0", d[0], d[1],
-                           d[2]);
+    return InvalidArgument("light_direction is {}, must be finite and not 0 0 0",
+                           fmt::join(d, " "));
   }
   return {};
 }
@@ -52,8 +53,7 @@ void SetBlankTexture(int width, int height, FitScene* scene) {
   scene->colors.clear();
 }
 
-Result<FitScene> SphereScene(const FitJob& job) {
-  TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(job.input));
+Result<FitScene> SphereScene(const FitJob& job, const Sphere& sphere) {
   const Mesh unit = Icosphere(job.config.template_level, 1);
   Mesh mesh = unit;
   for (glm::vec3& p : mesh.positions) p = sphere.centre + sphere.radius * p;
@@ -91,29 +91,30 @@ Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watc
   return scene;
 }
 
-// `note` gets why there is no hull where one was tried.
+// `note` gets what is in doubt, and why there is no hull where one was tried.
 Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, const Watch& watch,
                                bool* from_hull, std::string* note) {
   const FitConfig& config = job.config;
+  TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(job.input));
+  *note = sphere.doubt;
   *from_hull = config.start == StartShape::kHull;
-  if (config.start == StartShape::kSphere) return SphereScene(job);
-  if (config.start == StartShape::kHull) return HullScene(job, workers, watch);
+  if (*from_hull) return HullScene(job, workers, watch);
   const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
-  if (job.input.masked && known_cameras && job.input.training.size() >= kLeastHullViews) {
+  if (config.start == StartShape::kAuto && job.input.masked && known_cameras &&
+      job.input.training.size() >= kLeastHullViews && sphere.doubt.empty()) {
     auto hull = HullScene(job, workers, watch);
     *from_hull = hull.ok();
     if (hull.ok() || hull.status().code() == StatusCode::kCancelled) return hull;
     *note = fmt::format("the fit starts from a sphere, because there is no hull: {}",
                         hull.status().message());
   }
-  return SphereScene(job);
+  return SphereScene(job, sphere);
 }
 
 Result<FitScene> MeshScene(const FitJob& job) {
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(*job.start));
-  const bool wants_texture =
-      job.config.parameters[Parameter::kTexture] || job.config.parameters[Parameter::kUv];
-  if (!wants_texture || !scene.texture.empty()) return scene;
+  const ParameterSet& set = job.config.parameters;
+  if (!(set[Parameter::kTexture] || set[Parameter::kUv]) || !scene.texture.empty()) return scene;
   if (scene.uvs.empty()) {
     return InvalidArgument(
         "the mesh has no texture coordinates, so it cannot get a texture: fit \"colors\" instead");
@@ -128,6 +129,7 @@ bool HasColors(const Mesh& mesh) {
 
 struct Bounds {
   glm::vec3 low{HUGE_VALF}, high{-HUGE_VALF};
+  glm::vec3 middle() const { return 0.5f * (low + high); }
 };
 Bounds BoundsOf(const FitScene& scene) {
   Bounds box;
@@ -146,8 +148,7 @@ float RadiusOf(const FitScene& scene) {
 
 // World units of a pixel in the middle of the scene, the mean over the training views.
 double PixelOf(const FitJob& job, const FitScene& scene) {
-  const Bounds box = BoundsOf(scene);
-  const glm::vec3 middle = 0.5f * (box.low + box.high);
+  const glm::vec3 middle = BoundsOf(scene).middle();
   double sum = 0;
   for (const int i : job.input.training) {
     const Camera& c = job.input.cameras[static_cast<std::size_t>(i)];
@@ -189,8 +190,7 @@ Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees,
 }
 
 void SetCameras(const FitJob& job, FitScene* scene) {
-  const Bounds box = BoundsOf(*scene);
-  const glm::vec3 middle = 0.5f * (box.low + box.high);
+  const glm::vec3 middle = BoundsOf(*scene).middle();
   scene->pivot = {middle.x, middle.y, middle.z};
   scene->unit = 2 * RadiusOf(*scene);
   if (!(scene->unit > 0)) scene->unit = 1;  // a single point

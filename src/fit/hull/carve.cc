@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/whole_number.h"
 #include "fit/hull/mask_distance.h"
+#include "fit/sphere.h"
 
 namespace tilegrad::train {
 namespace {

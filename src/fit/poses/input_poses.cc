@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/hash.h"
 #include "fit/score.h"
+#include "fit/sphere.h"
 #include "train/json_fields.h"
 
 namespace tilegrad::train {

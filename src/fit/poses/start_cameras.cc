@@ -2,6 +2,7 @@
 #include "fit/poses/start_cameras.h"
 
 #include "fit/poses/input_poses.h"
+#include "fit/sphere.h"
 
 namespace tilegrad::train {
 namespace {

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where an object is, for cameras of all kinds.
+#include "fit/sphere.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "fit/run.h"
+#include "fit/synthetic_views.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::train::sphere_test {
+
+constexpr int kSize = 56;
+const Ball kBall{{0.1, -0.05, 0.2}, 0.5};
+
+Camera LookingFrom(glm::dvec3 eye, glm::dvec3 at = kBall.centre, glm::dvec3 up = {0, 1, 0}) {
+  const double e[3] = {eye.x, eye.y, eye.z}, t[3] = {at.x, at.y, at.z}, u[3] = {up.x, up.y, up.z};
+  return CameraCast<float>(LookAtCamera({50, kSize, kSize}, e, t, u));
+}
+
+// On a circle around the ball, 2 away.
+std::vector<Camera> Around(int count, double degrees = 360, glm::dvec3 at = kBall.centre) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    const double angle = degrees * i / count * std::numbers::pi / 180;
+    cameras.push_back(
+        LookingFrom(at + glm::dvec3(1.9 * std::sin(angle), 0.6, 1.9 * std::cos(angle)), at));
+  }
+  return cameras;
+}
+
+void ExpectBall(const Result<Sphere>& sphere, const Ball& ball = kBall) {
+  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  // Half a pixel of the mask's middle, and of its radius, at that distance.
+  const double pixel = 2.0 / (0.5 * kSize / std::tan(25 * std::numbers::pi / 180));
+  EXPECT_LT(glm::distance(glm::dvec3(sphere->centre), ball.centre), 4 * pixel);
+  EXPECT_NEAR(sphere->radius, ball.radius, 2 * pixel);
+  EXPECT_EQ(sphere->doubt.find("not known"), std::string::npos) << sphere->doubt;
+}
+
+TEST(GuessSphere, IsTheBallThatAllSee) {
+  const auto sphere = GuessSphere(InputOfBall(kBall, Around(8), kSize));
+  ExpectBall(sphere);
+  EXPECT_EQ(sphere->doubt, "");
+}
+
+// A rail: one orientation, rounded to floats, so that the axes meet nowhere.
+TEST(GuessSphere, FollowsFromParallaxWhereAxesAreParallel) {
+  const Camera one = LookingFrom({1.0, 0.7, 1.9});
+  std::vector<Camera> cameras;
+  for (int i = 0; i < 10; ++i) {
+    cameras.push_back(one);
+    cameras.back().translation[0] += 0.2f * static_cast<float>(i % 5 - 2);
+    cameras.back().translation[1] += 0.3f * static_cast<float>(i / 5);
+  }
+  ExpectBall(GuessSphere(InputOfBall(kBall, cameras, kSize)));
+}
+
+TEST(GuessSphere, SaysThatOneDirectionTellsNoDistance) {
+  for (const int count : {1, 5}) {
+    const std::vector<Camera> cameras(static_cast<std::size_t>(count), LookingFrom({0, 0.3, 2}));
+    const auto sphere = GuessSphere(InputOfBall(kBall, cameras, kSize));
+    ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+    EXPECT_NE(sphere->doubt.find("distance is not known"), std::string::npos);
+    // The world's origin is nearly where the ball is.
+    EXPECT_NEAR(sphere->radius, kBall.radius, 0.1);
+    EXPECT_LT(glm::distance(glm::dvec3(sphere->centre), kBall.centre), 0.3);
+  }
+  // Far from the origin the ball has the usual size.
+  const Ball far{{40, 0, 0}, 3};
+  const auto sphere =
+      GuessSphere(InputOfBall(far, std::vector{LookingFrom({40, 0, 12}, far.centre)}, kSize));
+  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  EXPECT_NEAR(sphere->radius, 0.5, 0.05);
+}
+
+TEST(GuessSphere, LiesBetweenViewsFromOppositeSides) {
+  const std::vector<Camera> cameras = {LookingFrom(kBall.centre + glm::dvec3(0, 0, 2)),
+                                       LookingFrom(kBall.centre - glm::dvec3(0, 0, 2))};
+  const auto sphere = GuessSphere(InputOfBall(kBall, cameras, kSize));
+  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  EXPECT_LT(glm::distance(glm::dvec3(sphere->centre), kBall.centre), 0.3);
+}
+
+// Off the middle of the picture, with one axis that looks past it.
+TEST(GuessSphere, IsWhereMasksAreIfAxesMeetBehindACamera) {
+  std::vector<Camera> cameras = Around(6, 60);
+  for (Camera& camera : cameras) camera.cx -= 20;  // cropped pictures
+  ExpectBall(GuessSphere(InputOfBall(kBall, cameras, kSize)));
+}
+
+TEST(GuessSphere, ErrorsNameTheCameraAndTheCause) {
+  std::vector<Camera> cameras = Around(6);
+  FitInput input = InputOfBall(kBall, cameras, kSize);
+  for (Camera& camera : input.cameras) {  // OpenCV's axes, taken for these
+    for (int i = 3; i < 9; ++i) camera.rotation[i] *= -1;
+    for (int i = 1; i < 3; ++i) camera.translation[i] *= -1;
+  }
+  ExpectMessage(GuessSphere(input).status(), "view 0", "faces away", "6 of 6", "OpenCV");
+  input = InputOfBall(kBall, cameras, kSize);
+  input.cameras[3] = LookingFrom({3, 0, 0}, {9, 0, 0});
+  input.cameras[4] = LookingFrom({-3, 1, 0}, {-9, 4, 0});
+  ExpectMessage(GuessSphere(input).status(), "view ", "faces away", " of 6", "pass each other by");
+  input = InputOfBall(kBall, cameras, kSize);
+  std::ranges::fill(input.images.alpha, 0.0f);
+  ExpectMessage(GuessSphere(input).status(), "all masks are empty");
+  // A scene of a thousandth of the size, that is nearer than the near plane.
+  input = InputOfBall(kBall, cameras, kSize);
+  for (Camera& camera : input.cameras)
+    for (float& t : camera.translation) t *= 1e-3f;
+  ExpectMessage(GuessSphere(input).status(), "view 0", "near plane of 0.01", "scale");
+  // Where steps of floats are larger than pixels.
+  const glm::dvec3 utm(1.2e6, 0, 5.1e5);
+  input = InputOfBall(kBall, Around(6, 360, utm), kSize);
+  std::ranges::fill(input.images.alpha, 1.0f);
+  ExpectMessage(GuessSphere(input).status(), "view 0", "move the cameras by (-1.2e+06");
+}
+
+// Their hull would be long and thin.
+TEST(FitStart, IsASphereWhereAllViewsLookOneWay) {
+  FitJob job;
+  job.input = InputOfBall(kBall, Around(10, 18), kSize);
+  job.config.template_level = 2;
+  job.config.texture_size = 32;
+  const auto start = PrepareFit(job, Workers(2));
+  ASSERT_TRUE(start.ok()) << start.status().message();
+  EXPECT_NE(start->note.find("within 1"), std::string::npos) << start->note;
+  EXPECT_NE(start->note.find("depth"), std::string::npos) << start->note;
+  for (std::size_t i = 0; i < start->scene.positions.size(); i += 3) {
+    const float* p = &start->scene.positions[i];
+    EXPECT_LT(glm::distance(glm::dvec3(p[0], p[1], p[2]), kBall.centre), 0.7);
+  }
+  job.input = InputOfBall(kBall, Around(10), kSize);
+  EXPECT_EQ(PrepareFit(job, Workers(2)).value().note, "");
+}
+
+}  // namespace tilegrad::train::sphere_test
