@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "fit/bare_frames.h"
+#include "fit/camera_check.h"
 #include "fit/colmap_frames.h"
 #include "fit/undistort.h"
 #include "io/camera_file.h"
@@ -145,6 +146,15 @@ Result<Frames> ReadFrames(const Path& folder, double fov) {
   return out;
 }
 
+Status CheckCameras(const FitInput& input) {
+  const ImageSize size{input.images.width, input.images.height};
+  for (std::size_t i = 0; i < input.cameras.size(); ++i) {
+    TILEGRAD_TRY(CheckCamera(CameraCast<double>(input.cameras[i]), size)
+                     .Within("camera of " + input.names[i]));
+  }
+  return {};
+}
+
 Result<int> FindModel(const Dataset& dataset, const std::string& name) {
   for (std::size_t i = 0; i < dataset.models().size(); ++i) {
     const ModelInfo& model = dataset.models()[i];
@@ -177,6 +187,7 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
 }
 
 Status FinishInput(const InputOptions& options, FitInput* input) {
+  TILEGRAD_TRY(CheckCameras(*input));
   HoldOut(options.hold_out, input);
   TILEGRAD_TRY(ApplyBackground(options.background, input, options.watch));
   TILEGRAD_TRY(DropEmptyViews(input));

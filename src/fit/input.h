@@ -66,7 +66,8 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
 
 // What is left to do once there are names, cameras and images: masks as `background` says, of
 // images with alpha or opaque ones; every `hold_out`-th of the views that are not held out is.
-// Views whose mask is empty go, with a warning. An error if no view is left to fit.
+// Views whose mask is empty go, with a warning. An error if no view is left to fit, or names one
+// whose camera no fit can compute with (camera_check.h).
 Status FinishInput(const InputOptions& options, FitInput* input);
 
 // Whether some pixel is not opaque.

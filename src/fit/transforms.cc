@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/json_text.h"
+#include "fit/camera_check.h"
 
 namespace tilegrad::train {
 namespace {
@@ -40,7 +41,9 @@ Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image) {
   if (frame.angle_long > 0)
     from.fl_x = 0.5 * std::max(own.width, own.height) / std::tan(0.5 * frame.angle_long);
   TILEGRAD_ASSIGN(const Camera64 camera, io::CameraOf(from, own));
-  return CameraCast<float>(ResizeCamera(camera, own, image));
+  const Camera64 resized = ResizeCamera(camera, own, image);
+  TILEGRAD_TRY(CheckCamera(resized, image));
+  return CameraCast<float>(resized);
 }
 
 std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size) {

@@ -45,7 +45,7 @@ TEST(MaskDistance, OfNoPlaceIsFarOutside) {
     EXPECT_EQ(DistanceOf(alpha, 4, 3).At(wild, 1), -HUGE_VALF);
     EXPECT_EQ(DistanceOf(alpha, 4, 3).At(1, wild), -HUGE_VALF);
   }
-  EXPECT_TRUE(std::isfinite(DistanceOf(std::vector<float>{1, 0}, 2, 1).At(3e38f, -3e38f)));
+  EXPECT_LT(DistanceOf(std::vector<float>{1, 0}, 2, 1).At(3e38f, -3e38f), -1e38f);
 }
 
 class Hull : public TempFolderTest {

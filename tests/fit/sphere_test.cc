@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "fit/camera_check.h"
 #include "fit/run.h"
 #include "fit/synthetic_views.h"
 #include "support/temp_folder.h"
@@ -116,6 +117,24 @@ TEST(GuessSphere, ErrorsNameTheCameraAndTheCause) {
   input = InputOfBall(kBall, Around(6, 360, utm), kSize);
   std::ranges::fill(input.images.alpha, 1.0f);
   ExpectMessage(GuessSphere(input).status(), "view 0", "move the cameras by (-1.2e+06");
+}
+
+TEST(FitCameras, WildNumbersAreRefusedByName) {
+  const auto refused = [](const auto& change, const char* part) {
+    Camera64 camera = CameraCast<double>(Around(1)[0]);
+    change(camera);
+    ExpectMessage(CheckCamera(camera, {kSize, kSize}), part);
+  };
+  for (const double wild : {1e38, 2e37, 1e10, 1e300})
+    refused([&](Camera64& c) { c.translation[2] = -wild; }, "from the world's origin");
+  for (const double wild : {1e-18, 1e-44, 1e-3, 1e12})
+    refused([&](Camera64& c) { c.fx = wild; }, "focal lengths");
+  refused([](Camera64& c) { c.cy = -1e20; }, "principal point");
+  refused([](Camera64& c) { c.fy = NAN; }, "focal lengths");
+  refused([](Camera64& c) { c.rotation[0] = NAN; }, "not finite");
+  FitInput input = InputOfBall(kBall, Around(3), kSize);
+  input.cameras[1].translation[0] = 1e38f;
+  ExpectMessage(FinishInput({}, &input), "view 1", "from the world's origin");
 }
 
 // Their hull would be long and thin.
