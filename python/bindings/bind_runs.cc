@@ -73,17 +73,27 @@ train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& 
   return input;
 }
 
+// None: of a folder, as its cameras make plain; cameras that are given in numbers are taken as they
+// are, since whoever has them renders with them.
+std::optional<UpAxis> UpOf(const py::dict& views) {
+  const auto word = views["up"].cast<std::string>();
+  if (word.empty()) return views.contains("folder") ? std::nullopt : std::optional(UpAxis::kY);
+  const auto up = UpAxisNamed(word);
+  if (!up) throw py::value_error(fmt::format("fit: up is '{}', expected y, z or x", word));
+  return up;
+}
+
 train::InputOptions InputOptionsOf(const py::dict& views) {
   const auto background = views["background"].cast<std::string>();
   const auto known = train::BackgroundNamed(background);
   if (!known)
     throw py::value_error(
         fmt::format("fit: background is '{}', expected auto, mask, plain or none", background));
-  return {views["hold_out"].cast<int>(), *known, views["fov"].cast<double>()};
+  return {views["hold_out"].cast<int>(), *known, views["fov"].cast<double>(), UpOf(views), {}};
 }
 
 // views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out", "background",
-// "fov".
+// "fov", "up".
 train::FitInput InputOf(const py::dict& views, Listener* listening) {
   train::InputOptions options = InputOptionsOf(views);
   options.watch = {listening->Sink(), &listening->stop()};

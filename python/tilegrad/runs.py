@@ -67,7 +67,7 @@ class TrainResult:
 
 
 def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
-        background: str = "auto", fov: float = 65, find_cameras: bool = False,
+        background: str = "auto", fov: float = 65, up: str = "", find_cameras: bool = False,
         hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
         material: str = "unlit", lighting: str = "none", quality: str = "",
         out: Optional[Path] = None, resume: bool = False, callback: Optional[Callback] = None,
@@ -82,6 +82,8 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     masks: (N, H, W), white is the object.
     background: where masks come from: "mask", alpha and masks; "plain", plain backgrounds; "auto",
         the former if there are any; "none": every pixel shows the object.
+    up: "y", "z" or "x", the axis of the cameras' world that points up: the mesh is turned to have y
+        up, as glTF. "": of a folder what its cameras make plain, else y.
     find_cameras: looks for the cameras in the images, though there are some.
     hold_out: every hold_out-th image is not fitted but judged by; 0: none.
     start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
@@ -101,7 +103,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     """
     views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
              "find_cameras": bool(find_cameras), "fov": _degrees("fov", fov),
-             **_texts(background=background), **_pictures(images, cameras, masks, model)}
+             **_texts(background=background, up=up), **_pictures(images, cameras, masks, model)}
     if quality and "steps" in options:
         raise ValueError("fit: quality and steps both say how many steps; give one of them")
     request = {"options": _words(options), "start": _mesh_dict(start), "truth": _mesh_dict(truth),

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/folder_lock.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/fit_outcome.h"
@@ -38,7 +39,7 @@ struct FitOptions {
   GivenOptions given;  // that the fit depends on
 };
 
-Result<Mesh> LoadFitMesh(const std::string& path, OutputGuard* guard) {
+Result<Mesh> LoadFitMesh(const std::string& path, UpAxis up, OutputGuard* guard) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
   guard->AddInputs(loaded.files);
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
@@ -47,6 +48,9 @@ Result<Mesh> LoadFitMesh(const std::string& path, OutputGuard* guard) {
         "{}: too far from the origin to be fitted; move mesh and cameras by ({}, {}, {})", path,
         -o.x, -o.y, -o.z);
   }
+  // glTF has y up, whatever the cameras have; others are in the cameras' world.
+  const std::string ending = LowerCase(Path(path).extension().string());
+  if (ending != ".glb" && ending != ".gltf") TurnUpright(up, &loaded.mesh);
   return std::move(loaded.mesh);
 }
 
@@ -68,6 +72,13 @@ Status SetConfig(const FitOptions& options, FitConfig* config) {
   const train::ParameterSet& set = config->parameters;
   config->vertex_colors = set[Parameter::kColors];
   return {};
+}
+
+// Directions are given in the world of the cameras.
+void TurnLight(UpAxis up, FitConfig* config) {
+  auto& d = config->light_direction;
+  const glm::vec3 turned = Upright(up, {d[0], d[1], d[2]});
+  d = {turned.x, turned.y, turned.z};
 }
 
 // Before anything is read or made: a folder that was misspelt would get a fit of its own.
@@ -95,6 +106,7 @@ Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, Out
   guard->AddInput(options.input);
   TILEGRAD_ASSIGN(job.input, ReadInput(options, watch));
   PrintWarnings(job.input, 0);
+  if (!options.light_direction.empty()) TurnLight(job.input.up, &job.config);
   static const std::map<std::string, train::StartShape> shapes = {
       {"auto", train::StartShape::kAuto},
       {"hull", train::StartShape::kHull},
@@ -102,10 +114,10 @@ Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, Out
   if (const auto shape = shapes.find(options.start); shape != shapes.end()) {
     job.config.start = shape->second;
   } else {
-    TILEGRAD_ASSIGN(job.start, LoadFitMesh(options.start, guard));
+    TILEGRAD_ASSIGN(job.start, LoadFitMesh(options.start, job.input.up, guard));
   }
   if (!options.truth.empty()) {
-    TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, guard));
+    TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, job.input.up, guard));
   }
   TILEGRAD_TRY(train::CheckFit(job));
   return job;

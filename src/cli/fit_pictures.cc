@@ -8,7 +8,7 @@
 namespace tilegrad::cli {
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
   // OneOf has checked it.
-  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov, watch};
+  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov, pictures.up, watch};
 }
 
 void PrintWarnings(const train::FitInput& input, std::size_t first) {
@@ -28,6 +28,12 @@ void AddPictureOptions(Command* command, FitPictures* o) {
   command->Add(
       "--find-cameras", &o->find_cameras,
       "look for the cameras in the images, though the folder has some; these judge the result");
+  command->Add("--up",
+               Choice<std::optional<UpAxis>>(
+                   &o->up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
+               "the axis of the cameras' world that points up: everything is turned to have y up, "
+               "as glTF wants it [what the cameras make plain, else y]",
+               {Excludes{{"--model"}}});
   command->Add("--fov", &o->fov, "degrees that images without cameras see along their longer side",
                {Range{5, 150}});
 }

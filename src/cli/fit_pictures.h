@@ -2,6 +2,7 @@
 // tilegrad fit: what pictures need that lack masks or cameras.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "cli/command.h"
@@ -13,6 +14,7 @@ struct FitPictures {
   std::string background = "auto";
   double fov = train::kUsualFov;
   bool find_cameras = false;
+  std::optional<UpAxis> up;
 };
 void AddPictureOptions(Command* command, FitPictures* pictures);
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch);

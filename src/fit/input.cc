@@ -8,6 +8,7 @@
 #include "fit/bare_frames.h"
 #include "fit/camera_check.h"
 #include "fit/colmap_frames.h"
+#include "fit/input_up.h"
 #include "fit/undistort.h"
 #include "io/camera_file.h"
 #include "train/data/dataset.h"
@@ -193,6 +194,7 @@ Status FinishInput(const InputOptions& options, FitInput* input) {
   TILEGRAD_TRY(DropEmptyViews(input));
   if (input->training.empty())
     return InvalidArgument("all views are held out: none is left to fit");
+  if (input->posed) TurnInputUpright(options.up, input);
   return {};
 }
 
@@ -234,7 +236,7 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
     input.names.push_back(fmt::format("view {}", i));
   }
   input.occupancy = std::move(data.occupancy);
-  TILEGRAD_TRY(FinishInput({hold_out, Background::kMask}, &input));
+  TILEGRAD_TRY(FinishInput({hold_out, Background::kMask, kUsualFov, UpAxis::kY}, &input));
   return input;
 }
 

@@ -15,6 +15,7 @@
 #include "fit/image_loss.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
+#include "scene/up_axis.h"
 
 namespace tilegrad::train {
 
@@ -30,6 +31,7 @@ struct FitInput {
   // else empty. In a world of their own.
   std::vector<Camera> given_cameras;
   std::vector<std::string> warnings;  // for people
+  UpAxis up = UpAxis::kY;  // of the world that the input is from; in that of `cameras` it is y
 
   // Of a dataset, what is known of the truth: occupancy at kOccupancyResolution. Else empty.
   std::vector<std::uint8_t> occupancy;
@@ -50,6 +52,8 @@ struct InputOptions {
   int hold_out = 0;  // every n-th view; 0: none
   Background background = Background::kAuto;
   double fov = kUsualFov;  // of images without cameras, degrees along their longer side
+  // The axis of the cameras' world that points up; none: as the cameras make plain, or else y.
+  std::optional<UpAxis> up = std::nullopt;
   Watch watch = {};  // of reading and masks
 };
 
@@ -65,9 +69,9 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
 }
 
 // What is left to do once there are names, cameras and images: masks as `background` says, of
-// images with alpha or opaque ones; every `hold_out`-th of the views that are not held out is.
-// Views whose mask is empty go, with a warning. An error if no view is left to fit, or names one
-// whose camera no fit can compute with (camera_check.h).
+// images with alpha or opaque ones; every `hold_out`-th of the views that are not held out is; the
+// world turned so that y is up (input_up.h). Views whose mask is empty go, with a warning. An error
+// if no view is left to fit, or names one whose camera no fit can compute with (camera_check.h).
 Status FinishInput(const InputOptions& options, FitInput* input);
 
 // Whether some pixel is not opaque.

@@ -4,15 +4,12 @@
 #include <algorithm>
 
 namespace tilegrad {
-namespace {
 
 glm::vec3 Upright(UpAxis up, glm::vec3 v) {
   if (up == UpAxis::kZ) return {v.x, v.z, -v.y};
   if (up == UpAxis::kX) return {-v.y, v.x, v.z};
   return v;
 }
-
-}  // namespace
 
 std::optional<UpAxis> UpAxisNamed(std::string_view name) {
   if (name == "y" || name == "Y") return UpAxis::kY;
@@ -25,6 +22,16 @@ void TurnUpright(UpAxis up, Mesh* mesh) {
   if (up == UpAxis::kY) return;
   for (auto* vectors : {&mesh->positions, &mesh->normals, &mesh->corner_normals})
     for (glm::vec3& v : *vectors) v = Upright(up, v);
+}
+
+// The rows of a rotation are directions in the world.
+Camera UprightCamera(UpAxis up, Camera camera) {
+  for (int i = 0; i < 3; ++i) {
+    float* r = camera.rotation + 3 * i;
+    const glm::vec3 turned = Upright(up, {r[0], r[1], r[2]});
+    for (int k = 0; k < 3; ++k) r[k] = turned[k];
+  }
+  return camera;
 }
 
 // A row r of the rotation meets Upright(v) as the row R^T r meets v.

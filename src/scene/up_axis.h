@@ -17,10 +17,17 @@ enum class UpAxis { kY, kZ, kX };
 // "y", "z", "x", in upper case, too; nothing for other words.
 std::optional<UpAxis> UpAxisNamed(std::string_view name);
 
-// Positions and normals; exact.
+// A place or a direction; exact, as all of these.
+glm::vec3 Upright(UpAxis up, glm::vec3 v);
+
+// Positions and normals.
 void TurnUpright(UpAxis up, Mesh* mesh);
 
-// The camera that sees of a mesh as its file has it what `camera` sees of the one turned upright.
+// The camera that sees of a mesh turned upright what `camera` sees of the one as its file has it.
+Camera UprightCamera(UpAxis up, Camera camera);
+
+// And back: the camera that sees of a mesh as its file has it what `camera` sees of the one turned
+// upright.
 Camera CameraOfFile(UpAxis up, Camera camera);
 
 }  // namespace tilegrad

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "base/text.h"
 #include "fit/transforms.h"
 #include "io/image_file.h"
@@ -181,6 +183,17 @@ TEST_F(Input, ColmapCamerasThatNoImageUsesMayBeOfAnyKind) {
   ExpectTwoViews("p", false);
   Write("p/sparse/0/cameras.txt", std::string("1 NEVER_HEARD_OF 1 2 3\n"));
   ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "cameras.txt: line 1", "NEVER_HEARD_OF");
+}
+
+TEST_F(Input, IsTurnedAsUpSays) {
+  Model("u/sparse/0");
+  Images("u/images");
+  const auto given = ReadFitFolder(folder_ / "u", {.up = UpAxis::kY});
+  const auto turned = ReadFitFolder(folder_ / "u", {.up = UpAxis::kZ});
+  ASSERT_TRUE(given.ok() && turned.ok());
+  const Camera expected = UprightCamera(UpAxis::kZ, given->cameras[1]);
+  EXPECT_TRUE(std::ranges::equal(turned->cameras[1].rotation, expected.rotation));
+  EXPECT_FALSE(std::ranges::equal(turned->cameras[1].rotation, given->cameras[1].rotation));
 }
 
 // A cut-out of 8 x 6 pixels; the object is its first `columns`.

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "fit/camera_check.h"
+#include "fit/input_up.h"
 #include "fit/run.h"
 #include "fit/synthetic_views.h"
 #include "support/temp_folder.h"
@@ -153,6 +154,31 @@ TEST(FitStart, IsASphereWhereAllViewsLookOneWay) {
   }
   job.input = InputOfBall(kBall, Around(10), kSize);
   EXPECT_EQ(PrepareFit(job, Workers(2)).value().note, "");
+}
+
+TEST(GuessUp, IsZWhereCamerasStandAboutIt) {
+  // Of a ball, in a world with z up and turned to have y up.
+  const Ball of_file{{0.1, 0.2, 0.3}, 0.5}, turned{{0.1, 0.3, -0.2}, 0.5};
+  std::vector<Camera> of_z, leaning;
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.7 * i;
+    const glm::dvec3 eye =
+        of_file.centre + glm::dvec3(2 * std::cos(angle), 2 * std::sin(angle), 0.8);
+    of_z.push_back(LookingFrom(eye, of_file.centre, {0, 0, 1}));
+    leaning.push_back(LookingFrom(eye, of_file.centre, {1, 1, 1}));
+  }
+  EXPECT_EQ(GuessUp(of_z), UpAxis::kZ);
+  EXPECT_EQ(GuessUp(Around(8)), std::nullopt);
+  EXPECT_EQ(GuessUp(leaning), std::nullopt);
+  EXPECT_EQ(GuessUp(std::span(of_z).first(2)), std::nullopt);
+  FitInput input = InputOfBall(of_file, of_z, kSize);
+  TurnInputUpright(std::nullopt, &input);
+  EXPECT_EQ(input.up, UpAxis::kZ);
+  ASSERT_EQ(input.warnings.size(), 1u);
+  EXPECT_NE(input.warnings[0].find("--up y"), std::string::npos);
+  ExpectBall(GuessSphere(input), turned);
+  TurnInputUpright(UpAxis::kY, &input);
+  EXPECT_EQ(input.warnings.size(), 1u);
 }
 
 }  // namespace tilegrad::train::sphere_test

@@ -108,6 +108,7 @@ class Fit(unittest.TestCase):
         for call, message in (
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "did you mean steps"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "mask, plain or none"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, up="w"), "expected y, z or x"),
                 (lambda: tilegrad.fit(IMAGES, fov=200), "5 to 150 degrees"),
                 (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "cannot be found without masks"),
                 (lambda: tilegrad.fit(IMAGES[:3], CAMERAS), "cameras has shape"),

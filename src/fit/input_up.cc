@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/input_up.h"
+
+#include <cmath>
+#include <utility>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+// How cameras stand about an axis of the world: means of the axis along their x and y axes.
+struct Stand {
+  double tilt = 0, upright = 0;
+};
+
+Stand StandAbout(std::span<const Camera> cameras, int axis) {
+  Stand out;
+  for (const Camera& camera : cameras) {
+    out.tilt += std::abs(static_cast<double>(camera.rotation[axis]));
+    out.upright += static_cast<double>(camera.rotation[3 + axis]);
+  }
+  out.tilt /= static_cast<double>(cameras.size());
+  out.upright /= static_cast<double>(cameras.size());
+  return out;
+}
+
+}  // namespace
+
+std::optional<UpAxis> GuessUp(std::span<const Camera> cameras) {
+  constexpr double kLevel = 0.1, kRolled = 0.25, kUpright = 0.2;
+  constexpr std::size_t kLeastCameras = 4;
+  if (cameras.size() < kLeastCameras || StandAbout(cameras, 1).tilt < kRolled) return std::nullopt;
+  for (const auto& [axis, up] : {std::pair(2, UpAxis::kZ), std::pair(0, UpAxis::kX)}) {
+    const Stand stand = StandAbout(cameras, axis);
+    if (stand.tilt < kLevel && stand.upright > kUpright) return up;
+  }
+  return std::nullopt;
+}
+
+void TurnInputUpright(std::optional<UpAxis> up, FitInput* input) {
+  if (!up) {
+    up = GuessUp(input->cameras);
+    if (up) {
+      input->warnings.push_back(fmt::format(
+          "the cameras stand upright about the {0} axis, so {0} is taken for up, and the mesh is "
+          "turned to have y up; --up y leaves it as the cameras have it",
+          *up == UpAxis::kZ ? "z" : "x"));
+    }
+  }
+  input->up = up.value_or(UpAxis::kY);
+  for (Camera& camera : input->cameras) camera = UprightCamera(input->up, camera);
+}
+
+}  // namespace tilegrad::train
