@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "base/rng.h"
 #include "fuzz/target.h"
 
 namespace tilegrad::fuzz {
@@ -27,5 +28,12 @@ class Numbers {
  private:
   Input rest_;
 };
+
+inline Bytes RandomBytes(std::uint64_t seed, std::size_t size) {
+  Rng rng(seed);
+  Bytes out(size);
+  for (std::uint8_t& byte : out) byte = static_cast<std::uint8_t>(rng.Next());
+  return out;
+}
 
 }  // namespace tilegrad::fuzz

@@ -4,12 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 
-#include "base/rng.h"
+#include "fuzz/numbers.h"
 #include "fuzz/target.h"
 #include "support/source_dir.h"
 
@@ -69,7 +70,7 @@ extern "C" void KeepInput(int signal) {
 }
 
 void Feed(const Target& target, Input input) {
-  std::signal(SIGABRT, KeepInput), std::signal(SIGSEGV, KeepInput);
+  for (const int signal : {SIGABRT, SIGSEGV, SIGFPE}) std::signal(signal, KeepInput);
   g_input = input;
   target.run(input);
 }
@@ -105,6 +106,26 @@ TEST_P(Replay, WhatWasFound) {
 
 INSTANTIATE_TEST_SUITE_P(Fuzz, Replay, testing::ValuesIn(Targets()),
                          [](const auto& p) { return p.param.name; });
+
+// Fits of cameras, masks and settings that nobody chose: the first `count` of a list without end,
+// or as many as TILEGRAD_RANDOM_FITS says.
+void RunRandomFits(std::uint64_t count) {
+  constexpr double kMostSeconds = 10;  // of one
+  if (const char* set = std::getenv("TILEGRAD_RANDOM_FITS"))
+    count = std::strtoull(set, nullptr, 10);
+  const auto target = std::ranges::find(Targets(), std::string("fit"), &Target::name);
+  ASSERT_NE(target, Targets().end());
+  for (std::uint64_t seed = 1000; seed < 1000 + count; ++seed) {
+    const Bytes bytes = RandomBytes(seed, 4000);
+    const auto start = std::chrono::steady_clock::now();
+    Feed(*target, bytes);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    EXPECT_LT(taken.count(), kMostSeconds) << "seed " << seed;
+  }
+}
+
+TEST(RandomFits, EndOrSayWhy) { RunRandomFits(60); }
+TEST(RandomFits, LongListsEndOrSayWhy) { RunRandomFits(10000); }
 
 // A folder of another name would never be looked at.
 TEST(ReplayFolders, EachIsOfATarget) {
