@@ -21,7 +21,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # network: (counted steps, goal of ours / PyTorch on one core, on two)
-NETWORKS = {"reconstruction": (9, 0.70, 0.62), "unet": (3, 0.77, None), "critic": (9, 0.62, None),
+NETWORKS = {"reconstruction": (9, 0.70, 0.62), "critic": (9, 0.62, None),
             "adversarial": (21, 0.60, None), "gan": (21, 0.60, None)}
 WARM_UP = 2
 
@@ -84,7 +84,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("networks", nargs="*", default=list(NETWORKS), metavar="NETWORK",
                         help="of " + ", ".join(NETWORKS))
-    parser.add_argument("--steps", type=int, help="counted steps of each (default: 9, unet 3)")
+    parser.add_argument("--steps", type=int, help="counted steps of each (default: 9 or 21)")
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--server", default=str(ROOT / "build/release/bench/nn/nn_step_server"))
     parser.add_argument("--python", default="/usr/bin/python3", help="one that has torch")

@@ -43,36 +43,6 @@ class Reconstruction(nn.Module):
         return self.shape(code).square().mean() + self.color(code).square().mean()
 
 
-def twice(before, after):
-    layers = []
-    for _ in range(2):
-        layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after),
-                   nn.ReLU(inplace=True)]
-        before = after
-    return nn.Sequential(*layers)
-
-
-class Painter(nn.Module):
-    def __init__(self):
-        super().__init__()
-        c = [64, 128, 256, 512, 1024]
-        self.down = nn.ModuleList(twice(3 if i == 0 else c[i - 1], c[i]) for i in range(5))
-        self.up = nn.ModuleList(nn.ConvTranspose2d(c[i + 1], c[i], 2, stride=2) for i in range(4))
-        self.merge = nn.ModuleList(twice(2 * c[i], c[i]) for i in range(4))
-        self.out = nn.Conv2d(c[0], 3, 1)
-        self.pool = nn.MaxPool2d(2)
-        self.image = torch.rand(4, 3, 256, 256)
-
-    def loss(self):
-        levels = [self.down[0](self.image)]
-        for down in self.down[1:]:
-            levels.append(down(self.pool(levels[-1])))
-        y = levels[-1]
-        for i in reversed(range(4)):
-            y = self.merge[i](torch.cat([levels[i], self.up[i](y)], 1))
-        return (self.out(y) - self.image).abs().mean()
-
-
 class Judge(nn.Module):
     def __init__(self, batch=32, base=64, channels=3, size=(64, 64), border="zeros"):
         super().__init__()
@@ -116,7 +86,7 @@ class Forger(nn.Module):
         return self.pictures.loss() + self.maps.loss() - self.maps.net(made).mean()
 
 
-NETWORKS = {"reconstruction": Reconstruction, "unet": Painter, "critic": Judge,
+NETWORKS = {"reconstruction": Reconstruction, "critic": Judge,
             "adversarial": lambda: Judge(batch=24, base=32), "gan": Forger}
 
 

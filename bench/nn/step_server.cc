@@ -66,8 +66,7 @@ int Serve(const char* network, int workers_count) {
 
 int main(int argc, char** argv) {
   if (argc != 3) {
-    std::fprintf(stderr,
-                 "usage: nn_step_server reconstruction|unet|critic|adversarial|gan WORKERS\n");
+    std::fprintf(stderr, "usage: nn_step_server reconstruction|critic|adversarial|gan WORKERS\n");
     return 2;
   }
   const tilegrad::Status status = tilegrad::ForceTargetFromEnvironment();

@@ -87,19 +87,6 @@ class Reconstruction {
   Sequential encoder_, shape_, color_;
 };
 
-class Painter {
- public:
-  explicit Painter(Context& context)
-      : image_(RandomImages(context, {4, 3, 256, 256}, 2)), net_(context, {}, rng_) {}
-  std::vector<NamedVar> All() { return Parameters(net_); }
-  Var Loss() { return Mean(Abs(net_.Forward(image_, Mode::kTrain) - image_)); }
-
- private:
-  Var image_;
-  Rng rng_{1};
-  ConvUNet net_;
-};
-
 class Judge {
  public:
   Judge(Context& context, const Shape& images, const CriticShape& critic)
@@ -174,7 +161,6 @@ class Forger {
 
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context) {
   if (name == "reconstruction") return std::make_unique<StepOf<Reconstruction>>(context);
-  if (name == "unet") return std::make_unique<StepOf<Painter>>(context);
   if (name == "critic") return std::make_unique<StepOf<LargeJudge>>(context);
   if (name == "adversarial") return std::make_unique<StepOf<SmallJudge>>(context);
   if (name == "gan") return std::make_unique<StepOf<Forger>>(context);

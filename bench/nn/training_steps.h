@@ -19,7 +19,6 @@ class TrainingStep {
 
 // "reconstruction": the network of the paper's section 5.1 (34.1 million parameters, batch 64), its
 //   loss replaced by a mean of squares. 55 GFLOP.
-// "unet": a U-Net of 31 million parameters on 4 images of 256 x 256. 1155 GFLOP.
 // "critic": the critic of a WGAN with gradient penalty, channels 64 to 512, 32 images of 64 x 64:
 //   three forward passes, one inner gradient, the backward pass through both. 66 GFLOP.
 // "adversarial": the critic of configs/texture_adversarial.toml: channels 32 to 256, 24 images.
@@ -27,8 +26,8 @@ class TrainingStep {
 // views
 //   (18 channels), the critic of maps (half of 128 x 128), each with gradient penalty, and the
 //   generator of maps, which learns from the second critic.
-inline constexpr std::array<std::string_view, 5> kTrainingSteps = {"reconstruction", "unet",
-                                                                   "critic", "adversarial", "gan"};
+inline constexpr std::array<std::string_view, 4> kTrainingSteps = {"reconstruction", "critic",
+                                                                   "adversarial", "gan"};
 
 // One of the above; null for another name.
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context);

@@ -45,14 +45,6 @@ TEST_P(Allocation, NoneInTheGame) {
   EXPECT_EQ(AllocationsLater([&](std::uint64_t i) { game.Step(i); }), 0);
 }
 
-TEST_P(Allocation, NoneInConvUNet) {
-  const Workers workers(GetParam());
-  Context context(workers);
-  Rng rng(1);
-  ConvUNet net(context, {.base = 16, .depth = 3}, rng);
-  EXPECT_EQ(AllocationsOfTraining(context, net, {2, 3, 16, 16}), 0);
-}
-
 TEST_P(Allocation, NoneInAnEncoder) {
   const Workers workers(GetParam());
   Context context(workers);

@@ -26,7 +26,7 @@ class Game {
         net_(context_, {.base = 5, .most = 11, .levels = 3, .resize = true, .output = &Sigmoid},
              rng_),
         wide_critic_(context_, {.base = 16, .halvings = 2}, rng_),
-        wide_net_(context_, {.base = 16, .depth = 2}, rng_),
+        wide_net_(context_, {.base = 16, .levels = 2, .resize = true}, rng_),
         adam_(context_, All(), {.learning_rate = 1e-3, .weight_decay = 1e-2}) {}
 
   double Step(std::uint64_t step) {
@@ -75,7 +75,7 @@ class Game {
   Critic critic_, judge_;
   UNet net_;
   Critic wide_critic_;
-  ConvUNet wide_net_;
+  UNet wide_net_;
   Adam adam_;
 };
 

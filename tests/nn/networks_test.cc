@@ -133,20 +133,6 @@ TEST_F(Networks, AMapThatWrapsHasNoEdges) {
   }
 }
 
-// 64 to 1024 channels: 31.0 million parameters, as the field's implementations count them.
-TEST_F(Networks, ConvUNetDifferentiated) {
-  {
-    Context context(workers_);
-    ConvUNet net(context, {}, rng_);
-    EXPECT_NEAR(static_cast<double>(CountParameters(net)), 31.04e6, 0.01e6);
-  }
-  ConvUNet net(context_, {.in = 2, .out = 3, .base = 3, .depth = 3}, rng_);
-  const Var x = Input({2, 2, 8, 12});
-  EXPECT_EQ(net.Forward(x, Mode::kEval).shape(), (Shape{2, 3, 8, 12}));
-  ExpectGradient(net, [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); });
-  EXPECT_FALSE(net.Forward(Input({1, 2, 6, 8}), Mode::kTrain).valid());
-}
-
 TEST_F(Networks, LightHeadHasSixLayers) {
   Sequential net;
   AddLightHead(net, context_, {.in = 5, .width = 7, .out = 3}, rng_);

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "nn/ops/axis_map.h"
 #include "nn/ops/pointwise.h"
-#include "nn/ops/pool.h"
+#include "nn/ops/shape.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -142,59 +142,6 @@ void UNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   }
   for (std::size_t k = 0; k < grow_.size(); ++k)
     grow_[k].Visit(prefix + "grow" + std::to_string(k + 1) + ".", visitor);
-}
-
-ConvUNet::ConvUNet(Context& context, const ConvUNetShape& shape, Rng& rng) {
-  const auto channels = [&](int level) { return shape.base << level; };
-  const auto twice = [&](std::int64_t in, std::int64_t out) {
-    Sequential net;
-    for (const char* name : {"1", "2"}) {
-      AddConvBlock(net, name, context,
-                   {.conv = {.in = in, .out = out, .options = {.padding = 1}},
-                    .norm = shape.norm,
-                    .activation = &Relu},
-                   rng);
-      in = out;
-    }
-    return net;
-  };
-  for (int i = 0; i < shape.depth; ++i) {
-    down_.push_back(twice(i == 0 ? shape.in : channels(i - 1), channels(i)));
-  }
-  for (int i = 0; i + 1 < shape.depth; ++i) {
-    const ConvShape up{
-        .in = channels(i + 1), .out = channels(i), .kernel = 2, .options = {.stride = 2}};
-    up_.emplace_back().Add<ConvTranspose2dLayer>("conv", context, up, rng);
-    merge_.push_back(twice(2 * channels(i), channels(i)));
-  }
-  out_.Add<Conv2dLayer>("conv", context,
-                        ConvShape{.in = channels(0), .out = shape.out, .kernel = 1}, rng);
-}
-
-Var ConvUNet::Forward(const Var& x, Mode mode) {
-  if (!x.valid()) return x;
-  if (const Status s = CheckImage(x, up_.size()); !s.ok()) return Fail(x, s);
-  StepVector<Var> levels({down_[0].Forward(x, mode)}, x.context().allocator<Var>());
-  for (std::size_t i = 1; i < down_.size(); ++i) {
-    levels.push_back(down_[i].Forward(MaxPool2d(levels.back(), {}), mode));
-  }
-  Var y = levels.back();
-  for (std::size_t i = up_.size(); i-- > 0;) {
-    y = merge_[i].Forward(Concat({levels[i], up_[i].Forward(y, mode)}, 1), mode);
-  }
-  return out_.Forward(y, mode);
-}
-
-void ConvUNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  const auto visit = [&](std::vector<Sequential>& nets, const char* name) {
-    for (std::size_t i = 0; i < nets.size(); ++i) {
-      nets[i].Visit(prefix + name + std::to_string(i + 1) + ".", visitor);
-    }
-  };
-  visit(down_, "down");
-  visit(up_, "up");
-  visit(merge_, "merge");
-  out_.Visit(prefix + "out.", visitor);
 }
 
 }  // namespace tilegrad::nn

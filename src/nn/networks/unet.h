@@ -53,25 +53,4 @@ class UNet : public Module {
   bool skips_;
 };
 
-// In the form of Ronneberger et al. 2015, with padding: two 3x3 convolutions with ReLU at each
-// level, max pooling down, 2x2 transposed convolutions up, a 1x1 convolution to the output. About
-// twice the work of the other form for each parameter.
-struct ConvUNetShape {
-  std::int64_t in = 3, out = 3;
-  std::int64_t base = 64;    // channels of the first level; they double with each
-  int depth = 5;             // levels; an image's sides are multiples of 2^(depth - 1)
-  Norm norm = Norm::kBatch;  // between a 3x3 convolution and its ReLU
-};
-
-class ConvUNet : public Module {
- public:
-  ConvUNet(Context& context, const ConvUNetShape& shape, Rng& rng);
-  Var Forward(const Var& x, Mode mode) override;  // [n, in, h, w] -> [n, out, h, w]
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
-
- private:
-  std::vector<Sequential> down_, up_, merge_;
-  Sequential out_;
-};
-
 }  // namespace tilegrad::nn
