@@ -17,6 +17,10 @@ Var RandomImages(Context& context, const Shape& shape, std::uint64_t seed) {
   return Constant(context, images);
 }
 
+Var Twice(const Var& x) {
+  return Resize(x, {2 * x.shape()[2], 2 * x.shape()[3]}, ResizeMode::kNearest);
+}
+
 // A network, its optimiser and its loss.
 template <class Network>
 class StepOf : public TrainingStep {
@@ -124,10 +128,10 @@ class Forger {
     for (std::int64_t level = 0, in = kRoot; level < 4; ++level, in /= 2) {
       const std::string name = "up" + std::to_string(level);
       const bool last = level == 3;
-      up_.Add<Upsample>(name + ".resize", ResizeMode::kNearest);
+      up_.Add<Activation>(name + ".resize", &Twice);
       AddConvBlock(up_, name, context,
                    {.conv = {.in = in, .out = last ? 3 : in / 2, .options = {.padding = 1}},
-                    .norm = last ? Norm::kNone : Norm::kBatch,
+                    .norm = !last,
                     .activation = last ? &Sigmoid : &LeakyRelu02},
                    rng_);
     }

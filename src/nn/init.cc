@@ -28,21 +28,6 @@ void FillUniform(Tensor& tensor, Rng& rng, double low, double high) {
   FillBy(tensor, [&] { return rng.Uniform(low, high); });
 }
 
-std::int64_t FanIn(const Shape& weight) { return weight.Product(1, weight.rank()); }
-
-std::int64_t FanOut(const Shape& weight) { return weight[0] * weight.Product(2, weight.rank()); }
-
-void FillHe(Tensor& weight, Rng& rng, double slope) {
-  const auto fan = static_cast<double>(std::max<std::int64_t>(1, FanIn(weight.shape())));
-  FillNormal(weight, rng, std::sqrt(2.0 / ((1.0 + slope * slope) * fan)));
-}
-
-void FillGlorot(Tensor& weight, Rng& rng) {
-  const std::int64_t fans = FanIn(weight.shape()) + FanOut(weight.shape());
-  const double bound = std::sqrt(6.0 / static_cast<double>(std::max<std::int64_t>(1, fans)));
-  FillUniform(weight, rng, -bound, bound);
-}
-
 void FillDefault(Tensor& tensor, Rng& rng, std::int64_t fan_in) {
   const double bound = 1.0 / std::sqrt(static_cast<double>(std::max<std::int64_t>(1, fan_in)));
   FillUniform(tensor, rng, -bound, bound);

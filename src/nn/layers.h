@@ -7,7 +7,6 @@
 //   Var y = net.Forward(x, Mode::kTrain);
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -17,8 +16,6 @@
 #include "nn/named_tensors.h"
 #include "nn/ops/batch_norm.h"
 #include "nn/ops/conv.h"
-#include "nn/ops/norm.h"
-#include "nn/ops/resize.h"
 #include "nn/tape.h"
 
 namespace tilegrad::nn {
@@ -36,12 +33,6 @@ class ModuleVisitor {
   virtual ~ModuleVisitor() = default;
   virtual void Parameter(const std::string& name, Var& value) = 0;
   virtual void Buffer(const std::string& name, Tensor& value) = 0;
-  // A buffer that files of earlier versions do not have: `derive` sets it from the rest.
-  virtual void NewBuffer(const std::string& name, Tensor& value,
-                         const std::function<void()>& derive) {
-    (void)derive;
-    Buffer(name, value);
-  }
 };
 
 class Module {
@@ -56,35 +47,15 @@ class Module {
 std::vector<NamedVar> Parameters(Module& module);
 // Parameters and buffers: what a checkpoint holds.
 std::vector<NamedTensor> State(Module& module);
-// What a pass in training mode changes: running statistics, vectors of spectral norms.
+// What a pass in training mode changes: running statistics.
 std::vector<NamedTensor> Buffers(Module& module);
 std::int64_t CountParameters(Module& module);
-// CopyByName into parameters and buffers. Of new buffers (ModuleVisitor) that `state` does not have
-// none is an error: they are derived from the rest.
+// CopyByName into parameters and buffers.
 Status LoadState(Module& module, const std::vector<NamedTensor>& state);
 
 struct LinearShape {
   std::int64_t in = 0, out = 0;
   bool bias = true;
-};
-
-// A weight divided by its largest singular value (SpectralNorm of ops/norm.h), which one power
-// iteration per training step tracks. The buffers are "spectral_u" and "spectral_v"; files that
-// were written before there was the second get W^T u / |W^T u|, with which sigma = u^T W v is the
-// |W^T u| that was taken then.
-class Spectral {
- public:
-  Spectral() = default;  // none: leaves weights as they are
-  // `transposed`: the weight is [in, out, ..], as that of a transposed convolution.
-  Spectral(const Var& weight, bool transposed, Rng& rng);
-  Var Normalised(const Var& weight, Mode mode);
-  // `weight`: what it is the norm of.
-  void Visit(const std::string& prefix, Var& weight, ModuleVisitor& visitor);
-
- private:
-  Var ByOutput(const Var& weight) const;
-  bool transposed_ = false;
-  SpectralVectors at_;
 };
 
 class LinearLayer : public Module {
@@ -102,38 +73,20 @@ struct ConvShape {
   int kernel = 3;
   ConvOptions options = {};
   bool bias = true;
-  bool spectral = false;  // spectral norm of the weight
 };
 
-// Common base of the two convolutions.
-class ConvLayer : public Module {
+class Conv2dLayer : public Module {
  public:
+  // FillDefault by the fan-in of the weight's shape.
+  Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng);
+  Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
-  Var weight;
-  Var bias;  // [out]; invalid without
+  Var weight;  // [out, in, kernel, kernel]
+  Var bias;    // [out]; invalid without
 
- protected:
-  // FillDefault by the fan-in of the weight's shape, as PyTorch counts it.
-  ConvLayer(Context& context, const ConvShape& shape, bool transposed, Rng& rng);
+ private:
   ConvOptions options_;
-  Spectral spectral_;
-};
-
-class Conv2dLayer : public ConvLayer {
- public:
-  // weight: [out, in, kernel, kernel]
-  Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-      : ConvLayer(context, shape, /*transposed=*/false, rng) {}
-  Var Forward(const Var& x, Mode mode) override;
-};
-
-class ConvTranspose2dLayer : public ConvLayer {
- public:
-  // weight: [in, out, kernel, kernel]
-  ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-      : ConvLayer(context, shape, /*transposed=*/true, rng) {}
-  Var Forward(const Var& x, Mode mode) override;
 };
 
 // Of [n, c] and [n, c, h, w]. Running statistics as PyTorch: new = (1 - momentum) old + momentum
@@ -151,33 +104,6 @@ class BatchNorm : public Module {
  private:
   void Track(const BatchNormResult& batch, std::int64_t count);
   BatchNormOptions options_;
-};
-
-// Statistics over each sample: groups = 1 is layer norm with one gamma to a channel, groups =
-// channels instance norm.
-class GroupNormLayer : public Module {
- public:
-  GroupNormLayer(Context& context, std::int64_t channels, std::int64_t groups,
-                 const NormOptions& options = {});
-  Var Forward(const Var& x, Mode mode) override;
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
-
-  Var weight, bias;  // [channels]: gamma 1, beta 0 at the start
-
- private:
-  std::int64_t groups_;
-  NormOptions options_;
-};
-
-// Twice the height and the width.
-class Upsample : public Module {
- public:
-  explicit Upsample(ResizeMode mode) : mode_(mode) {}
-  Var Forward(const Var& x, Mode mode) override;
-  void Visit(const std::string&, ModuleVisitor&) override {}
-
- private:
-  ResizeMode mode_;
 };
 
 class Activation : public Module {
@@ -216,13 +142,13 @@ class Sequential : public Module {
   std::vector<std::pair<std::string, std::unique_ptr<Module>>> children_;
 };
 
-// y = shortcut(x) + body(x); an empty shortcut is x itself (He et al. 2016).
+// y = x + body(x) (He et al. 2016).
 class Residual : public Module {
  public:
   Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
-  Sequential body, shortcut;
+  Sequential body;
 };
 
 }  // namespace tilegrad::nn

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "nn/kernels/adam.h"
 #include "nn/kernels/product_adam.h"
-#include "nn/kernels/update.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -20,57 +19,55 @@ Tensor ZerosLike(Context& context, const Tensor& tensor) {
   return zeros;
 }
 
-Status CheckGradient(const std::string& optimizer, const NamedVar& parameter,
-                     const Gradient& gradient) {
+Status CheckGradient(const NamedVar& parameter, const Gradient& gradient) {
   const Tensor& p = parameter.value.value();
   if (gradient.valid() && gradient.shape() == p.shape() && gradient.dtype() == p.dtype()) return {};
-  return InvalidArgument("{}: parameter \"{}\" is {} of shape {}, its gradient {} of shape {}",
-                         optimizer, parameter.name, NameOf(p.dtype()), p.shape().ToString(),
+  return InvalidArgument("adam: parameter \"{}\" is {} of shape {}, its gradient {} of shape {}",
+                         parameter.name, NameOf(p.dtype()), p.shape().ToString(),
                          gradient.valid() ? NameOf(gradient.dtype()) : "invalid",
                          gradient.shape().ToString());
 }
 
+double DecayOf(const Tensor& parameter, double weight_decay) {
+  return parameter.shape().rank() > 1 ? weight_decay : 0.0;
+}
+
 }  // namespace
 
-Optimizer::Optimizer(Context& context, std::string name, std::vector<std::string> moments,
-                     std::vector<NamedVar> parameters)
-    : context_(context), name_(std::move(name)), moments_(std::move(moments)) {
+Adam::Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions& options)
+    : context_(context), options_(options) {
   for (NamedVar& p : parameters) {
-    Slot slot{p, {}};
-    for (std::size_t i = 0; i < moments_.size(); ++i) {
-      slot.moments.push_back(ZerosLike(context, p.value.value()));
-    }
-    slots_.push_back(std::move(slot));
+    const Tensor& value = p.value.value();
+    slots_.push_back({p, {ZerosLike(context, value), ZerosLike(context, value)}});
     parameters_.push_back(p.value);
   }
 }
 
-Status Optimizer::Step(std::span<const Var> gradients, double gradient_scale) {
+Status Adam::Step(std::span<const Var> gradients, double gradient_scale) {
   StepVector<Gradient> as_they_are(context_.allocator<Gradient>());
   as_they_are.reserve(gradients.size());
   for (const Var& g : gradients) as_they_are.emplace_back(g);
   return Step(as_they_are, gradient_scale);
 }
 
-Status Optimizer::Check(std::span<const Gradient> gradients) const {
+Status Adam::Check(std::span<const Gradient> gradients) const {
   TILEGRAD_TRY(context_.status());
   if (gradients.size() != slots_.size()) {
-    return InvalidArgument("{}: {} gradients for {} parameters", name_, gradients.size(),
-                           slots_.size());
+    return InvalidArgument("adam: {} gradients for {} parameters", gradients.size(), slots_.size());
   }
   for (std::size_t i = 0; i < slots_.size(); ++i) {
-    TILEGRAD_TRY(CheckGradient(name_, slots_[i].parameter, gradients[i]));
+    TILEGRAD_TRY(CheckGradient(slots_[i].parameter, gradients[i]));
   }
   return {};
 }
 
-Status Optimizer::Step(std::span<const Gradient> gradients, UpdateShare* share) {
+Status Adam::Step(std::span<const Gradient> gradients, UpdateShare* share) {
   if (share == nullptr) return Step(gradients);
   TILEGRAD_TRY(Check(gradients));
   ++steps_;
   BeginStep(/*gradient_scale=*/1);
   share->Begin(*this);
-  workers().For(share->pieces(), [&](std::size_t k, std::size_t) {
+  context_.workers().For(share->pieces(), [&](std::size_t k, std::size_t) {
     const UpdateShare::Piece piece = share->piece(k);
     Update(slots_[piece.parameter], gradients[piece.parameter].a().value(),
            {piece.begin, piece.end});
@@ -79,7 +76,7 @@ Status Optimizer::Step(std::span<const Gradient> gradients, UpdateShare* share) 
   return share->Finish();
 }
 
-Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scale) {
+Status Adam::Step(std::span<const Gradient> gradients, double gradient_scale) {
   TILEGRAD_TRY(Check(gradients));
   ++steps_;
   BeginStep(gradient_scale);
@@ -94,20 +91,19 @@ Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scal
   return {};
 }
 
-std::vector<NamedTensor> Optimizer::State() const {
+std::vector<NamedTensor> Adam::State() const {
   std::vector<NamedTensor> state;
   for (const Slot& slot : slots_) {
-    for (std::size_t i = 0; i < moments_.size(); ++i) {
-      state.push_back({name_ + "." + moments_[i] + "." + slot.parameter.name, slot.moments[i]});
-    }
+    state.push_back({"adam.m." + slot.parameter.name, slot.moments[0]});
+    state.push_back({"adam.v." + slot.parameter.name, slot.moments[1]});
   }
   Tensor steps = context_.Empty({1}, DType::kI64);
   *steps.data<std::int64_t>() = steps_;
-  state.push_back({name_ + ".steps", steps});
+  state.push_back({"adam.steps", steps});
   return state;
 }
 
-Status Optimizer::LoadState(const std::vector<NamedTensor>& state) {
+Status Adam::LoadState(const std::vector<NamedTensor>& state) {
   std::vector<NamedTensor> own = State(), count = {own.back()};
   TILEGRAD_TRY(CopyByName(state, count));
   const std::int64_t steps = *count[0].value.data<std::int64_t>();
@@ -116,14 +112,6 @@ Status Optimizer::LoadState(const std::vector<NamedTensor>& state) {
   steps_ = steps;
   return {};
 }
-
-namespace {
-
-double DecayOf(const Tensor& parameter, double weight_decay) {
-  return parameter.shape().rank() > 1 ? weight_decay : 0.0;
-}
-
-}  // namespace
 
 void Adam::BeginStep(double gradient_scale) {
   const auto t = static_cast<double>(steps());
@@ -148,7 +136,7 @@ void Adam::Update(Slot& slot, const Tensor& gradient, Numbers numbers) {
   WithFloatType(gradient.dtype(), [&]<class T>(T) {
     AdamProblem<T> problem = Problem<T>(slot, numbers);
     problem.gradient = gradient.data<T>() + numbers.begin;
-    AdamStep(problem, workers());
+    AdamStep(problem, context_.workers());
   });
 }
 
@@ -156,7 +144,7 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
   const Tensor &a = product.a().value(), &b = product.b().value();
   const auto steps = static_cast<std::size_t>(a.shape()[0]);
   if (a.dtype() != DType::kF32 || steps == 0 || steps > kMostProductAdamSteps) {
-    return Optimizer::UpdateByProduct(slot, product);
+    return Update(slot, product.Value().value(), {0, slot.parameter.value.value().elements()});
   }
   GemmProblem<float> gradient;
   gradient.m = static_cast<std::size_t>(a.shape()[1]), gradient.k = steps;
@@ -164,19 +152,7 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
   gradient.a = a.data<float>(), gradient.lda = gradient.m, gradient.transpose_a = true;
   gradient.b = b.data<float>(), gradient.ldb = gradient.n;
   const Numbers all{0, slot.parameter.value.value().elements()};
-  ProductAdamStep(gradient, Problem<float>(slot, all), context().kernels());
-}
-
-void Sgd::Update(Slot& slot, const Tensor& gradient, Numbers numbers) {
-  Tensor& p = slot.parameter.value.value();
-  const SgdCoefficients c{options_.learning_rate, options_.momentum, gradient_scale_,
-                          DecayOf(p, options_.weight_decay), options_.nesterov};
-  WithFloatType(p.dtype(), [&]<class T>(T) {
-    SgdStep(SgdProblem<T>{numbers.end - numbers.begin, p.data<T>() + numbers.begin,
-                          gradient.data<T>() + numbers.begin,
-                          slot.moments[0].data<T>() + numbers.begin, c},
-            workers());
-  });
+  ProductAdamStep(gradient, Problem<float>(slot, all), context_.kernels());
 }
 
 namespace {

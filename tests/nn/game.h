@@ -17,30 +17,24 @@ class Game {
  public:
   explicit Game(const Workers& workers)
       : context_(workers),
-        generator_(context_, {.noise = 9, .base = 6, .doublings = 2}, rng_),
-        critic_(
-            context_,
-            {.base = 5, .halvings = 2, .norm = Norm::kLayer, .padding_mode = PadMode::kCircular},
-            rng_),
-        judge_(context_, {.base = 4, .halvings = 2, .spectral = true}, rng_),
-        net_(context_, {.base = 5, .most = 11, .levels = 3, .resize = true, .output = &Sigmoid},
-             rng_),
+        critic_(context_, {.base = 5, .halvings = 2, .padding_mode = PadMode::kCircular}, rng_),
+        judge_(context_, {.base = 4, .halvings = 2}, rng_),
+        net_(context_, {.base = 5, .most = 11, .levels = 3, .output = &Sigmoid}, rng_),
         wide_critic_(context_, {.base = 16, .halvings = 2}, rng_),
-        wide_net_(context_, {.base = 16, .levels = 2, .resize = true}, rng_),
+        wide_net_(context_, {.base = 16, .levels = 2}, rng_),
         adam_(context_, All(), {.learning_rate = 1e-3, .weight_decay = 1e-2}) {}
 
   double Step(std::uint64_t step) {
     Rng rng(3, step);
-    const Var noise = Random({3, 9}, rng), real = Random({3, 3, 16, 16}, rng);
+    const Var real = Random({3, 3, 16, 16}, rng);
     const Var one = Slice(real, 0, 0, 1);
-    const Var fake = generator_.Forward(noise, Mode::kTrain);
     const Var painted = net_.Forward(real, Mode::kTrain);
     const Var pooled = AvgPool2d(MaxPool2d(painted, {3, 2, 1}), {2, 2});
     const Var larger = Resize(pooled, {7, 5}, ResizeMode::kBilinear);
     const Var labels = Reshape(Softmax(Reshape(larger, {3, -1}), 1), larger.shape());
-    const Var loss = Mean(critic_.Forward(fake, Mode::kTrain)) + GradientPenalty(critic_, real) +
+    const Var loss = Mean(critic_.Forward(painted, Mode::kTrain)) + GradientPenalty(critic_, real) +
                      Mean(Softplus(judge_.Forward(painted, Mode::kTrain))) + Mean(Square(labels)) +
-                     Mean(Elu(painted - real)) + GradientPenalty(wide_critic_, one) +
+                     Mean(Abs(painted - real)) + GradientPenalty(wide_critic_, one) +
                      Mean(Abs(wide_net_.Forward(one, Mode::kTrain) - one));
     const auto gradients = Grad(loss, adam_.parameters());
     const double scale = ClipFactor(GlobalNorm(context_, gradients), 1.0);
@@ -61,8 +55,8 @@ class Game {
   std::vector<NamedVar> All() {
     std::vector<NamedVar> all;
     int number = 0;
-    for (Module* module : std::initializer_list<Module*>{&generator_, &critic_, &judge_, &net_,
-                                                         &wide_critic_, &wide_net_}) {
+    for (Module* module :
+         std::initializer_list<Module*>{&critic_, &judge_, &net_, &wide_critic_, &wide_net_}) {
       const std::string prefix = std::to_string(++number) + ".";
       for (const NamedVar& p : Parameters(*module)) all.push_back({prefix + p.name, p.value});
     }
@@ -71,7 +65,6 @@ class Game {
 
   Context context_;
   Rng rng_{4};
-  Generator generator_;
   Critic critic_, judge_;
   UNet net_;
   Critic wide_critic_;

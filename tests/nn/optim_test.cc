@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optimisers, schedules and moving averages: steps by hand, and the same bits after saving and
+// Adam, schedules and moving averages: steps by hand, and the same bits after saving and
 // restoring and for any number of workers.
 #include "nn/optim.h"
 
@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "nn/nn.h"
 
@@ -21,25 +22,6 @@ class Optimisers : public ::testing::Test {
   Workers workers_{2};
   Context context_{workers_, DType::kF64};
 };
-
-// p = 1, g = 0.5, then 0.5 again: v = 0.5, p = 0.95; v = 0.45 + 0.5, p = 0.95 - 0.095.
-TEST_F(Optimisers, SgdWithMomentum) {
-  const Var p = Matrix(1.0);
-  Sgd sgd(context_, {{"p", p}}, {.learning_rate = 0.1, .momentum = 0.9});
-  ASSERT_TRUE(sgd.Step(Gradient({1, 1}, 0.25), 2.0).ok());
-  EXPECT_DOUBLE_EQ(p.item(), 0.95);
-  ASSERT_TRUE(sgd.Step(Gradient({1, 1}, 0.5)).ok());
-  EXPECT_DOUBLE_EQ(p.item(), 0.855);
-}
-
-// g = 0.5 + 0.01 * 1 = 0.51, v = 0.51, p = 1 - 0.1 (0.51 + 0.9 * 0.51).
-TEST_F(Optimisers, SgdAheadAndWithDecay) {
-  const Var p = Matrix(1.0);
-  Sgd sgd(context_, {{"p", p}},
-          {.learning_rate = 0.1, .momentum = 0.9, .nesterov = true, .weight_decay = 0.01});
-  ASSERT_TRUE(sgd.Step(Gradient({1, 1}, 0.5)).ok());
-  EXPECT_DOUBLE_EQ(p.item(), 1 - 0.1 * 1.9 * 0.51);
-}
 
 // The first step of Adam is the learning rate; the decay takes 0.1 * 0.2 of a matrix first, and
 // nothing of a vector.
@@ -87,15 +69,14 @@ TEST_F(Optimisers, MovingAverageFollows) {
   EXPECT_EQ(average.State()[0].name, "ema.p");
 }
 
-// A network of two layers trained with one of the optimisers and averaged.
+// A network of two layers, trained and averaged.
 struct Trained {
-  using Make = std::unique_ptr<Optimizer> (*)(Context&, std::vector<NamedVar>);
-  Trained(const Workers& workers, Make make) : context(workers) {
+  explicit Trained(const Workers& workers) : context(workers) {
     Rng rng(5);
     net.Add<LinearLayer>("fc1", context, LinearShape{.in = 40, .out = 300}, rng);
     net.Add<Activation>("relu", &Relu);
     net.Add<LinearLayer>("fc2", context, LinearShape{.in = 300, .out = 3}, rng);
-    optimizer = make(context, Parameters(net));
+    adam.emplace(context, Parameters(net), AdamOptions{.weight_decay = 0.01});
     average = std::make_unique<MovingAverage>(context, State(net), 0.9);
   }
   void Step(std::uint64_t step) {
@@ -103,12 +84,12 @@ struct Trained {
     Tensor x = context.Empty({7, 40});
     FillUniform(x, rng, -1, 1);
     const Var loss = Mean(Square(net.Forward(Constant(context, x), Mode::kTrain) - 1.0));
-    EXPECT_TRUE(optimizer->Step(Grad(loss, optimizer->parameters())).ok());
+    EXPECT_TRUE(adam->Step(Grad(loss, adam->parameters())).ok());
     average->Update();
   }
   std::vector<NamedTensor> All() {
     std::vector<NamedTensor> all = State(net);
-    for (const auto& more : {optimizer->State(), average->State()}) {
+    for (const auto& more : {adam->State(), average->State()}) {
       all.insert(all.end(), more.begin(), more.end());
     }
     return all;
@@ -117,64 +98,55 @@ struct Trained {
 
   Context context;
   Sequential net;
-  std::unique_ptr<Optimizer> optimizer;
+  std::optional<Adam> adam;
   std::unique_ptr<MovingAverage> average;
 };
 
-const Trained::Make kMakes[] = {
-    [](Context& c, std::vector<NamedVar> p) -> std::unique_ptr<Optimizer> {
-      return std::make_unique<Adam>(c, std::move(p), AdamOptions{.weight_decay = 0.01});
-    },
-    [](Context& c, std::vector<NamedVar> p) -> std::unique_ptr<Optimizer> {
-      return std::make_unique<Sgd>(c, std::move(p), SgdOptions{.momentum = 0.9, .nesterov = true});
-    }};
-
 TEST(SavedAndRestored, SameBitsForAnyNumberOfWorkers) {
-  for (const Trained::Make make : kMakes) {
-    Bytes want;
-    for (const int count : {1, 2, 7}) {
-      const Workers workers(count);
-      Trained a(workers, make), b(workers, make);
-      for (std::uint64_t step = 0; step < 3; ++step) a.Step(step);
-      const auto saved = DecodeSafetensors(b.context, a.Encoded()).value().tensors;
-      ASSERT_TRUE(LoadState(b.net, saved).ok());
-      ASSERT_TRUE(b.optimizer->LoadState(saved).ok());
-      ASSERT_TRUE(b.average->LoadState(saved).ok());
-      EXPECT_EQ(b.optimizer->steps(), 3);
-      for (std::uint64_t step = 3; step < 5; ++step) a.Step(step), b.Step(step);
-      EXPECT_EQ(a.Encoded(), b.Encoded());
-      if (want.empty()) want = a.Encoded();
-      EXPECT_EQ(a.Encoded(), want) << count;
+  Bytes want;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    Trained a(workers), b(workers);
+    for (std::uint64_t step = 0; step < 3; ++step) a.Step(step);
+    const auto saved = DecodeSafetensors(b.context, a.Encoded()).value().tensors;
+    ASSERT_TRUE(LoadState(b.net, saved).ok());
+    ASSERT_TRUE(b.adam->LoadState(saved).ok());
+    ASSERT_TRUE(b.average->LoadState(saved).ok());
+    EXPECT_EQ(b.adam->steps(), 3);
+    for (std::uint64_t step = 3; step < 5; ++step) {
+      a.Step(step);
+      b.Step(step);
     }
+    EXPECT_EQ(a.Encoded(), b.Encoded());
+    if (want.empty()) want = a.Encoded();
+    EXPECT_EQ(a.Encoded(), want) << count;
   }
 }
 
 TEST(SavedAndRestored, RefusesACountOfStepsBelowZero) {
   const Workers workers(1);
-  for (const Trained::Make make : kMakes) {
-    Trained trained(workers, make);
-    trained.Step(0);
-    const Bytes before = trained.Encoded();
-    auto state = DecodeSafetensors(trained.context, before).value().tensors;
-    for (NamedTensor& t : state) {
-      if (t.name.ends_with(".steps")) *t.value.data<std::int64_t>() = -1;
-      if (t.value.dtype() == DType::kF32) t.value.data<float>()[0] += 1;
-    }
-    EXPECT_EQ(trained.optimizer->LoadState(state).code(), StatusCode::kDataLoss);
-    EXPECT_EQ(trained.Encoded(), before);
+  Trained trained(workers);
+  trained.Step(0);
+  const Bytes before = trained.Encoded();
+  auto state = DecodeSafetensors(trained.context, before).value().tensors;
+  for (NamedTensor& t : state) {
+    if (t.name.ends_with(".steps")) *t.value.data<std::int64_t>() = -1;
+    if (t.value.dtype() == DType::kF32) t.value.data<float>()[0] += 1;
   }
+  EXPECT_EQ(trained.adam->LoadState(state).code(), StatusCode::kDataLoss);
+  EXPECT_EQ(trained.Encoded(), before);
 }
 
 // A network of the same start for each, trained along Gradients and along Grad.
 class ProductsOfGradients : public ::testing::Test {
  protected:
   struct Net {
-    explicit Net(Trained::Make make, DType dtype) : context(workers, dtype) {
+    explicit Net(DType dtype) : context(workers, dtype) {
       Rng rng(3);
       net.Add<LinearLayer>("fc1", context, LinearShape{.in = 37, .out = 50}, rng);
       net.Add<Activation>("tanh", &Tanh);
       net.Add<LinearLayer>("fc2", context, LinearShape{.in = 50, .out = 50}, rng);
-      optimizer = make(context, Parameters(net));
+      adam.emplace(context, Parameters(net), AdamOptions{.weight_decay = 0.01});
     }
     // `twice`: the second layer is used two times, so that its gradient is a sum.
     Var Loss(std::int64_t batch, bool twice) {
@@ -182,48 +154,46 @@ class ProductsOfGradients : public ::testing::Test {
       Tensor x = context.Empty({batch, 37});
       FillUniform(x, data, -1, 1);
       Var y = net.Forward(Constant(context, x), Mode::kTrain);
-      const auto parameters = optimizer->parameters();
+      const auto parameters = adam->parameters();
       if (twice) y = Linear(y, parameters[2], parameters[3]);
       return Mean(Square(y - 1.0));
     }
     Bytes Encoded() {
       std::vector<NamedTensor> all = State(net);
-      for (const NamedTensor& moment : optimizer->State()) all.push_back(moment);
+      for (const NamedTensor& moment : adam->State()) all.push_back(moment);
       return EncodeSafetensors({all, {}}).value();
     }
     Workers workers{2};
     Context context;
     Sequential net;
-    std::unique_ptr<Optimizer> optimizer;
+    std::optional<Adam> adam;
   };
 };
 
 TEST_F(ProductsOfGradients, SameBitsAsValues) {
-  for (const Trained::Make make : kMakes) {
-    for (const DType dtype : {DType::kF32, DType::kF64}) {
-      for (const std::int64_t batch : {7, 300}) {  // 300: more than ProductAdamStep takes
-        for (const bool twice : {false, true}) {
-          Net products(make, dtype), values(make, dtype);
-          for (int step = 0; step < 2; ++step) {
-            const auto g = Gradients(products.Loss(batch, twice), products.optimizer->parameters());
-            EXPECT_TRUE(g[0].is_product());
-            EXPECT_EQ(g[2].is_product(), !twice);
-            EXPECT_FALSE(g[1].is_product());
-            EXPECT_TRUE(products.optimizer->Step(g, 0.5).ok());
-            const auto v = Grad(values.Loss(batch, twice), values.optimizer->parameters());
-            EXPECT_TRUE(values.optimizer->Step(v, 0.5).ok());
-          }
-          EXPECT_EQ(products.Encoded(), values.Encoded()) << batch << twice;
+  for (const DType dtype : {DType::kF32, DType::kF64}) {
+    for (const std::int64_t batch : {7, 300}) {  // 300: more than ProductAdamStep takes
+      for (const bool twice : {false, true}) {
+        Net products(dtype), values(dtype);
+        for (int step = 0; step < 2; ++step) {
+          const auto g = Gradients(products.Loss(batch, twice), products.adam->parameters());
+          EXPECT_TRUE(g[0].is_product());
+          EXPECT_EQ(g[2].is_product(), !twice);
+          EXPECT_FALSE(g[1].is_product());
+          EXPECT_TRUE(products.adam->Step(g, 0.5).ok());
+          const auto v = Grad(values.Loss(batch, twice), values.adam->parameters());
+          EXPECT_TRUE(values.adam->Step(v, 0.5).ok());
         }
+        EXPECT_EQ(products.Encoded(), values.Encoded()) << batch << twice;
       }
     }
   }
 }
 
 TEST_F(ProductsOfGradients, NormIsThatOfValues) {
-  Net net(kMakes[0], DType::kF32);
-  const auto g = Gradients(net.Loss(5, false), net.optimizer->parameters());
-  const auto v = Grad(net.Loss(5, false), net.optimizer->parameters());
+  Net net(DType::kF32);
+  const auto g = Gradients(net.Loss(5, false), net.adam->parameters());
+  const auto v = Grad(net.Loss(5, false), net.adam->parameters());
   EXPECT_EQ(GlobalNorm(net.context, g), GlobalNorm(net.context, v));
   EXPECT_TRUE(IsFinite(net.context, g));
 }

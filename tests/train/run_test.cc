@@ -70,6 +70,22 @@ TEST_F(RunTest, ConfigErrorsNameFileLineAndKey) {
   ExpectMessage(ReadConfig(folder_ / "none.toml").status(), "none.toml");
 }
 
+TEST_F(RunTest, KeysOfFormerVersionsArePassedOver) {
+  const std::string texture = "task.kind = \"textured_image\"\n";
+  const auto old = ParseConfig(texture + "network.wrap = true\n", "old");
+  ASSERT_TRUE(old.ok()) << old.status().message();
+  EXPECT_EQ(WriteConfig(*old), WriteConfig(ParseConfig(texture, "new").value()));
+  ExpectMessage(ParseConfig(texture + "network.wrap = false\n", "c.toml").status(), "c.toml",
+                "line 2", "network.wrap is gone", "true");
+  const auto set = [](const char* assignment) {
+    TrainConfig config = ParseConfig("task.kind = \"textured_image\"\n", "new").value();
+    return ApplyOverrides({assignment}, &config);
+  };
+  EXPECT_TRUE(set("network.wrap=true").ok());
+  ExpectMessage(set("network.wrap=false"), "network.wrap is gone");
+  ExpectMessage(set("network.wrap=maybe"), "unknown key \"network.wrap\"");
+}
+
 // toml++ frees tables in tables by recursion.
 TEST_F(RunTest, ConfigsOfDeepKeys) {
   std::string key;

@@ -4,71 +4,22 @@
 #include <string>
 #include <utility>
 
-#include "nn/init.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
 
 namespace tilegrad::nn {
-namespace {
-
-constexpr ConvOptions kDouble = {.stride = 2, .padding = 1};  // of a transposed 4x4 kernel
-constexpr std::int64_t kRoot = 4;                             // pixels a side
-
-}  // namespace
-
-Generator::Generator(Context& context, const GeneratorShape& shape, Rng& rng)
-    : channels_(shape.base << (shape.doublings - 1)) {
-  root_.Add<LinearLayer>("fc", context,
-                         LinearShape{.in = shape.noise, .out = channels_ * kRoot * kRoot}, rng);
-  AddNorm(net_, "norm", context, shape.norm, channels_);
-  net_.Add<Activation>("act", &Relu);
-  std::int64_t channels = channels_;
-  for (int i = 1; i <= shape.doublings; ++i) {
-    const bool last = i == shape.doublings;
-    AddConvBlock(net_, "up" + std::to_string(i), context,
-                 {.conv = {.in = channels,
-                           .out = last ? shape.out : channels / 2,
-                           .kernel = 4,
-                           .options = kDouble},
-                  .transposed = true,
-                  .norm = last ? Norm::kNone : shape.norm,
-                  .activation = last ? &Tanh : &Relu},
-                 rng);
-    channels /= 2;
-  }
-  FillWeights(*this, [&](Tensor& weight) { FillNormal(weight, rng, 0.02); });
-}
-
-Var Generator::Forward(const Var& noise, Mode mode) {
-  const Var root = root_.Forward(noise, mode);
-  return net_.Forward(Reshape(root, {-1, channels_, kRoot, kRoot}), mode);
-}
-
-void Generator::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  root_.Visit(prefix, visitor);
-  net_.Visit(prefix, visitor);
-}
-
 Critic::Critic(Context& context, const CriticShape& shape, Rng& rng) {
   std::int64_t in = shape.in, out = shape.base;
   for (int i = 0; i < shape.halvings; ++i) {
-    AddConvBlock(levels_.emplace_back(), "down", context,
-                 {.conv = {.in = in,
-                           .out = out,
-                           .kernel = 4,
-                           .options = {2, 1, shape.padding_mode},
-                           .spectral = shape.spectral},
-                  .norm = i == 0 ? Norm::kNone : shape.norm,
-                  .activation = &LeakyRelu02},
-                 rng);
+    AddConvBlock(
+        levels_.emplace_back(), "down", context,
+        {.conv = {.in = in, .out = out, .kernel = 4, .options = {2, 1, shape.padding_mode}},
+         .activation = &LeakyRelu02},
+        rng);
     in = out, out *= 2;
   }
   AddConvBlock(levels_.emplace_back(), "score", context,
-               {.conv = {.in = in,
-                         .out = 1,
-                         .options = {1, 1, shape.padding_mode},
-                         .spectral = shape.spectral}},
-               rng);
+               {.conv = {.in = in, .out = 1, .options = {1, 1, shape.padding_mode}}}, rng);
 }
 
 Var Critic::Forward(const Var& x, Mode mode) {

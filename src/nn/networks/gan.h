@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two sides of an adversarial game: a generator of images from noise, and a critic of images.
+// A critic of images, and what it is trained by.
 #pragma once
 
 #include <vector>
@@ -8,35 +8,12 @@
 
 namespace tilegrad::nn {
 
-// DCGAN (Radford et al. 2016): noise [n, noise] -> linear -> [n, c, 4, 4] -> doubled by 4x4
-// transposed convolutions, each with norm and ReLU, the channels halved down to `base` -> tanh.
-struct GeneratorShape {
-  std::int64_t noise = 128;
-  std::int64_t out = 3;    // channels of the image
-  std::int64_t base = 64;  // channels before the last doubling
-  int doublings = 4;       // sides of 4 * 2^doublings pixels
-  Norm norm = Norm::kBatch;
-};
-class Generator : public Module {
- public:
-  // Weights N(0, 0.02^2), as DCGAN has them.
-  Generator(Context& context, const GeneratorShape& shape, Rng& rng);
-  Var Forward(const Var& noise, Mode mode) override;
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
-
- private:
-  std::int64_t channels_;  // of the 4x4 image
-  Sequential root_, net_;
-};
-
 // PatchGAN (Isola et al. 2017): `halvings` 4x4 convolutions of stride 2, leaky ReLU of 0.2 after
 // each, the channels doubling from `base`, then a 3x3 one to one number for each patch. For the
 // gradient penalty no batch norm: a sample's score must depend on that sample alone.
 struct CriticShape {
   std::int64_t in = 3, base = 64;
   int halvings = 4;
-  Norm norm = Norm::kNone;                // not of the first level
-  bool spectral = false;                  // spectral norm of every weight
   PadMode padding_mode = PadMode::kZero;  // kCircular for textures that wrap around
 };
 class Critic : public Module {

@@ -46,28 +46,12 @@ class UpsampleMap : public Module {
   }
 };
 
-// ReLU, then `block` at twice the size; the kernel and its options are the shape's.
-void AddDoubling(Sequential& net, Context& context, const UNetShape& shape, ConvBlock block,
-                 Rng& rng) {
+// ReLU, then a convolution at twice the size.
+void AddDoubling(Sequential& net, Context& context, ConvBlock block, Rng& rng) {
+  block.conv.kernel = 3;
   net.Add<Activation>("act", &Relu);
-  block.conv.kernel = 4, block.conv.options = kHalve, block.transposed = true;
-  if (shape.resize) {
-    block.conv.kernel = 3, block.conv.options = {.padding = shape.wrap ? 0 : 1};
-    block.transposed = false;
-    if (shape.wrap) {
-      net.Add<UpsampleMap>("resize");
-    } else {
-      net.Add<Upsample>("resize", ResizeMode::kNearest);
-    }
-  }
+  net.Add<UpsampleMap>("resize");
   AddConvBlock(net, "up", context, block, rng);
-}
-
-// The last one.
-void AddOutput(Sequential& net, Context& context, const UNetShape& shape, std::int64_t from,
-               Rng& rng) {
-  AddDoubling(net, context, shape,
-              {.conv = {.in = from, .out = shape.out}, .activation = shape.output}, rng);
 }
 
 }  // namespace
@@ -77,25 +61,26 @@ UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) : skips_(shape.sk
   const auto channels = [&](int level) {
     return std::min(shape.most, shape.base << std::min(level, 30));
   };
+  const auto output = [&](std::int64_t from) {
+    return ConvBlock{.conv = {.in = from, .out = shape.out}, .activation = shape.output};
+  };
   for (int i = 0; i < levels; ++i) {
     Sequential down, up;
-    const Norm norm = i == 0 || i + 1 == levels ? Norm::kNone : shape.norm;
     if (i > 0) down.Add<Activation>("act", &LeakyRelu02);
     AddConvBlock(down, "down", context,
                  {.conv = {.in = i == 0 ? shape.in : channels(i - 1),
                            .out = channels(i),
                            .kernel = 4,
                            .options = kHalve},
-                  .norm = norm},
+                  .norm = i > 0 && i + 1 < levels},
                  rng);
     // Above the innermost level the decoder has the skip connection's channels beside its own.
     const std::int64_t from = i + 1 == levels || !shape.skips ? channels(i) : 2 * channels(i);
     if (i == 0 && shape.enlarge == 0) {
-      AddOutput(up, context, shape, from, rng);
+      AddDoubling(up, context, output(from), rng);
     } else {
-      AddDoubling(up, context, shape,
-                  {.conv = {.in = from, .out = channels(std::max(0, i - 1))}, .norm = shape.norm},
-                  rng);
+      AddDoubling(up, context,
+                  {.conv = {.in = from, .out = channels(std::max(0, i - 1))}, .norm = true}, rng);
     }
     down_.push_back(std::move(down));
     up_.push_back(std::move(up));
@@ -103,10 +88,10 @@ UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) : skips_(shape.sk
   for (int k = 1; k <= shape.enlarge; ++k) {
     Sequential& grow = grow_.emplace_back();
     if (k == shape.enlarge) {
-      AddOutput(grow, context, shape, channels(0), rng);
+      AddDoubling(grow, context, output(channels(0)), rng);
     } else {
-      AddDoubling(grow, context, shape,
-                  {.conv = {.in = channels(0), .out = channels(0)}, .norm = shape.norm}, rng);
+      AddDoubling(grow, context, {.conv = {.in = channels(0), .out = channels(0)}, .norm = true},
+                  rng);
     }
   }
 }
@@ -128,10 +113,10 @@ Var UNet::Decode(const Var& code, const StepVector<Var>& levels, Mode mode) {
   return y;
 }
 
-UNet::Result UNet::Run(const Var& x, Mode mode) {
-  if (!x.has_context()) return {x, x};
+Var UNet::Forward(const Var& x, Mode mode) {
+  if (!x.has_context()) return x;
   const StepVector<Var> levels = Encode(x, mode);
-  return {Decode(levels.back(), levels, mode), levels.back()};
+  return Decode(levels.back(), levels, mode);
 }
 
 void UNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {

@@ -8,20 +8,17 @@
 
 namespace tilegrad::nn {
 
-// In the form of pix2pix (Isola et al. 2017): one 4x4 convolution halves, a transposed one doubles.
+// Down as in pix2pix (Isola et al. 2017), a 4x4 convolution of stride 2 to each level; up by
+// nearest resizing and a 3x3 convolution, which leaves no checkerboard. What comes out is a map
+// around a body: its left and right edges are neighbours, and what lies beyond its upper and lower
+// edges is what lies at them.
 struct UNetShape {
   std::int64_t in = 3, out = 3;  // channels of the images
   std::int64_t base = 64;        // channels after the first level; they double to at most
   std::int64_t most = 512;       // this many
   int levels = 8;                // halvings: an image's sides are multiples of 2^levels
-  Norm norm = Norm::kInstance;   // not of the first level, nor of one that is down to one pixel
-  bool resize = false;           // the way up: nearest resizing and a 3x3 convolution, not a 4x4
-                                 // transposed one: costs more and leaves no checkerboard
   bool skips = true;             // false: the decoder sees the code alone
   int enlarge = 0;               // further doublings behind the last level, of `base` channels
-  bool wrap = false;             // with `resize`: the image that comes out is a map whose left and
-                                 // right edges are neighbours, and what lies beyond its upper and
-                                 // lower edges is what lies at them
   Activation::Function output = nullptr;  // e.g. &Sigmoid
 };
 
@@ -35,16 +32,12 @@ class UNet : public Module {
  public:
   UNet(Context& context, const UNetShape& shape, Rng& rng);
 
-  struct Result {
-    Var image;  // [n, out, h, w] times 2^enlarge
-    Var code;   // [n, c, h / 2^levels, w / 2^levels]: what other heads start from
-  };
-  Result Run(const Var& x, Mode mode);  // x [n, in, h, w]
   // Its two halves, for what stands between them. Levels: x, then each level's; the last is the
   // code. `code` has the shape of that one.
   StepVector<Var> Encode(const Var& x, Mode mode);
   Var Decode(const Var& code, const StepVector<Var>& levels, Mode mode);
-  Var Forward(const Var& x, Mode mode) override { return Run(x, mode).image; }
+  // x [n, in, h, w] -> [n, out, h, w] times 2^enlarge
+  Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
  private:

@@ -126,28 +126,6 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
   return Record({"conv2d"}, std::move(y), {x, weight, bias}, rule);
 }
 
-Var ConvTranspose2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options,
-                    int output_padding) {
-  const bool usable = bias.has_context() ? Usable("transposed conv2d", {&x, &weight, &bias})
-                                         : Usable("transposed conv2d", {&x, &weight});
-  if (!usable) return Invalid({&x, &weight, &bias});
-  const bool images = x.shape().rank() == 4 && weight.shape().rank() == 4;
-  const bool biased = !bias.valid() || (images && bias.shape() == Shape{weight.shape()[1]});
-  if (!images || !biased || output_padding < 0 || output_padding >= options.stride) {
-    return Fail(
-        x, InvalidArgument("transposed conv2d: input {}, weight {}, bias {}, output padding "
-                           "{}",
-                           x.shape().ToString(), weight.shape().ToString(), bias.shape().ToString(),
-                           output_padding));
-  }
-  const auto extent = [&](int axis) {
-    return (x.shape()[axis] - 1) * options.stride - 2 * options.padding + weight.shape()[axis] +
-           output_padding;
-  };
-  const Var y = Conv2dInputGrad(x, weight, {extent(2), extent(3)}, options);
-  return bias.valid() ? Add(y, Reshape(bias, {1, -1, 1, 1})) : y;
-}
-
 Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options) {
   if (!Usable("conv2d input gradient", {&dy, &weight})) return Invalid({&dy, &weight});
   if (dy.shape().rank() != 4 || weight.shape().rank() != 4) {

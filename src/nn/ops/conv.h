@@ -12,17 +12,12 @@ namespace tilegrad::nn {
 struct ConvOptions {
   int stride = 1;                         // >= 1
   int padding = 0;                        // pixels added on every side, >= 0
-  PadMode padding_mode = PadMode::kZero;  // the two gradients and the transposed one: zero only
+  PadMode padding_mode = PadMode::kZero;  // the two gradients: zero only
 };
 
 // x [n, in, h, w], weight [out, in, kh, kw], bias [out] or an invalid Var for none ->
 // [n, out, (h + 2 padding - kh) / stride + 1, ...], rounded down.
 Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options);
-
-// x [n, in, h, w], weight [in, out, kh, kw], bias [out] or an invalid Var ->
-// [n, out, (h - 1) stride - 2 padding + kh + output_padding, ...]; output_padding < stride.
-Var ConvTranspose2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options,
-                    int output_padding = 0);
 
 // The adjoint of x: dy [n, out, oh, ow] -> [n, in, height, width].
 Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options);

@@ -260,14 +260,6 @@ Var Softplus(const Var& x) {
                   [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sigmoid(x))}; });
 }
 
-Var Silu(const Var& x) { return Mul(x, Sigmoid(x)); }
-
-// At 0 the gradient is that of the lower branch: Clamp passes it on at its bound, Relu does not.
-Var Elu(const Var& x, double alpha) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return Add(Relu(x), Scale(Expm1(Clamp(x, -kInfinity, 0.0)), alpha));
-}
-
 Var Clamp(const Var& x, double low, double high) {
   if (!Usable("clamp", {&x})) return Invalid({&x});
   if (!(low <= high)) return Fail(x, InvalidArgument("clamp: [{}, {}] is empty", low, high));

@@ -27,8 +27,6 @@ Var Pow(const Var& x, const Var& p);        // broadcasts; x > 0
 Var Abs(const Var& x);                      // gradient 0 at 0
 Var Relu(const Var& x);                     // gradient 0 at 0
 Var LeakyRelu(const Var& x, double slope);  // x > 0 ? x : slope x; slope at 0; slope >= 0
-Var Elu(const Var& x, double alpha = 1.0);  // x > 0 ? x : alpha (e^x - 1)
-Var Silu(const Var& x);                     // x sigmoid(x)
 Var Softplus(const Var& x);                 // log(1 + e^x)
 Var Tanh(const Var& x);
 Var Sigmoid(const Var& x);

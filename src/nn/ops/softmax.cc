@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "base/error.h"
-#include "nn/ops/broadcast.h"
 #include "nn/ops/index.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
@@ -62,17 +61,6 @@ Var CrossEntropy(const Var& logits, const Var& target) {
                                         logits.shape().ToString(), target.shape().ToString()));
   }
   return Neg(Mean(Sum(Mul(target, LogSoftmax(logits, 1)), {1})));
-}
-
-Var BinaryCrossEntropy(const Var& logits, const Var& target) {
-  if (!Usable("binary cross-entropy", {&logits, &target})) return Invalid({&logits, &target});
-  // [n, 1] beside [n] would be n x n numbers, and a loss that looks like one.
-  Shape joined;
-  if (!BroadcastShape(logits.shape(), target.shape(), joined) || !(joined == logits.shape())) {
-    return Fail(logits, InvalidArgument("binary cross-entropy: logits {} with target {}",
-                                        logits.shape().ToString(), target.shape().ToString()));
-  }
-  return Mean(Sub(Softplus(logits), Mul(logits, target)));
 }
 
 }  // namespace tilegrad::nn

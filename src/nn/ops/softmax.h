@@ -17,8 +17,5 @@ Var LogSumExp(const Var& x, int axis);
 Var CrossEntropy(const Var& logits, const Tensor& labels);
 // The same for probabilities [n, classes]: mean over n of -sum target log softmax.
 Var CrossEntropy(const Var& logits, const Var& target);
-// Mean of softplus(x) - x target, the cross-entropy of sigmoid(x) with a target in [0, 1],
-// which may be repeated to the logits' shape, not they to its.
-Var BinaryCrossEntropy(const Var& logits, const Var& target);
 
 }  // namespace tilegrad::nn

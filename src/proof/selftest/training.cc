@@ -118,12 +118,28 @@ Result<Finding> PenaltyInFloat(const CheckContext& context) {
   return gauge.Found();
 }
 
+class ToImage : public nn::Module {
+ public:
+  Var Forward(const Var& x, nn::Mode) override { return nn::Reshape(x, {-1, 3, 16, 16}); }
+  void Visit(const std::string&, nn::ModuleVisitor&) override {}
+};
+
+// Images of 3 x 16 x 16 from nine numbers each.
+nn::Sequential MakeGenerator(Context& context, Rng& rng) {
+  nn::Sequential net;
+  nn::AddLinear(net, "code", context, 9, 3 * 16 * 16, rng);
+  net.Add<ToImage>("image");
+  net.Add<nn::UNet>("paint", context,
+                    nn::UNetShape{.base = 16, .levels = 2, .output = &nn::Sigmoid}, rng);
+  return net;
+}
+
 // A small adversarial game, as `tilegrad train` has its own: Wasserstein loss with penalty, Adam.
 class Game {
  public:
   explicit Game(const Workers& workers)
       : context_(workers),
-        generator_(context_, {.noise = 9, .base = 16, .doublings = 2}, rng_),
+        generator_(MakeGenerator(context_, rng_)),
         critic_(context_, {.base = 16, .halvings = 2}, rng_),
         for_generator_(context_, nn::Parameters(generator_), {}),
         for_critic_(context_, nn::Parameters(critic_), {}) {}
@@ -161,7 +177,7 @@ class Game {
 
   Context context_;
   Rng rng_{13, 25};
-  nn::Generator generator_;
+  nn::Sequential generator_;
   nn::Critic critic_;
   nn::Adam for_generator_, for_critic_;
 };

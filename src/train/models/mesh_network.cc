@@ -31,8 +31,7 @@ struct NetworkBuilder {
   void Blocks(nn::Sequential& net, const std::string& name, std::int64_t channels) {
     for (std::int64_t i = 0; i < config.blocks; ++i) {
       const std::string block = fmt::format("block{}_{}", name, i + 1);
-      nn::AddResidualBlock(net, block, context,
-                           {.in = channels, .out = channels, .norm = nn::Norm::kBatch}, rng);
+      nn::AddResidualBlock(net, block, context, channels, rng);
       net.Add<nn::Activation>(block + "_relu", &nn::Relu);
     }
   }

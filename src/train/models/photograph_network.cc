@@ -105,11 +105,8 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
                            .base = config.base,
                            .most = config.most,
                            .levels = static_cast<int>(config.levels),
-                           .norm = nn::Norm::kBatch,
-                           .resize = true,
                            .skips = config.skips,
                            .enlarge = static_cast<int>(config.enlarge),
-                           .wrap = true,
                            .output = flow ? &nn::Tanh : &nn::Sigmoid};
   all_.code.emplace(
       context, unet,

@@ -121,7 +121,7 @@ void ShapeTextureGenerator::BuildTexture(Rng& rng) {
   nn::AddLinear(texture_.first, "fc", context_, config_.noise, texture_.root.elements(), rng);
   const auto frame = config_.symmetric_texture ? &FrameOfHalf : &FrameOfWhole;
   nn::Sequential& net = texture_.net;
-  nn::AddNorm(net, "norm", context_, nn::Norm::kBatch, channels(doublings));
+  net.Add<nn::BatchNorm>("norm", context_, channels(doublings));
   net.Add<nn::Activation>("act", &nn::LeakyRelu02);
   for (int level = doublings; level > 0; --level) {
     const std::string name = "up" + std::to_string(doublings - level + 1);
@@ -131,7 +131,7 @@ void ShapeTextureGenerator::BuildTexture(Rng& rng) {
     nn::AddConvBlock(
         net, name, context_,
         {.conv = {.in = channels(level), .out = last ? 3 : channels(level - 1), .options = {}},
-         .norm = last ? nn::Norm::kNone : nn::Norm::kBatch,
+         .norm = !last,
          .activation = last ? nullptr : &nn::LeakyRelu02},
         rng);
   }

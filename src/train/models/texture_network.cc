@@ -83,11 +83,8 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
                            .base = config.base,
                            .most = config.most,
                            .levels = static_cast<int>(config.levels),
-                           .norm = nn::Norm::kBatch,
-                           .resize = true,
                            .skips = config.skips,
                            .enlarge = config.lookup ? 0 : static_cast<int>(config.enlarge),
-                           .wrap = config.wrap,
                            .output = config.lookup ? &nn::LeakyRelu02 : &nn::Sigmoid};
   all_.code.emplace(context, unet,
                     PictureCodeShape{.image_size = image_size, .latent = config.latent}, rng);

@@ -18,14 +18,13 @@
 namespace tilegrad::train {
 
 struct TextureNetworkConfig {
-  std::int64_t base = 24;     // U-Net: channels of the first level; they double to at most
-  std::int64_t most = 256;    // this many
-  std::int64_t levels = 4;    // halvings
-  std::int64_t enlarge = 1;   // the texture is 2^this times as large as the image
-  bool skips = true;          // the U-Net's skip connections
-  bool wrap = true;           // the texture's left and right edges are neighbours in the decoder
-  std::int64_t latent = 384;  // all heads start from this code, fully connected
-  std::int64_t hidden = 512;  // width of the head of vertices
+  std::int64_t base = 24;           // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 256;          // this many
+  std::int64_t levels = 4;          // halvings
+  std::int64_t enlarge = 1;         // the texture is 2^this times as large as the image
+  bool skips = true;                // the U-Net's skip connections
+  std::int64_t latent = 384;        // all heads start from this code, fully connected
+  std::int64_t hidden = 512;        // width of the head of vertices
   std::int64_t light_width = 128;   // of the six layers of the head of light
   std::int64_t template_level = 3;  // subdivisions of the icosahedron
   double template_radius = 0.3;     // world units

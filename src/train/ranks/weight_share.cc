@@ -42,11 +42,10 @@ void WeightShare::Prepare(Job job) {
   for (const Place& place : own_) ++left_[place.bucket];
 }
 
-void WeightShare::Begin(const nn::Optimizer& optimizer) {
-  optimizer_ = &optimizer;
-  const auto known = [&](const Spread& spread) { return spread.optimizer == &optimizer; };
-  if (std::none_of(spread_.begin(), spread_.end(), known))
-    spread_.push_back({&optimizer, *job_.layout});
+void WeightShare::Begin(const nn::Adam& adam) {
+  adam_ = &adam;
+  const auto known = [&](const Spread& spread) { return spread.adam == &adam; };
+  if (std::none_of(spread_.begin(), spread_.end(), known)) spread_.push_back({&adam, *job_.layout});
   for (std::size_t b = 0; b < job_.layout->buckets(); ++b) {
     if (left_[b] == 0) exchange_.Spread(b);
   }
@@ -54,7 +53,7 @@ void WeightShare::Begin(const nn::Optimizer& optimizer) {
 
 void WeightShare::Updated(std::size_t k) {
   const Place& place = own_[k];
-  const float* weights = optimizer_->parameters()[place.piece.parameter].value().data<float>();
+  const float* weights = adam_->parameters()[place.piece.parameter].value().data<float>();
   std::copy(weights + place.piece.begin, weights + place.piece.end, job_.numbers + place.flat);
   if (--left_[place.bucket] == 0) exchange_.Spread(place.bucket);
 }
@@ -66,7 +65,7 @@ Status WeightShare::Finish() {
   workers_.For(foreign_.size(), [&](std::size_t k, std::size_t) {
     const Place& place = foreign_[k];
     const Piece& piece = place.piece;
-    nn::Tensor weights = optimizer_->parameters()[piece.parameter].value();
+    nn::Tensor weights = adam_->parameters()[piece.parameter].value();
     std::copy_n(job_.numbers + place.flat, piece.end - piece.begin,
                 weights.data<float>() + piece.begin);
   });
@@ -77,7 +76,7 @@ Status WeightShare::Finish() {
 
 void WeightShare::GatherMoments() {
   for (const Spread& spread : spread_) {
-    for (std::size_t m = 0; m < spread.optimizer->moments(0).size(); ++m) GatherMoment(spread, m);
+    for (std::size_t m = 0; m < spread.adam->moments(0).size(); ++m) GatherMoment(spread, m);
   }
 }
 
@@ -89,7 +88,7 @@ void WeightShare::GatherMoment(const Spread& spread, std::size_t moment) {
     const auto visit = [&](auto use) {
       std::size_t at = 0;
       for (const Place& place : places) {
-        nn::Tensor numbers = spread.optimizer->moments(place.piece.parameter)[moment];
+        nn::Tensor numbers = spread.adam->moments(place.piece.parameter)[moment];
         const std::size_t n = place.piece.end - place.piece.begin;
         use(numbers.data<float>() + place.piece.begin, n, at);
         at += n;

@@ -35,7 +35,7 @@ class WeightShare : public nn::UpdateShare {
     for (std::size_t k = 0; k < own_.size(); ++k) use(own_[k].piece, own_[k].flat);
   }
 
-  void Begin(const nn::Optimizer& optimizer) override;
+  void Begin(const nn::Adam& adam) override;
   std::size_t pieces() const override { return own_.size(); }
   Piece piece(std::size_t k) const override { return own_[k].piece; }
   void Updated(std::size_t k) override;
@@ -56,7 +56,7 @@ class WeightShare : public nn::UpdateShare {
   };
   static void PlacesOf(const BucketLayout& layout, int rank, int ranks, std::vector<Place>* out);
   struct Spread {
-    const nn::Optimizer* optimizer;
+    const nn::Adam* adam;
     BucketLayout layout;
   };
   void GatherMoment(const Spread& spread, std::size_t moment);
@@ -68,7 +68,7 @@ class WeightShare : public nn::UpdateShare {
   std::vector<Place> own_, foreign_;
   std::unique_ptr<std::atomic<int>[]> left_;  // of each bucket: own pieces that are to come
   std::size_t left_size_ = 0;
-  const nn::Optimizer* optimizer_ = nullptr;
+  const nn::Adam* adam_ = nullptr;
   bool finished_ = true;
   double seconds_waited_ = 0;
   std::vector<Spread> spread_;

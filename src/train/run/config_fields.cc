@@ -57,6 +57,24 @@ Status UnknownKey(const ConfigFields& fields, const std::string& key) {
                          near.empty() ? KeysBeside(fields, key) : near);
 }
 
+// Keys of former versions, each with the value (of a switch: 0 or 1) that says what happens without
+// it: configurations of former runs have them.
+struct GoneKey {
+  std::string_view key;
+  double value;
+};
+constexpr GoneKey kGone[] = {{"network.wrap", 1}};
+
+Status PassOver(const ConfigFields& fields, const std::string& key, const toml::node& node) {
+  const auto* const gone = std::find_if(std::begin(kGone), std::end(kGone),
+                                        [&](const GoneKey& g) { return g.key == key; });
+  if (gone == std::end(kGone)) return UnknownKey(fields, key);
+  const auto value = node.is_boolean() ? node.ref<bool>() : node.value<double>();
+  if (value == gone->value) return {};
+  return InvalidArgument("{} is gone, and this version does what {} stood for; leave it out", key,
+                         node.is_boolean() ? "true" : fmt::format("{}", gone->value));
+}
+
 Status CheckRange(const ConfigField& field, double value) {
   if (value >= field.low && value <= field.high) return {};  // false for NaN
   return InvalidArgument("{} is {}, but must be within [{}, {}]", field.key, value, field.low,
@@ -114,6 +132,17 @@ Status Place(const toml::node& node, const Status& status) {
   return status.Within(fmt::format("line {}", node.source().begin.line));
 }
 
+ConfigFields::const_iterator FindField(const ConfigFields& fields, std::string_view key) {
+  return std::find_if(fields.begin(), fields.end(),
+                      [&](const ConfigField& f) { return f.key == key; });
+}
+
+Status SetKey(const ConfigFields& fields, const std::string& key, const toml::node& node) {
+  const auto field = FindField(fields, key);
+  if (field == fields.end()) return PassOver(fields, key, node);
+  return std::visit(SetFromToml{*field, node}, field->target);
+}
+
 Status SetTable(const ConfigFields& fields, const toml::table& table, const std::string& prefix) {
   for (const auto& [name, node] : table) {
     const std::string key = prefix + std::string(name.str());
@@ -121,11 +150,7 @@ Status SetTable(const ConfigFields& fields, const toml::table& table, const std:
       TILEGRAD_TRY(SetTable(fields, *inner, key + "."));
       continue;
     }
-    const auto field = std::find_if(fields.begin(), fields.end(),
-                                    [&](const ConfigField& f) { return f.key == key; });
-    if (field == fields.end()) return Place(node, UnknownKey(fields, key));
-    const Status set = std::visit(SetFromToml{*field, node}, field->target);
-    if (!set.ok()) return Place(node, set);
+    if (const Status set = SetKey(fields, key, node); !set.ok()) return Place(node, set);
   }
   return {};
 }
@@ -188,18 +213,18 @@ Status OverrideField(const std::string& assignment, const ConfigFields& fields) 
   if (equals == std::string::npos)
     return InvalidArgument("\"{}\" is not of the form key=value", assignment);
   const std::string key = assignment.substr(0, equals), value = assignment.substr(equals + 1);
-  const auto field = std::find_if(fields.begin(), fields.end(),
-                                  [&](const ConfigField& f) { return f.key == key; });
-  if (field == fields.end()) return UnknownKey(fields, key);
-  if (std::holds_alternative<std::string*>(field->target)) return OverrideText(*field, value);
+  const auto field = FindField(fields, key);
+  const bool known = field != fields.end();
+  if (known && std::holds_alternative<std::string*>(field->target))
+    return OverrideText(*field, value);
   // Unless it is TOML of one value.
-  Status set = MustBe(*field);
+  Status set = known ? MustBe(*field) : UnknownKey(fields, key);
   const Status read = WithToml("value = " + value, [&](const toml::table& table) -> Status {
-    if (table.size() == 1)
-      set = std::visit(SetFromToml{*field, *table.get("value")}, field->target);
+    if (table.size() == 1) set = SetKey(fields, key, *table.get("value"));
     return {};
   });
-  return read.ok() && set.ok() ? Status() : set.Within(assignment);
+  if (read.ok() && set.ok()) return {};
+  return known ? set.Within(assignment) : set;
 }
 
 }  // namespace

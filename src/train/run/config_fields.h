@@ -29,8 +29,8 @@ using ConfigFields = std::vector<ConfigField>;
 inline constexpr double kNoLimit = 1e12;
 
 // TOML into the targets; keys that are not there keep their values. An unknown key, a wrong type
-// or a value out of range is an error that names line and key, and the known keys
-// that are near.
+// or a value out of range is an error that names line and key, and the known keys that are near.
+// Keys of former versions may have the value that nothing depends on.
 Status ReadFields(std::string_view toml, const ConfigFields& fields);
 // "schedule.steps=100" and the like, applied in order.
 Status OverrideFields(const std::vector<std::string>& assignments, const ConfigFields& fields);

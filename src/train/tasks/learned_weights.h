@@ -18,7 +18,7 @@ class LearnedWeights {
   LearnedWeights(nn::Context& context, nn::Module& network, const OptimizerConfig& config,
                  std::int64_t steps);
 
-  // One step of Adam, and of the moving average if there is one. `share`: of Optimizer::Step.
+  // One step of Adam, and of the moving average if there is one. `share`: of Adam::Step.
   Status Update(std::span<const nn::Gradient> gradients, std::int64_t step,
                 nn::UpdateShare* share = nullptr);
 

@@ -48,7 +48,7 @@ struct UpdateIndex {
   int update = 0;                            // of the step, from 0
   Portion portion{};                         // of the batch
   nn::GradientListener* listener = nullptr;  // for nn::Gradients
-  nn::UpdateShare* share = nullptr;          // for nn::Optimizer::Step
+  nn::UpdateShare* share = nullptr;          // for nn::Adam::Step
 };
 
 // A trained network as commands use it. Of most tasks it predicts: images in, meshes out.

@@ -60,18 +60,6 @@ void AddPaddedConvolution(CaseList& list, PadMode mode) {
             256});
 }
 
-void AddTransposedConvolution(CaseList& list) {
-  const int stride = static_cast<int>(list.Extent(3));
-  const ConvOptions options{stride, static_cast<int>(list.rng.Below(2))};
-  const int rest = static_cast<int>(list.rng.Below(static_cast<std::uint64_t>(stride)));
-  const Shape x = {list.Extent(2), list.Extent(3), list.Extent(3), list.Extent(7)};
-  const Shape w = {x[1], list.Extent(3), 3, 3 + list.Extent(2)};
-  list.Add({"transposed conv2d stride " + std::to_string(stride),
-            [=](const Inputs& v) { return ConvTranspose2d(v[0], v[1], v[2], options, rest); },
-            {{x}, {w}, {{w[1]}}},
-            256});
-}
-
 }  // namespace
 
 void AddProductCases(CaseList& list) {
@@ -100,7 +88,6 @@ void AddProductCases(CaseList& list) {
        {PadMode::kZero, PadMode::kCircular, PadMode::kReflect, PadMode::kReplicate}) {
     AddPaddedConvolution(list, mode);
   }
-  for (int trial = 0; trial < 4; ++trial) AddTransposedConvolution(list);
 }
 
 }  // namespace tilegrad::nn

@@ -23,10 +23,6 @@ void AddSoftmaxCases(CaseList& list) {
             [](const Inputs& v) { return CrossEntropy(v[0], v[1]); },
             {logits, {{4, 5}, 0, 1}},
             96});
-  list.Add({"binary cross-entropy",
-            [](const Inputs& v) { return BinaryCrossEntropy(v[0], v[1]); },
-            {{{3, 7}, -3, 3}, {{3, 7}, 0, 1}},
-            96});
 }
 
 }  // namespace tilegrad::nn

@@ -39,7 +39,7 @@ TEST_F(FeatureL1, SumOfMeansByHand) {
 }
 
 TEST_F(FeatureL1, MatchesTheCriticsLevelsButNotItsScores) {
-  nn::Critic critic(context_, {.base = 3, .halvings = 2, .norm = nn::Norm::kLayer}, rng_);
+  nn::Critic critic(context_, {.base = 3, .halvings = 2}, rng_);
   const FeatureFunction features = FeaturesOf(critic);
   const nn::Var predicted = Images({2, 3, 16, 16});
   const nn::Tensor truth = Images({2, 3, 16, 16}).value();

@@ -136,7 +136,7 @@ class WganGpThroughRenderer : public WganGp {
 
 // The second derivative: the penalty is a gradient, and is differentiated by the critic's weights.
 TEST_F(WganGpThroughRenderer, CriticStepIsDifferentiated) {
-  nn::Critic critic(context_, {.base = 3, .halvings = 2, .norm = nn::Norm::kLayer}, rng_);
+  nn::Critic critic(context_, {.base = 3, .halvings = 2}, rng_);
   const nn::Var real = Images({1, 3, 16, 16}), fake = Draw();
   for (const PenaltyPlace place : {PenaltyPlace::kRendered, PenaltyPlace::kInterpolates}) {
     const auto loss = [&](const nn::Var CriticLoss::*part) {
@@ -163,7 +163,7 @@ TEST(WganGpBits, AreTheSameForAnyNumberOfWorkers) {
     const Workers workers(count);
     nn::Context context(workers);
     Rng rng(4);
-    nn::Critic critic(context, {.base = 16, .halvings = 3, .norm = nn::Norm::kLayer}, rng);
+    nn::Critic critic(context, {.base = 16, .halvings = 3}, rng);
     const auto images = [&] {
       nn::Tensor t = context.Empty({5, 3, 32, 32});
       nn::FillUniform(t, rng, 0, 1);

@@ -15,6 +15,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr int kImageSize = 8;
+const std::string kOfBias = "bias.";               // before names of the second optimiser
 constexpr std::uint64_t kTestStream = 1ull << 40;  // apart from those of the steps
 
 struct ToyConfig {
@@ -112,7 +113,7 @@ class ToyTask : public Task {
     weight_.emplace(*context_, std::vector<nn::NamedVar>{{"weight", model_->layer.weight}},
                     nn::AdamOptions{.learning_rate = config_.learning_rate});
     bias_.emplace(*context_, std::vector<nn::NamedVar>{{"bias", model_->layer.bias}},
-                  nn::SgdOptions{.learning_rate = config_.learning_rate, .momentum = 0.5});
+                  nn::AdamOptions{.learning_rate = config_.learning_rate});
     return {};
   }
   int image_size() const override { return kImageSize; }
@@ -132,16 +133,18 @@ class ToyTask : public Task {
 
   std::vector<nn::NamedTensor> State() override {
     std::vector<nn::NamedTensor> out = nn::State(model_->layer);
-    for (const int update : {0, 1}) {
-      const auto moments = Moved({0, update}).State();
-      out.insert(out.end(), moments.begin(), moments.end());
-    }
+    for (const nn::NamedTensor& t : weight_->State()) out.push_back(t);
+    for (const nn::NamedTensor& t : bias_->State()) out.push_back({kOfBias + t.name, t.value});
     return out;
   }
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t /*steps*/) override {
     TILEGRAD_TRY(nn::LoadState(model_->layer, state));
     TILEGRAD_TRY(weight_->LoadState(state));
-    return bias_->LoadState(state);
+    std::vector<nn::NamedTensor> of_bias;
+    for (const nn::NamedTensor& t : state) {
+      if (t.name.starts_with(kOfBias)) of_bias.push_back({t.name.substr(kOfBias.size()), t.value});
+    }
+    return bias_->LoadState(of_bias);
   }
   Result<ImageU8> SamplePicture(std::int64_t /*steps*/) override {
     Rng rng(seed_, kTestStream);
@@ -164,16 +167,13 @@ class ToyTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
-  nn::Optimizer& Moved(const UpdateIndex& at) {
-    return at.update == 0 ? static_cast<nn::Optimizer&>(*weight_) : *bias_;
-  }
+  nn::Adam& Moved(const UpdateIndex& at) { return at.update == 0 ? *weight_ : *bias_; }
 
   ToyConfig config_;
   nn::Context* context_ = nullptr;
   std::uint64_t seed_ = 0;
   std::unique_ptr<ToyModel> model_;
-  std::optional<nn::Adam> weight_;
-  std::optional<nn::Sgd> bias_;
+  std::optional<nn::Adam> weight_, bias_;
 };
 
 Result<nn::StepVector<nn::Gradient>> ToyTask::Backward(const UpdateIndex& at, StepValues* out) {

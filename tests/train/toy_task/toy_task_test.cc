@@ -116,7 +116,7 @@ TEST_F(ToyTaskTest, KilledAndContinuedEndsInTheSameBits) {
   EXPECT_TRUE(continued->finished);
   const auto left = Final("whole"), right = Final("killed");
   ASSERT_EQ(left.size(), right.size());
-  ASSERT_EQ(left.size(), 7u);  // weight, bias; m, v and steps; v and steps
+  ASSERT_EQ(left.size(), 8u);  // weight, bias; m, v and steps of each
   for (std::size_t i = 0; i < left.size(); ++i) {
     EXPECT_EQ(left[i].name, right[i].name);
     ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());

@@ -9,9 +9,7 @@ namespace {
 ConfigFields FieldsOf(TextureNetworkConfig* c) {
   return Joined(
       {FieldsOf(UNetKeys{&c->base, &c->most, &c->levels, &c->enlarge, &c->skips, &c->latent}),
-       {{"network.wrap", &c->wrap, 0, 1,
-         "left and right edge of the texture are neighbours in the decoder"},
-        {"network.hidden", &c->hidden, 1, 65536, "width of the head of vertices"},
+       {{"network.hidden", &c->hidden, 1, 65536, "width of the head of vertices"},
         {"network.light_width", &c->light_width, 1, 65536,
          "of the six layers of the head of light"}},
        FieldsOf(SphereKeys{&c->template_level, &c->smoothing, &c->template_radius, &c->symmetric}),

@@ -132,7 +132,7 @@ TEST(TexturedStep, GradientsUnderHarmonics) {
 
 TEST(TexturedStep, GradientsWithoutLightAndSkips) {
   TexturedImageConfig config = TinyConfig("none");
-  config.network.skips = false, config.network.wrap = false, config.network.symmetric = false;
+  config.network.skips = false, config.network.symmetric = false;
   ExpectGradientsAgreeWithDifferences(config);
 }
 
