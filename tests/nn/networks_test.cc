@@ -136,96 +136,49 @@ TEST_F(Networks, CriticStepWithGradientPenalty) {
   }
 }
 
-// A network of torchvision's names with few channels.
-struct SmallFeatures {
-  explicit SmallFeatures(Context& c, Rng& r) : context(c), rng(r) {}
-  void Conv(const std::string& name, std::int64_t out, std::int64_t in, std::int64_t kernel) {
-    Tensor weight = context.Empty({out, in, kernel, kernel}), bias = context.Empty({out});
-    FillDefault(weight, rng, in);
-    FillUniform(bias, rng, -0.1, 0.1);
-    weights.push_back({"features." + name + ".weight", weight});
-    weights.push_back({"features." + name + ".bias", bias});
-  }
-  void Fire(const std::string& name, std::int64_t in) {
-    Conv(name + ".squeeze", 2, in, 1);
-    Conv(name + ".expand1x1", 2, 2, 1);
-    Conv(name + ".expand3x3", 2, 2, 3);
-  }
-  Context& context;
-  Rng& rng;
-  std::vector<NamedTensor> weights;
-};
-
-std::vector<NamedTensor> SmallAlexNet(Context& context, Rng& rng) {
-  SmallFeatures f(context, rng);
-  f.Conv("0", 4, 3, 11), f.Conv("3", 5, 4, 5), f.Conv("6", 6, 5, 3);
-  f.Conv("8", 5, 6, 3), f.Conv("10", 4, 5, 3);
-  return f.weights;
-}
-
+// Of torchvision's names, with two channels everywhere.
 std::vector<NamedTensor> SmallVgg16(Context& context, Rng& rng) {
-  SmallFeatures f(context, rng);
-  const std::vector<int> indices = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};
+  std::vector<NamedTensor> weights;
   std::int64_t in = 3;
-  for (const int index : indices) {
-    f.Conv(std::to_string(index), 2, in, 3);
+  for (const int index : {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28}) {
+    const std::string name = "features." + std::to_string(index);
+    weights.push_back({name + ".weight", context.Empty({2, in, 3, 3})});
+    weights.push_back({name + ".bias", context.Empty({2})});
+    FillUniform(weights[weights.size() - 2].value, rng, -0.5, 0.5);
+    FillUniform(weights.back().value, rng, 0, 0.1);
     in = 2;
   }
-  return f.weights;
+  return weights;
 }
 
-std::vector<NamedTensor> SmallSqueezeNet(Context& context, Rng& rng) {
-  SmallFeatures f(context, rng);
-  f.Conv("0", 3, 3, 3);
-  f.Fire("3", 3);
-  for (const char* name : {"4", "6", "7", "9", "10", "11", "12"}) f.Fire(name, 4);
-  return f.weights;
-}
+// The spatial sizes that torchvision's network gives for an image of 64 x 64.
+TEST_F(Networks, Vgg16HasTheStagesOfTorchvision) {
+  // As a user has them: from a file.
+  const Bytes bytes = EncodeSafetensors({SmallVgg16(context_, rng_), {}}).value();
+  auto weights = DecodeSafetensors(context_, bytes).value().tensors;
+  const auto network = Vgg16::Load(context_, weights);
+  ASSERT_TRUE(network.ok()) << network.status().message();
+  const Var x = Input({1, 3, 64, 64}), y = Input({1, 3, 64, 64});
+  const auto features = network->Features(x);
+  ASSERT_EQ(features.size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(features[i].shape()[2], 64 >> i);
+  const Var distance = PerceptualL1(features, network->Features(y));
+  EXPECT_GT(distance.item(), 0);
+  EXPECT_EQ(PerceptualL1(features, network->Features(Detach(x))).item(), 0);
+  EXPECT_EQ(Grad(distance, {x})[0].shape(), x.shape());
+  EXPECT_TRUE(context_.status().ok()) << context_.status().message();
+  EXPECT_FALSE(PerceptualL1(features, std::span(features).first(1)).valid());
+  EXPECT_EQ(context_.TakeStatus().code(), StatusCode::kInvalidArgument);
 
-// The spatial sizes that torchvision's networks give for an image of 64 x 64.
-TEST_F(Networks, FeatureExtractors) {
-  struct Case {
-    FeatureKind kind;
-    std::vector<NamedTensor> (*make)(Context&, Rng&);
-    std::vector<std::int64_t> sides;
-  };
-  const Case cases[] = {{FeatureKind::kAlexNet, &SmallAlexNet, {15, 7, 3, 3, 3}},
-                        {FeatureKind::kVgg16, &SmallVgg16, {64, 32, 16, 8, 4}},
-                        {FeatureKind::kSqueezeNet, &SmallSqueezeNet, {31, 15, 7, 3, 3, 3, 3}}};
-  for (const Case& c : cases) {
-    auto weights = c.make(context_, rng_);
-    // As a user has them: from a file.
-    const Bytes bytes = EncodeSafetensors({weights, {}}).value();
-    weights = DecodeSafetensors(context_, bytes).value().tensors;
-    const auto network = FeatureNetwork::Load(context_, c.kind, weights);
-    ASSERT_TRUE(network.ok()) << network.status().message();
-    const Var x = Input({1, 3, 64, 64}), y = Input({1, 3, 64, 64});
-    const auto features = network->Features(x);
-    ASSERT_EQ(features.size(), c.sides.size());
-    for (std::size_t i = 0; i < c.sides.size(); ++i) {
-      EXPECT_EQ(features[i].shape()[2], c.sides[i]) << i;
-    }
-    const Var distance = PerceptualL1(features, network->Features(y));
-    EXPECT_GT(distance.item(), 0);
-    EXPECT_EQ(PerceptualL1(features, network->Features(Detach(x))).item(), 0);
-    EXPECT_EQ(Grad(distance, {x})[0].shape(), x.shape());
-    EXPECT_TRUE(context_.status().ok()) << context_.status().message();
-    EXPECT_FALSE(PerceptualL1(features, std::span(features).first(1)).valid());
-    EXPECT_EQ(context_.TakeStatus().code(), StatusCode::kInvalidArgument);
-
-    weights.pop_back();
-    EXPECT_EQ(FeatureNetwork::Load(context_, c.kind, weights).status().code(),
-              StatusCode::kNotFound);
-  }
+  weights.pop_back();
+  EXPECT_EQ(Vgg16::Load(context_, weights).status().code(), StatusCode::kNotFound);
 }
 
 TEST_F(Networks, FeatureWeightsThatDoNotFitAreNamed) {
-  auto weights = SmallAlexNet(context_, rng_);
+  auto weights = SmallVgg16(context_, rng_);
   weights[2].value = context_.Zeros({5, 9, 5, 5});
-  const auto network = FeatureNetwork::Load(context_, FeatureKind::kAlexNet, weights);
-  EXPECT_NE(network.status().message().find("\"features.3.weight\" has shape [5, 9, 5, 5]"),
-            std::string::npos)
-      << network.status().message();
+  ExpectMessage(Vgg16::Load(context_, weights).status(),
+                "\"features.2.weight\" has shape [5, 9, 5, 5]");
 }
 
 }  // namespace tilegrad::nn::networks_test

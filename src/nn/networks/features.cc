@@ -12,59 +12,7 @@
 namespace tilegrad::nn {
 namespace {
 
-// One entry of torchvision's "features" that holds weights or pools; rectifiers follow
-// convolutions.
-struct Step {
-  enum Kind { kConvolution, kFire, kPool } kind;
-  int index = 0;   // in "features"
-  int stride = 1;  // of a pool: its stride
-  int padding = 0;
-  int window = 0;  // of a pool
-  bool tap = false;
-};
-
-constexpr Step Conv(int index, int stride, int padding, bool tap) {
-  return {Step::kConvolution, index, stride, padding, 0, tap};
-}
-constexpr Step Fire(int index, bool tap) { return {Step::kFire, index, 1, 0, 0, tap}; }
-constexpr Step Pool(int window) { return {Step::kPool, 0, 2, 0, window, false}; }
-
-constexpr Step kAlexNet[] = {Conv(0, 4, 2, true), Pool(3),
-                             Conv(3, 1, 2, true), Pool(3),
-                             Conv(6, 1, 1, true), Conv(8, 1, 1, true),
-                             Conv(10, 1, 1, true)};
-constexpr Step kVgg16[] = {Conv(0, 1, 1, false),
-                           Conv(2, 1, 1, true),
-                           Pool(2),
-                           Conv(5, 1, 1, false),
-                           Conv(7, 1, 1, true),
-                           Pool(2),
-                           Conv(10, 1, 1, false),
-                           Conv(12, 1, 1, false),
-                           Conv(14, 1, 1, true),
-                           Pool(2),
-                           Conv(17, 1, 1, false),
-                           Conv(19, 1, 1, false),
-                           Conv(21, 1, 1, true),
-                           Pool(2),
-                           Conv(24, 1, 1, false),
-                           Conv(26, 1, 1, false),
-                           Conv(28, 1, 1, true)};
-constexpr Step kSqueezeNet[] = {
-    Conv(0, 2, 0, true), Pool(3), Fire(3, false), Fire(4, true),  Pool(3),        Fire(6, false),
-    Fire(7, true),       Pool(3), Fire(9, true),  Fire(10, true), Fire(11, true), Fire(12, true)};
-
-std::span<const Step> StepsOf(FeatureKind kind) {
-  switch (kind) {
-    case FeatureKind::kAlexNet:
-      return kAlexNet;
-    case FeatureKind::kVgg16:
-      return kVgg16;
-    case FeatureKind::kSqueezeNet:
-      return kSqueezeNet;
-  }
-  return {};
-}
+constexpr int kStages[] = {2, 2, 3, 3, 3};  // 3x3 convolutions of each; a pool between two stages
 
 // In the context's dtype.
 Tensor Converted(Context& context, const Tensor& from) {
@@ -74,9 +22,9 @@ Tensor Converted(Context& context, const Tensor& from) {
 
 Result<Tensor> FindFloat(const std::vector<NamedTensor>& weights, const std::string& name) {
   const Tensor* tensor = Find(weights, name);
-  if (tensor == nullptr) return NotFound("feature network: no tensor \"{}\"", name);
+  if (tensor == nullptr) return NotFound("VGG16: no tensor \"{}\"", name);
   if (tensor->dtype() == DType::kF32 || tensor->dtype() == DType::kF64) return *tensor;
-  return InvalidArgument("feature network: \"{}\" is {}, F32 or F64 is needed", name,
+  return InvalidArgument("VGG16: \"{}\" is {}, F32 or F64 is needed", name,
                          NameOf(tensor->dtype()));
 }
 
@@ -90,11 +38,11 @@ Result<Loaded> LoadConvolution(const std::vector<NamedTensor>& weights, const st
   TILEGRAD_ASSIGN(const Tensor weight, FindFloat(weights, name + ".weight"));
   TILEGRAD_ASSIGN(const Tensor bias, FindFloat(weights, name + ".bias"));
   if (weight.shape().rank() != 4 || weight.shape()[1] != in) {
-    return InvalidArgument("feature network: \"{}.weight\" has shape {}, [out, {}, h, w] is needed",
-                           name, weight.shape().ToString(), in);
+    return InvalidArgument("VGG16: \"{}.weight\" has shape {}, [out, {}, h, w] is needed", name,
+                           weight.shape().ToString(), in);
   }
   if (bias.shape() == Shape{weight.shape()[0]}) return Loaded{weight, bias};
-  return InvalidArgument("feature network: \"{}.bias\" has shape {} beside a weight of {}", name,
+  return InvalidArgument("VGG16: \"{}.bias\" has shape {} beside a weight of {}", name,
                          bias.shape().ToString(), weight.shape().ToString());
 }
 
@@ -111,64 +59,35 @@ Var Standardised(const Var& x) {
 
 }  // namespace
 
-Result<FeatureNetwork> FeatureNetwork::Load(Context& context, FeatureKind kind,
-                                            const std::vector<NamedTensor>& weights) {
-  FeatureNetwork network(kind);
+Result<Vgg16> Vgg16::Load(Context& context, const std::vector<NamedTensor>& weights) {
+  Vgg16 network;
   std::int64_t channels = 3;
-  // Returns the channels that come out.
-  const auto load = [&](const std::string& name, std::int64_t in) -> Result<std::int64_t> {
-    TILEGRAD_ASSIGN(const Loaded loaded, LoadConvolution(weights, name, in));
-    network.convolutions_.push_back({Constant(context, Converted(context, loaded.weight)),
-                                     Constant(context, Converted(context, loaded.bias))});
-    return loaded.weight.shape()[0];
-  };
-  for (const Step& step : StepsOf(kind)) {
-    const std::string name = "features." + std::to_string(step.index);
-    if (step.kind == Step::kConvolution) {
-      TILEGRAD_ASSIGN(channels, load(name, channels));
-    } else if (step.kind == Step::kFire) {
-      TILEGRAD_ASSIGN(const std::int64_t squeezed, load(name + ".squeeze", channels));
-      TILEGRAD_ASSIGN(const std::int64_t narrow, load(name + ".expand1x1", squeezed));
-      TILEGRAD_ASSIGN(const std::int64_t wide, load(name + ".expand3x3", squeezed));
-      channels = narrow + wide;
+  int index = 0;  // in torchvision's "features", where rectifiers and pools have one, too
+  for (const int convolutions : kStages) {
+    for (int i = 0; i < convolutions; ++i, index += 2) {
+      const std::string name = "features." + std::to_string(index);
+      TILEGRAD_ASSIGN(const Loaded loaded, LoadConvolution(weights, name, channels));
+      channels = loaded.weight.shape()[0];
+      network.convolutions_.push_back({Constant(context, Converted(context, loaded.weight)),
+                                       Constant(context, Converted(context, loaded.bias))});
     }
+    ++index;
   }
   return network;
 }
 
-// Iandola et al. 2016: a 1x1 convolution, then 1x1 and 3x3 ones side by side.
-Var FeatureNetwork::Fire(const Var& x, std::size_t first) const {
-  const auto apply = [&](std::size_t i, const Var& from, int padding) {
-    const Convolution& c = convolutions_[first + i];
-    return Relu(Conv2d(from, c.weight, c.bias, {.padding = padding}));
-  };
-  const Var squeezed = apply(0, x, 0);
-  return Concat({apply(1, squeezed, 0), apply(2, squeezed, 1)}, 1);
-}
-
-std::vector<Var> FeatureNetwork::Features(const Var& x) const {
-  std::vector<Var> taps;
+std::vector<Var> Vgg16::Features(const Var& x) const {
+  std::vector<Var> stages;
   Var y = x.valid() ? Standardised(x) : x;
-  std::size_t next = 0;
-  for (const Step& step : StepsOf(kind_)) {
-    switch (step.kind) {
-      case Step::kConvolution:
-        y = Relu(Conv2d(y, convolutions_[next].weight, convolutions_[next].bias,
-                        {.stride = step.stride, .padding = step.padding}));
-        next += 1;
-        break;
-      case Step::kFire:
-        y = Fire(y, next);
-        next += 3;
-        break;
-      case Step::kPool:
-        y = MaxPool2d(y, {.kernel = step.window, .stride = step.stride},
-                      kind_ == FeatureKind::kSqueezeNet ? Rounding::kUp : Rounding::kDown);
-        break;
+  auto convolution = convolutions_.begin();
+  for (const int convolutions : kStages) {
+    if (!stages.empty()) y = MaxPool2d(y, {});
+    for (int i = 0; i < convolutions; ++i, ++convolution) {
+      y = Relu(Conv2d(y, convolution->weight, convolution->bias, {.padding = 1}));
     }
-    if (step.tap) taps.push_back(y);
+    stages.push_back(y);
   }
-  return taps;
+  return stages;
 }
 
 Var PerceptualL1(std::span<const Var> a, std::span<const Var> b) {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The convolutional part of three classifiers, with weights supplied by the user, to compare images
-// by their features (Johnson et al. 2016; Zhang et al. 2018 say which layers).
+// The convolutional part of VGG16, with weights supplied by the user, to compare images by their
+// features (Johnson et al. 2016; Zhang et al. 2018 say which layers).
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
 #include "nn/named_tensors.h"
@@ -12,29 +11,23 @@
 
 namespace tilegrad::nn {
 
-enum class FeatureKind { kAlexNet, kVgg16, kSqueezeNet };  // SqueezeNet 1.1
-
-class FeatureNetwork {
+class Vgg16 {
  public:
-  // Weights by torchvision's names ("features.0.weight", "features.3.squeeze.bias", ..), as
-  // ReadSafetensors gives them; others are ignored. Kernel sizes and channels are those of the
-  // tensors, so narrower networks of the same build will do. An error names the tensor that is
-  // missing or does not fit what comes before it.
-  static Result<FeatureNetwork> Load(Context& context, FeatureKind kind,
-                                     const std::vector<NamedTensor>& weights);
+  // Weights by torchvision's names ("features.0.weight", "features.0.bias", ..), as ReadSafetensors
+  // gives them; others are ignored. Channels are those of the tensors, so narrower networks of the
+  // same build will do. An error names the tensor that is missing or does not fit what comes before
+  // it.
+  static Result<Vgg16> Load(Context& context, const std::vector<NamedTensor>& weights);
 
   // x [n, 3, h, w], RGB in [0, 1] (the means and deviations of ImageNet are applied here). Returns
-  // the activations after the last rectifier of each stage: five of AlexNet and VGG16, seven of
-  // SqueezeNet. The weights take no gradient.
+  // the activations after the last rectifier of each of the five stages. The weights take no
+  // gradient.
   std::vector<Var> Features(const Var& x) const;
 
  private:
   struct Convolution {
     Var weight, bias;
   };
-  explicit FeatureNetwork(FeatureKind kind) : kind_(kind) {}
-  Var Fire(const Var& x, std::size_t first) const;
-  FeatureKind kind_;
   std::vector<Convolution> convolutions_;  // in the order of use
 };
 

@@ -13,23 +13,16 @@
 namespace tilegrad::nn {
 namespace {
 
-std::int64_t Windows(std::int64_t extent, const PoolOptions& o, Rounding rounding) {
-  const std::int64_t room = extent + 2 * static_cast<std::int64_t>(o.padding) - o.kernel;
-  if (rounding == Rounding::kDown) return room / o.stride + 1;
-  const std::int64_t windows = (room + o.stride - 1) / o.stride + 1;
-  // The last one must begin in the image or in the padding before it.
-  return (windows - 1) * o.stride >= extent + o.padding ? windows - 1 : windows;
+std::int64_t Windows(std::int64_t extent, const PoolOptions& o) {
+  return (extent + 2 * static_cast<std::int64_t>(o.padding) - o.kernel) / o.stride + 1;
 }
 
-Status Check(const char* op, const Shape& x, const PoolOptions& o,
-             Rounding rounding = Rounding::kDown) {
+Status Check(const char* op, const Shape& x, const PoolOptions& o) {
   const bool options =
       o.kernel >= 1 && o.stride >= 1 && o.padding >= 0 && o.padding <= o.kernel / 2;
-  // A first window may hang over the edge as a last one may.
-  const std::int64_t least = o.kernel - (rounding == Rounding::kUp ? o.stride - 1 : 0);
   const std::int64_t padding = 2 * static_cast<std::int64_t>(o.padding);
-  if (options && x.rank() == 4 && x[2] > 0 && x[3] > 0 && x[2] + padding >= least &&
-      x[3] + padding >= least && x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
+  if (options && x.rank() == 4 && x[2] > 0 && x[3] > 0 && x[2] + padding >= o.kernel &&
+      x[3] + padding >= o.kernel && x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
     return {};
   }
   return InvalidArgument("{}: input {}, kernel {}, stride {}, padding {}", op, x.ToString(),
@@ -37,7 +30,7 @@ Status Check(const char* op, const Shape& x, const PoolOptions& o,
 }
 
 Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
-  const AxisExtents extents{x.shape()[axis], Windows(x.shape()[axis], o, Rounding::kDown)};
+  const AxisExtents extents{x.shape()[axis], Windows(x.shape()[axis], o)};
   const auto row = [&](std::int64_t i, AxisTerms& terms) {
     const std::int64_t begin = i * o.stride - o.padding;
     const std::int64_t end = std::min(extents.in, begin + o.kernel);
@@ -57,14 +50,13 @@ Var AvgPool2d(const Var& x, const PoolOptions& options) {
 }
 
 // The elements are picked by index; picking is linear, and its adjoint puts them back.
-Var MaxPool2d(const Var& x, const PoolOptions& options, Rounding rounding) {
+Var MaxPool2d(const Var& x, const PoolOptions& options) {
   if (!Usable("max pooling", {&x})) return Invalid({&x});
-  if (const Status s = Check("max pooling", x.shape(), options, rounding); !s.ok()) {
+  if (const Status s = Check("max pooling", x.shape(), options); !s.ok()) {
     return Fail(x, s);
   }
   const Shape& in = x.shape();
-  const Shape out = {in[0], in[1], Windows(in[2], options, rounding),
-                     Windows(in[3], options, rounding)};
+  const Shape out = {in[0], in[1], Windows(in[2], options), Windows(in[3], options)};
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
   const PoolShape shape{size(in[0] * in[1]),  size(in[2]),          size(in[3]),
                         size(out[2]),         size(out[3]),         size(options.kernel),

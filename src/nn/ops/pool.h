@@ -17,9 +17,7 @@ struct PoolOptions {
 Var AvgPool2d(const Var& x, const PoolOptions& options);
 
 // Padding never wins. The gradient goes to the first element of a window, in memory order, that
-// attains its maximum; NaN wins. kUp adds a last window that hangs over the edge where the stride
-// leaves a rest; of a small image it may be the only one.
-enum class Rounding { kDown, kUp };
-Var MaxPool2d(const Var& x, const PoolOptions& options, Rounding rounding = Rounding::kDown);
+// attains its maximum; NaN wins.
+Var MaxPool2d(const Var& x, const PoolOptions& options);
 
 }  // namespace tilegrad::nn

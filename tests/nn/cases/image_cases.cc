@@ -54,12 +54,10 @@ void AddPooling(CaseList& list) {
             [=](const Inputs& v) { return Square(AvgPool2d(v[0], options)); },
             {x},
             64});
-  for (const Rounding rounding : {Rounding::kDown, Rounding::kUp}) {
-    list.Add({"max pooling" + what,
-              [=](const Inputs& v) { return Square(MaxPool2d(v[0], options, rounding)); },
-              {x},
-              64});
-  }
+  list.Add({"max pooling" + what,
+            [=](const Inputs& v) { return Square(MaxPool2d(v[0], options)); },
+            {x},
+            64});
 }
 
 }  // namespace

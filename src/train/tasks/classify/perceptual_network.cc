@@ -2,7 +2,6 @@
 #include "train/tasks/classify/perceptual_network.h"
 
 #include <algorithm>
-#include <optional>
 
 #include "base/error.h"
 #include "nn/networks/features.h"
@@ -12,13 +11,6 @@
 
 namespace tilegrad::train {
 namespace {
-
-std::optional<nn::FeatureKind> KindOf(const std::string& word) {
-  if (word == "vgg16") return nn::FeatureKind::kVgg16;
-  if (word == "alexnet") return nn::FeatureKind::kAlexNet;
-  if (word == "squeezenet") return nn::FeatureKind::kSqueezeNet;
-  return std::nullopt;
-}
 
 Result<FeatureFunction> LoadClassifier(nn::Context& context, const PerceptualSource& source) {
   const std::string place = source.file.string();
@@ -52,15 +44,12 @@ Result<Path> PerceptualWeights(nn::Context& context, const PerceptualSource& sou
 Result<FeatureFunction> LoadPerceptualNetwork(nn::Context& context,
                                               const PerceptualSource& source) {
   if (source.kind == "classify") return LoadClassifier(context, source);
-  const auto kind = KindOf(source.kind);
-  if (!kind) {
+  if (source.kind != "vgg16") {
     return InvalidArgument(
-        "the perceptual network is \"{}\", but must be \"classify\", \"vgg16\", \"alexnet\" or "
-        "\"squeezenet\"",
-        source.kind);
+        "the perceptual network is \"{}\", but must be \"classify\" or \"vgg16\"", source.kind);
   }
   TILEGRAD_ASSIGN(const nn::TensorFile file, nn::ReadSafetensors(context, source.file));
-  auto network = nn::FeatureNetwork::Load(context, *kind, file.tensors);
+  auto network = nn::Vgg16::Load(context, file.tensors);
   if (!network.ok()) return network.status().Within(source.file.string());
   return FeatureFunction(
       [network = std::move(*network)](const nn::Var& images) { return network.Features(images); });

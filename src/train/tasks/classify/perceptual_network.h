@@ -9,8 +9,8 @@
 namespace tilegrad::train {
 
 struct PerceptualSource {
-  // "classify": a run folder, or one checkpoint, of task.kind = "classify". "vgg16", "alexnet",
-  // "squeezenet": a safetensors file of the user's with torchvision's names (nn::FeatureNetwork).
+  // "classify": a run folder, or one checkpoint, of task.kind = "classify". "vgg16": a safetensors
+  // file of the user's with torchvision's names (nn::Vgg16).
   std::string kind = "classify";
   Path file;
   // Of "classify": the levels before this one are left out, as far as one remains. At the full and
