@@ -65,7 +65,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"base", {}},
     {"scene", {"base"}},
     {"nn", {"base"}},
-    {"io", {"scene", "nn", "base"}},
+    {"io", {"scene", "base"}},
     {"raster", {"scene", "base"}},
     {"shade", {"raster", "scene", "base"}},
     {"render", {"shade", "raster", "scene", "base"}},
