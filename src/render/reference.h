@@ -252,7 +252,7 @@ void UniformsBackRef(const RefScene<T>& s, const RefGradients<T>& d,
   }
   std::fill(d_scene.sh.begin(), d_scene.sh.end(), T(0));
   if (!d_scene.sh.empty()) {
-    shade::ShPolynomialAdjoint<T>(shade::ShBasis::kOrthonormal, u.sh, d_scene.sh);
+    shade::ShPolynomialAdjoint<T>(u.sh, d_scene.sh);
   }
   for (std::size_t t = 0; t < d_scene.textures.size(); ++t) {
     std::vector<T> texels = u.texels[t];

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Light as spherical harmonics up to degree 2 (equation 11): I_l = sum_i w_i Y_i(N), nine
-// coefficients. (R. Ramamoorthi, P. Hanrahan: An efficient representation for irradiance
-// environment maps, 2001.)
+// coefficients. The Y_i are the orthonormal real basis with the Condon-Shortley sign: 1, -y, z, -x,
+// xy, -yz, 3z^2-1, -xz, x^2-y^2 times constants. (R. Ramamoorthi, P. Hanrahan: An efficient
+// representation for irradiance environment maps, 2001.)
 #pragma once
 
 #include <array>
@@ -10,20 +11,6 @@
 #include "shade/pixel_run.h"
 
 namespace tilegrad::shade {
-
-enum class ShBasis {
-  // The orthonormal real basis with the Condon-Shortley sign: 1, -y, z, -x, xy, -yz, 3z^2-1, -xz,
-  // x^2-y^2 times its constants. What equation 11 says.
-  kOrthonormal,
-  // The same times pi, 2 pi / 3, pi / 4 by degree: coefficients of radiance give irradiance.
-  kIrradiance,
-  // Constants of an older implementation (Kaolin 0.1, frag_shtex): the basis times 1, 2/3, 1/4 by
-  // degree, its z^2 divided by sqrt 3 and its xz by sqrt 2. For models that were trained with it.
-  kKaolin01,
-  // Constants and order of another (Kaolin's spherical_harmonic_lighting): 1, x, z, y, xy, yz, z^2,
-  // xz, x^2-y^2, no signs, the last two divided by sqrt 2. For models that were trained with it.
-  kKaolinLegacy,
-};
 
 // I_l as a polynomial in N = (x, y, z): p[0] + p[1] x + p[2] y + p[3] z + p[4] xy + p[5] yz
 // + p[6] z^2 + p[7] xz + p[8] (x^2 - y^2).

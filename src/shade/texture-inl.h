@@ -73,14 +73,12 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const Texture
                         std::size_t i, AxisRun* out) {
   const RunTag d;
   const RunIntTag di;
-  const bool corners = input.outer_centres;
-  const Wrap wrap = corners ? Wrap::kClamp : way;  // of indices
   const bool nearest = input.filter == Filter::kNearest;
   const auto most = hn::Sub(n, hn::Set(di, 1));
-  const auto scale = hn::ConvertTo(d, corners ? most : n);
+  const auto scale = hn::ConvertTo(d, n);
   auto x = hn::Mul(u.at, scale);
-  if (!corners && !nearest) x = hn::Sub(x, hn::Set(d, 0.5f));
-  const auto cell = corners && nearest ? hn::Round(x) : hn::Floor(x);
+  if (!nearest) x = hn::Sub(x, hn::Set(d, 0.5f));
+  const auto cell = hn::Floor(x);
   const auto low = hn::ConvertTo(di, cell);
   if (nearest) {
     const auto index = ClampIndex(low, most);
@@ -88,9 +86,9 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const Texture
     hn::Store(hn::Zero(d), d, out->weight + i), hn::Store(hn::Zero(d), d, out->slope + i);
     return;
   }
-  hn::Store(WrapLaneIndex(low, most, wrap), di, out->low + i);
+  hn::Store(WrapLaneIndex(low, most, way), di, out->low + i);
   const auto high = hn::Add(low, hn::Set(di, 1));
-  hn::Store(WrapLaneIndex(high, most, wrap), di, out->high + i);
+  hn::Store(WrapLaneIndex(high, most, way), di, out->high + i);
   hn::Store(hn::Sub(x, cell), d, out->weight + i);
   hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
 }

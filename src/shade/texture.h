@@ -26,10 +26,6 @@ struct TextureViewT {
   int width = 0, height = 0, channels = 0;
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
-  // With Wrap::kRepeat: as an older implementation (Kaolin 0.1 with PyTorch 1.2) repeats, with the
-  // centres of the outer texels at 0 and 1, so that u = 1 jumps to the first. For models trained
-  // with it.
-  bool outer_centres = false;
 };
 using TextureView = TextureViewT<float>;
 
@@ -64,7 +60,6 @@ struct TextureInput {
   Filter filter;
   const RunPlane* uv;     // [2]
   const RunPlane* level;  // if trilinear: log2 of texels for a pixel, 0 is the finest; any number
-  bool outer_centres = false;  // as in TextureView
 };
 
 // A pixel's gradient to up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color

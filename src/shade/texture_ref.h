@@ -53,18 +53,16 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
 // Along u, which is wrapped by `way`; for v, call it with 1 - v.
 template <class T>
 Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap way, const TextureViewT<T>& texture) {
-  const bool corners = texture.outer_centres, nearest = texture.filter == Filter::kNearest;
-  const Wrap wrap = corners ? Wrap::kClamp : way;  // of indices
-  const float scale = static_cast<float>(corners ? n - 1 : n);
-  const T x = corners || nearest ? u.at * T(scale) : u.at * T(scale) - T(0.5f);
-  if (nearest) {
-    const auto cell = corners ? std::nearbyint(RealPart(x)) : std::floor(RealPart(x));
-    const int i = WrapIndex(static_cast<int>(cell), n, wrap == Wrap::kRepeat ? Wrap::kClamp : wrap);
-    return {i, i, T(0), 0};
-  }
+  const bool nearest = texture.filter == Filter::kNearest;
+  const auto scale = static_cast<float>(n);
+  const T x = nearest ? u.at * T(scale) : u.at * T(scale) - T(0.5f);
   const auto cell = std::floor(RealPart(x));
   const int i = static_cast<int>(cell);
-  return {WrapIndex(i, n, wrap), WrapIndex(i + 1, n, wrap), x - T(cell), u.slope * scale};
+  if (nearest) {
+    const int texel = std::clamp(i, 0, n - 1);
+    return {texel, texel, T(0), 0};
+  }
+  return {WrapIndex(i, n, way), WrapIndex(i + 1, n, way), x - T(cell), u.slope * scale};
 }
 
 template <class T>

@@ -73,8 +73,7 @@ std::array<float, 3> Sample(const shade::TexturePyramid& pyramid, float u, float
   std::fill_n(uv[0].at, shade::kRunPad, u), std::fill_n(uv[1].at, shade::kRunPad, v);
   std::fill_n(levels.at, shade::kRunPad, level);
   const shade::TextureView& view = pyramid.view();
-  shade::SampleTexture(
-      1, {pyramid.levels(), view.wrap, view.filter, uv, &levels, view.outer_centres}, color);
+  shade::SampleTexture(1, {pyramid.levels(), view.wrap, view.filter, uv, &levels}, color);
   return {color[0].at[0], color[1].at[0], color[2].at[0]};
 }
 
@@ -86,11 +85,10 @@ void Texture(Input input) {
   const int width = 1 + static_cast<int>(in.Below(16)), height = 1 + static_cast<int>(in.Below(16));
   const auto wrap = static_cast<Wrap>(in.Below(9));
   const auto filter = static_cast<Filter>(in.Below(3));
-  const bool outer = wrap == Wrap::kRepeat && in.Below(2) == 1;
   std::vector<float> texels(3 * static_cast<std::size_t>(width * height));
   Rng rng(in.Take<std::uint8_t>(), 9);
   for (float& t : texels) t = static_cast<float>(rng.Uniform());
-  const shade::TextureView view{texels, width, height, 3, wrap, filter, outer};
+  const shade::TextureView view{texels, width, height, 3, wrap, filter};
   shade::TexturePyramid pyramid;
   pyramid.Build(view);
   const shade::PyramidRef<float> reference(view);

@@ -69,8 +69,7 @@ Vec3<float> Sample(const TexturePyramid& pyramid, float u, float v, float level)
   std::fill_n(uv[0].at, kRunPad, u), std::fill_n(uv[1].at, kRunPad, v);
   std::fill_n(levels.at, kRunPad, level);
   const TextureView& view = pyramid.view();
-  SampleTexture(1, {pyramid.levels(), view.wrap, view.filter, uv, &levels, view.outer_centres},
-                color);
+  SampleTexture(1, {pyramid.levels(), view.wrap, view.filter, uv, &levels}, color);
   return {color[0].at[0], color[1].at[0], color[2].at[0]};
 }
 
@@ -86,10 +85,9 @@ TEST_F(OnEveryTarget, LookupsAreThoseOfTheReference) {
     ASSERT_TRUE(ForceTarget(target).ok());
     Rng rng(4, 4);
     for (int n = 0; n < 432; ++n) {
-      const bool outer_centres = n % 4 == 3;
-      const Wrap wrap = outer_centres ? Wrap::kRepeat : static_cast<Wrap>(n / 4 % 9);
+      const auto wrap = static_cast<Wrap>(n / 4 % 9);
       const auto filter = static_cast<Filter>(n / 36 % 3);
-      const TextureView view{texels, kWidth, kHeight, 3, wrap, filter, outer_centres};
+      const TextureView view{texels, kWidth, kHeight, 3, wrap, filter};
       TexturePyramid pyramid;
       pyramid.Build(view);
       const auto u = static_cast<float>(rng.Uniform(-3, 3));

@@ -32,7 +32,7 @@ void SetLights(const Scene& scene, StageScene* out) {
     out->inverse_lengths.push_back(unit.inverse_length);
   }
   if (scene.shading.lighting != Lighting::kSphericalHarmonics) return;
-  out->sh = shade::ShPolynomialOf<float>(shade::ShBasis::kOrthonormal, scene.sh);
+  out->sh = shade::ShPolynomialOf<float>(scene.sh);
 }
 
 void SetSurfaces(const Scene& scene, StageScene* out) {

@@ -88,7 +88,7 @@ void AddCamera(const StageScene& scene, const SceneSums& sums, Camera* d_camera)
 void AddSh(const StageScene& scene, const SceneSums& sums, std::span<float> d_sh) {
   if (d_sh.empty() || scene.scene->shading.lighting != Lighting::kSphericalHarmonics) return;
   std::array<double, 9> d = {};
-  shade::ShPolynomialAdjoint<double>(shade::ShBasis::kOrthonormal, sums.sh, d);
+  shade::ShPolynomialAdjoint<double>(sums.sh, d);
   for (std::size_t i = 0; i < 9; ++i) d_sh[i] += static_cast<float>(d[i]);
 }
 

@@ -85,7 +85,7 @@ void SetUniformsRef(RefScene<T>* s) {
     s->inverse_lengths.push_back(unit.inverse_length);
   }
   if (scene.shading.lighting == Lighting::kSphericalHarmonics) {
-    u.sh = shade::ShPolynomialOf<T>(shade::ShBasis::kOrthonormal, scene.sh);
+    u.sh = shade::ShPolynomialOf<T>(scene.sh);
   }
   for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t c = 0; c < 3; ++c) {

@@ -42,7 +42,7 @@ shade::Vec3<double> ToCamera(const Camera& camera, const shade::Vec3<double>& n)
 }
 
 double LightAt(std::span<const double> sh, const shade::Vec3<double>& n) {
-  return shade::ShLightRef(shade::ShPolynomialOf<double>(shade::ShBasis::kOrthonormal, sh), n);
+  return shade::ShLightRef(shade::ShPolynomialOf<double>(sh), n);
 }
 
 // A normal of the world and the same one in the camera's axes have the same light. Rotations are of
