@@ -208,41 +208,6 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
   EXPECT_LE(off, checked / 50) << "of " << checked;
 }
 
-// (I + lambda L) undoes the map: v + lambda * sum over neighbours n of (v - n) is what went in.
-TEST(OffsetMap, StiffnessIsTheInverseOfOnePlusTheLaplacian) {
-  const Workers workers(1);
-  nn::Context context(workers, nn::DType::kF64);
-  const Mesh sphere = Icosphere(1, 1);
-  const Topology topology = BuildTopology(sphere.faces, sphere.positions.size());
-  const auto count = static_cast<std::int64_t>(sphere.positions.size());
-  constexpr double kLambda = 3;
-  Rng rng(2);
-  std::vector<double> raw(static_cast<std::size_t>(2 * 3 * count));
-  for (double& x : raw) x = rng.Uniform(-1, 1);
-  const OffsetMap map(context, sphere, {.stiffness = kLambda});
-  nn::Tensor out =
-      map.Apply(nn::Constant(context, context.From({2, 3 * count}, std::span<const double>(raw))))
-          .value();
-  const std::span<const double> offsets = out.span<double>();
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    const std::size_t axis = i % 3, v = i / 3 % static_cast<std::size_t>(count),
-                      mesh = i - axis - 3 * v;
-    double back = offsets[i];
-    for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n) {
-      const auto other = static_cast<std::size_t>(topology.neighbors[static_cast<std::size_t>(n)]);
-      back += kLambda * (offsets[i] - offsets[mesh + 3 * other + axis]);
-    }
-    EXPECT_NEAR(back, raw[i], 1e-12)
-        << i;  // of sums of some tens of numbers below 1, times 1 + 7 lambda
-  }
-}
-
-TEST(Chain, SoDoThoseOfStiffTemplates) {
-  SmallProblem p;
-  p.config.network.shape.smoothing = 0, p.config.network.shape.stiffness = 2;
-  ExpectGradientsAgreeWithDifferences(p);
-}
-
 TEST(Chain, Float64GradientsAgreeWithDifferences) {
   ExpectGradientsAgreeWithDifferences(SmallProblem());
 }

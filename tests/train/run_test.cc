@@ -86,6 +86,12 @@ TEST_F(RunTest, KeysOfFormerVersionsArePassedOver) {
   ExpectMessage(set("network.wrap=maybe"), "unknown key \"network.wrap\"");
 }
 
+TEST_F(RunTest, NumbersOfFormerVersionsAreCompared) {
+  EXPECT_TRUE(ParseConfig("network.stiffness = 0.0\n", "old").ok());
+  ExpectMessage(ParseConfig("network.stiffness = 5.0\n", "old").status(), "network.stiffness",
+                "what 0 stood for");
+}
+
 // toml++ frees tables in tables by recursion.
 TEST_F(RunTest, ConfigsOfDeepKeys) {
   std::string key;

@@ -26,10 +26,8 @@ DeformableTemplate::DeformableTemplate(nn::Context& context, const TemplateConfi
   std::vector<float> unit(flat.begin(), flat.end());
   for (float& x : unit) x /= static_cast<float>(kN3mrRadius);
   if (config.n3mr_vertices) unit_sphere_ = context.From({count, 3}, std::span<const float>(unit));
-  offsets_ = OffsetMap(context, mesh_,
-                       {.smoothing = config.smoothing,
-                        .stiffness = config.stiffness,
-                        .symmetric = config.symmetric});
+  offsets_ =
+      OffsetMap(context, mesh_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
 }
 
 nn::Var DeformableTemplate::Movement(const nn::Var& raw) const {

@@ -16,8 +16,6 @@ struct TemplateConfig {
   std::int64_t level = 3;      // subdivisions of the icosahedron: 3 gives 642 vertices
   double radius = 0.175;       // world units
   std::int64_t smoothing = 0;  // rounds of diffusion over the sphere that offsets go through
-  double stiffness = 0;        // lambda of (I + lambda L)^-1, which offsets go through: Nicolet et
-                               // al., "Large Steps in Inverse Rendering", 2021, with L = D - A
   bool symmetric = false;  // offsets are the mean of themselves and their mirror image at x = 0,
                            // so every prediction is symmetric there
   bool n3mr_vertices = false;  // sphere_vertices.h instead of offsets; radius is 1/4, and the two

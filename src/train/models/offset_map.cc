@@ -24,34 +24,6 @@ nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
   });
 }
 
-// (I + lambda L)^-1 [V, V] with L = D - A of the mesh's edges: by Gauss and Jordan, without pivots,
-// as the matrix is diagonally dominant.
-std::vector<double> StiffInverse(const Mesh& mesh, double lambda) {
-  const std::size_t n = mesh.positions.size();
-  const Topology topology = BuildTopology(mesh.faces, n);
-  std::vector<double> a(n * n);
-  for (std::size_t v = 0; v < n; ++v) {
-    const std::int32_t first = topology.offsets[v], last = topology.offsets[v + 1];
-    a[v * n + v] = 1 + lambda * (last - first);
-    for (std::int32_t i = first; i < last; ++i)
-      a[v * n + static_cast<std::size_t>(topology.neighbors[static_cast<std::size_t>(i)])] =
-          -lambda;
-  }
-  for (std::size_t k = 0; k < n; ++k) {
-    double* const pivot = &a[k * n];
-    const double scale = 1 / pivot[k];
-    pivot[k] = 1;
-    for (std::size_t j = 0; j < n; ++j) pivot[j] *= scale;
-    for (std::size_t i = 0; i < n; ++i) {
-      const double factor = a[i * n + k];
-      if (i == k || factor == 0) continue;
-      a[i * n + k] = 0;
-      for (std::size_t j = 0; j < n; ++j) a[i * n + j] -= factor * pivot[j];
-    }
-  }
-  return a;
-}
-
 // The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
 std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
   std::map<std::tuple<float, float, float>, std::int64_t> at;
@@ -78,21 +50,15 @@ nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
 }  // namespace
 
 OffsetMap::OffsetMap(nn::Context& context, const Mesh& sphere, const OffsetRules& rules)
-    : context_(&context),
-      rules_(rules),
-      vertices_(static_cast<std::int64_t>(sphere.positions.size())) {
+    : rules_(rules), vertices_(static_cast<std::int64_t>(sphere.positions.size())) {
   const nn::Var like = nn::Constant(context, 0.0);
   diffusion_ = DiffusionRound(like, sphere);
   if (rules.symmetric) symmetry_ = Symmetry(like, sphere);
-  if (rules.stiffness > 0) {
-    const std::vector<double> inverse = StiffInverse(sphere, rules.stiffness);
-    stiff_ = context.From({vertices_, vertices_}, std::span<const double>(inverse));
-  }
 }
 
 nn::Var OffsetMap::Apply(const nn::Var& raw) const {
   if (!raw.valid()) return raw;
-  const bool plain = !rules_.symmetric && rules_.smoothing == 0 && rules_.stiffness == 0;
+  const bool plain = !rules_.symmetric && rules_.smoothing == 0;
   return nn::Reshape(plain ? raw : Mapped(raw), {raw.shape()[0], vertices_, 3});
 }
 
@@ -104,7 +70,6 @@ nn::Var OffsetMap::Mapped(const nn::Var& raw) const {
   offsets = nn::Reshape(offsets, {vertices_, 3 * batch});
   for (std::int64_t round = 0; round < rules_.smoothing; ++round)
     offsets = nn::MapAxis(offsets, 0, diffusion_);
-  if (rules_.stiffness > 0) offsets = nn::Matmul(nn::Constant(*context_, stiff_), offsets);
   return nn::Transpose(nn::Reshape(offsets, {3 * vertices_, batch}));
 }
 

@@ -9,9 +9,7 @@ namespace tilegrad::train {
 
 struct OffsetRules {
   std::int64_t smoothing = 0;  // rounds of diffusion over the template
-  double stiffness = 0;    // lambda of (I + lambda L)^-1, L = D - A: Nicolet et al., "Large Steps
-                           // in Inverse Rendering of Geometry", 2021; 0: not
-  bool symmetric = false;  // offsets are the mean of themselves and their mirror image at x = 0
+  bool symmetric = false;      // offsets are the mean of themselves and their mirror image at x = 0
 };
 
 class OffsetMap {
@@ -24,12 +22,10 @@ class OffsetMap {
  private:
   nn::Var Mapped(const nn::Var& raw) const;
 
-  nn::Context* context_ = nullptr;
   OffsetRules rules_;
   std::int64_t vertices_ = 0;
   nn::AxisMap diffusion_;  // one round
   nn::AxisMap symmetry_;   // of [3 V] offsets
-  nn::Tensor stiff_;       // [V, V], (I + lambda L)^-1
 };
 
 }  // namespace tilegrad::train

@@ -63,7 +63,7 @@ struct GoneKey {
   std::string_view key;
   double value;
 };
-constexpr GoneKey kGone[] = {{"network.wrap", 1}};
+constexpr GoneKey kGone[] = {{"network.stiffness", 0}, {"network.wrap", 1}};
 
 Status PassOver(const ConfigFields& fields, const std::string& key, const toml::node& node) {
   const auto* const gone = std::find_if(std::begin(kGone), std::end(kGone),

@@ -19,8 +19,6 @@ ConfigFields FieldsOf(NetworkConfig* c) {
       {"network.template_radius", &c->shape.radius, 1e-3, 10, "world units"},
       {"network.smoothing", &c->shape.smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
-      {"network.stiffness", &c->shape.stiffness, 0, 1e6,
-       "lambda of (I + lambda L)^-1, which offsets go through; 0: not"},
       {"network.symmetric", &c->shape.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
       {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
       {"network.fc_deviation", &c->fc_deviation, 0, 10,
@@ -49,10 +47,10 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
 
 Status CheckConfig(const SingleImageConfig& config) {
   const TemplateConfig& n = config.network.shape;
-  if (n.n3mr_vertices && (n.smoothing > 0 || n.stiffness > 0 || n.symmetric)) {
+  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
     return InvalidArgument(
-        "network.n3mr_vertices has no offsets, which network.smoothing, network.stiffness and "
-        "network.symmetric are about: leave these at 0, 0 and false");
+        "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
+        "about: leave these at 0 and false");
   }
   return RivalOptions(config.render.rule, config.rivals).status();
 }
