@@ -20,8 +20,7 @@ constexpr int kSphereLevels = 3;
 // What a hull has too much of, tents on flat sides, has more area than what is right; masks hold
 // the rest. At 1 thin things vanish.
 constexpr double kHullArea = 0.3;
-constexpr double kRemeshShare = 0.6;  // of the run
-constexpr double kLateLight = 0.1;    // rate of light once colours move
+constexpr double kLateLight = 0.1;  // rate of light once colours move
 constexpr double kRounding = 1e-9;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
@@ -77,7 +76,6 @@ ConfigFields FieldsOf(FitConfig* c) {
        "share of the masks that may lack a point of the hull, if masks have gaps"},
       {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
       {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
-      {"remeshes", &c->remeshes, 0, 1000, "times that edges are made as long as they should be"},
       {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
       {"flatness", &c->regularizers.flatness, 0, 1e6, "weight of the angles between faces"},
       {"edge_length", &c->regularizers.edge_length, 0, 1e6, "weight of unequal edges"},
@@ -134,21 +132,13 @@ FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
   if (config.delta_start == 0)
     config.delta_start = from_hull ? DeltaOf(kHullPixels, size) : kWideDelta;
   if (config.regularizers.area < 0) config.regularizers.area = from_hull ? kHullArea : 0;
-  if (config.parameters[Parameter::kUv]) config.remeshes = 0;
   SetMaterial(from_hull, &config);
   return config;
-}
-
-int RemeshesUntil(const FitConfig& config, double time) {
-  if (config.remeshes <= 0) return 0;
-  return std::min(config.remeshes,
-                  static_cast<int>(time * config.remeshes / kRemeshShare + kRounding));
 }
 
 double EarliestHurry(const FitConfig& config) {
   double time = std::max(config.cameras_rest, config.texture_rest);
   if (config.levels > 1) time = std::max(time, 1 - kFullShare);
-  if (config.remeshes > 0) time = std::max(time, kRemeshShare);
   return time;
 }
 

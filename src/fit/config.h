@@ -52,10 +52,7 @@ struct FitConfig {
   double delta = 0;  // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
   double max_alpha_error = 1e-4;
 
-  LearningRates rates;  // positions and cameras' translation: times the object's radius
-  // How often, over the first 60 % of the run, edges are made as long as they should be. Not where
-  // uv is fitted, or a texture is not. Only of closed manifolds, as hulls and spheres are.
-  int remeshes = 0;
+  LearningRates rates;       // positions and cameras' translation: times the object's radius
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
@@ -87,11 +84,8 @@ std::string DescribeConfig(const FitConfig& config);
 // What is 0 for "as it suits the start" gets its value. Later functions want that.
 FitConfig Settled(FitConfig config, bool from_hull, ImageSize size);
 
-// How many times edges have been remade at that time, 0 to 1, of the run.
-int RemeshesUntil(const FitConfig& config, double time);
-
 // The time of the run until which its loss says nothing about its end: resolutions are coarse,
-// cameras rest, edges are remade.
+// cameras rest.
 double EarliestHurry(const FitConfig& config);
 
 // The state of the schedules at a time of the run.

@@ -207,14 +207,6 @@ Result<FitValues> Fitter::Step(const FitStep& step) {
   return values;
 }
 
-Result<RemeshCount> Fitter::Remesh(const RemeshLimits& limits) {
-  TILEGRAD_ASSIGN(RemeshedScene made, RemeshScene(scene_, blocks_, limits, *workers_));
-  Fitter next(std::move(made.scene), options_, *workers_);
-  next.blocks_ = std::move(made.blocks);
-  *this = std::move(next);
-  return made.count;
-}
-
 std::vector<nn::NamedTensor> Fitter::State(nn::Context& context) const {
   std::vector<nn::NamedTensor> state = {
       {kFaces, context.Indices(scene_.faces)},

@@ -13,7 +13,6 @@
 #include "fit/image_loss.h"
 #include "fit/parameter_block.h"
 #include "fit/regularizer.h"
-#include "fit/remesh_scene.h"
 #include "nn/layers.h"
 
 namespace tilegrad::train {
@@ -76,10 +75,6 @@ class Fitter {
   const Images& images() const { return renderer_->images(); }  // of the last step
   const ImageLossRule& rule() const { return rule_; }
   std::span<const ParameterBlock> blocks() const { return blocks_; }
-
-  // Other vertices and faces for the same surface; moments are carried along (remesh_scene.h).
-  // Errors leave everything as it was.
-  Result<RemeshCount> Remesh(const RemeshLimits& limits);
 
   // All that a later Step depends on, by name: values and moments of each block, connectivity and
   // texture coordinates.

@@ -60,24 +60,25 @@ RunPlan PlanOf(const FitJob& job) {
   return plan;
 }
 
+const std::set<std::string> kFormerLines = {"stop_gain = 0", "remeshes = 0"};
+
 class FitWork : public RunWork {
  public:
   FitWork(const FitJob& job, const FitStart& start, nn::Context& context, Fitter fitter)
       : job_(job),
         config_(start.config),
-        remesh_(start.remesh),
         context_(context),
         fitter_(std::move(fitter)),
         clock_(config_) {}
 
-  // All lines count; earlier versions wrote them in another order, and took all steps. Of what is
-  // read, a checksum counts.
+  // All lines count, but those of earlier versions that say what is always so now; they wrote them
+  // in another order. Of what is read, a checksum counts.
   Result<std::string> ResultSettings(const std::string& settings,
                                      const std::string& /*place*/) const override {
     std::istringstream text(settings);
     std::set<std::string> lines;
     for (std::string line; std::getline(text, line);) {
-      if (line == "stop_gain = 0") continue;
+      if (kFormerLines.contains(line)) continue;
       const bool input = line.starts_with(kInput);
       lines.insert(input ? "checksum of images, cameras and mesh" + line.substr(5) : line);
     }
@@ -112,7 +113,6 @@ class FitWork : public RunWork {
 
   const FitJob& job_;
   const FitConfig config_;
-  const RemeshLimits remesh_;
   nn::Context& context_;
   Fitter fitter_;
   FitClock clock_;
@@ -133,8 +133,6 @@ const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<cons
 Status FitWork::Step(std::int64_t step, StepValues* values) {
   const FitConfig& config = config_;
   const double time = clock_.At(step);
-  if (step > 0 && RemeshesUntil(config, time) > RemeshesUntil(config, clock_.At(step - 1)))
-    TILEGRAD_TRY(fitter_.Remesh(remesh_).status());
   const FitSchedule schedule = ScheduleAt(config, time, SizeOf(job_.input));
   const std::vector<int> views = ViewsAt(config, step, job_.input.training);
   TILEGRAD_ASSIGN(const FitValues v,

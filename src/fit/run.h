@@ -59,7 +59,6 @@ struct FitStart {
   FitScene scene;
   FitterOptions options;
   FitConfig config;  // the job's, settled
-  RemeshLimits remesh;
   std::string note;  // why it is not what one would expect, or empty
 };
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch = {});

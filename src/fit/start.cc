@@ -19,9 +19,6 @@
 namespace tilegrad::train {
 namespace {
 
-// Pixels: the shortest edge that remeshing leaves (legs and rods are about two across), the longest
-// where the surface still moves, and how far remeshing may move it.
-constexpr double kShortestPixels = 0.3, kBusyPixels = 2.5, kRemeshError = 0.03;
 constexpr float kGrey = 0.5f;                 // what is to be coloured
 constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
 
@@ -146,30 +143,6 @@ float RadiusOf(const FitScene& scene) {
   return 0.5f * std::max({extent.x, extent.y, extent.z, 0.0f});
 }
 
-// World units of a pixel in the middle of the scene, the mean over the training views.
-double PixelOf(const FitJob& job, const FitScene& scene) {
-  const glm::vec3 middle = BoundsOf(scene).middle();
-  double sum = 0;
-  for (const int i : job.input.training) {
-    const Camera& c = job.input.cameras[static_cast<std::size_t>(i)];
-    const glm::vec3 axis(c.rotation[6], c.rotation[7], c.rotation[8]);
-    const float depth = -(glm::dot(axis, middle) + c.translation[2]);
-    sum += std::abs(static_cast<double>(depth / c.fx));
-  }
-  return sum / static_cast<double>(job.input.training.size());
-}
-
-RemeshLimits LimitsOf(double pixel) {
-  const HullOptions hull;
-  const auto of = [&](double pixels) { return static_cast<float>(pixels * pixel); };
-  return {.shortest = of(kShortestPixels),
-          .busy = of(kBusyPixels),
-          .longest = of(hull.longest_pixels),
-          .error = of(kRemeshError),
-          .patch = of(hull.patch_pixels) * of(hull.patch_pixels),
-          .most_faces = hull.most_faces};
-}
-
 // Turns a camera about the object's middle by `degrees` around a random axis: it moves and looks
 // elsewhere, but still at the object.
 Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees, Rng* rng) {
@@ -268,7 +241,6 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
                                    ? MeshScene(job)
                                    : TemplateScene(job, workers, watch, &from_hull, &start.note));
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
-  start.remesh = LimitsOf(PixelOf(job, start.scene));
   SetCameras(job, &start.scene);
   SetLight(start.config, &start.scene);
   const bool blank = !job.start.has_value() || !HasColors(*job.start);
@@ -283,9 +255,6 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
   }
   for (const Parameter p : kParameters)
     options.parameters[p] |= LightParameters(job.config.material)[p];
-  // Texels that are not fitted would have to be kept in every checkpoint.
-  if (!start.scene.texture.empty() && !options.parameters[Parameter::kTexture])
-    start.config.remeshes = 0;
   options.rates = job.config.rates;
   options.rates[Parameter::kPositions] *= static_cast<double>(RadiusOf(start.scene));
   if (options.parameters[Parameter::kExposure]) {

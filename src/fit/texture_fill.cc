@@ -8,10 +8,17 @@
 #include <glm/vec2.hpp>
 #include <numeric>
 
-#include "fit/texels.h"
-
 namespace tilegrad::train {
 namespace {
+
+// Of one pair of texture coordinates, in texels: centres are at whole numbers, row 0 is v = 1.
+glm::dvec2 TexelAt(const FitScene& scene, std::int32_t uv) {
+  const auto at = 2 * static_cast<std::size_t>(uv);
+  return {static_cast<double>(scene.uvs[at]) * scene.texture.width - 0.5,
+          (1 - static_cast<double>(scene.uvs[at + 1])) * scene.texture.height - 0.5};
+}
+
+double Cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
 
 constexpr float kLeastWeight = 1e-3f;  // of a texel in all pixels together: less is rounding
 constexpr int kMostTiles = 16;         // a face that covers more of them covers each texel

@@ -28,10 +28,11 @@ std::size_t CornerOf(const Face& face, std::int32_t vertex) {
 
 }  // namespace
 
-Result<EditMesh> EditMesh::Make(VertexRows vertices, std::vector<Face> faces) {
+Result<EditMesh> EditMesh::Make(std::vector<glm::vec3> positions, std::vector<Face> faces) {
   EditMesh mesh;
-  mesh.vertices_ = std::move(vertices), mesh.faces_ = std::move(faces);
-  mesh.around_.resize(mesh.vertices_.count());
+  mesh.positions_ = std::move(positions);
+  mesh.faces_ = std::move(faces);
+  mesh.around_.resize(mesh.positions_.size());
   for (std::size_t f = 0; f < mesh.faces_.size(); ++f) {
     for (const std::int32_t v : mesh.faces_[f]) {
       if (v < 0 || Index(v) >= mesh.around_.size())
@@ -115,9 +116,8 @@ bool EditMesh::CollapseTurnsFaces(std::int32_t a, std::int32_t b, glm::vec3 plac
       const Face& face = faces_[Index(f)];
       if (Has(face, a) && Has(face, b)) continue;
       const std::size_t k = CornerOf(face, moved);
-      const glm::vec3 p = vertices_.Position(face[(k + 1) % 3]),
-                      q = vertices_.Position(face[(k + 2) % 3]);
-      if (Apart(Normal(vertices_.Position(moved), p, q), Normal(place, p, q), cosine)) return true;
+      const glm::vec3 p = Position(face[(k + 1) % 3]), q = Position(face[(k + 2) % 3]);
+      if (Apart(Normal(Position(moved), p, q), Normal(place, p, q), cosine)) return true;
     }
   }
   return false;
@@ -143,68 +143,16 @@ void EditMesh::ReplaceCorner(std::int32_t face, std::int32_t from, std::int32_t 
 void EditMesh::Collapse(std::int32_t a, std::int32_t b, glm::vec3 place) {
   for (const std::int32_t face : {FaceRunning(a, b), FaceRunning(b, a)}) RemoveFace(face);
   while (!around_[Index(b)].empty()) ReplaceCorner(around_[Index(b)].back(), b, a);
-  float* to = &vertices_.values[Index(a) * vertices_.width];
-  const float* from = &vertices_.values[Index(b) * vertices_.width];
-  for (std::size_t i = 3; i < vertices_.width; ++i) to[i] = 0.5f * (to[i] + from[i]);
-  Move(a, place);
+  positions_[Index(a)] = place;
 }
 
-void EditMesh::Move(std::int32_t vertex, glm::vec3 place) {
-  float* to = &vertices_.values[Index(vertex) * vertices_.width];
-  to[0] = place.x, to[1] = place.y, to[2] = place.z;
-}
-
-std::int32_t EditMesh::Split(std::int32_t a, std::int32_t b) {
-  const auto middle = static_cast<std::int32_t>(vertices_.count());
-  const std::size_t width = vertices_.width, i = Index(a) * width, j = Index(b) * width;
-  for (std::size_t k = 0; k < width; ++k) {
-    const float mean = 0.5f * (vertices_.values[i + k] + vertices_.values[j + k]);
-    vertices_.values.push_back(mean);
-  }
-  around_.emplace_back();
-  for (const std::int32_t face : {FaceRunning(a, b), FaceRunning(b, a)}) {
-    Face half = faces_[Index(face)];
-    half[CornerOf(half, a)] = middle;  // the half at b; the face itself keeps a
-    ReplaceCorner(face, b, middle);
-    for (const std::int32_t v : half)
-      around_[Index(v)].push_back(static_cast<std::int32_t>(faces_.size()));
-    faces_.push_back(half);
-  }
-  return middle;
-}
-
-bool EditMesh::CanFlip(std::int32_t a, std::int32_t b) const {
-  const auto [c, d] = Across(a, b);
-  return Valence(a) > 3 && Valence(b) > 3 && c != d && !HasEdge(c, d);
-}
-
-bool EditMesh::FlipTurnsFaces(std::int32_t a, std::int32_t b, float cosine) const {
-  const auto [c, d] = Across(a, b);
-  const glm::vec3 pa = vertices_.Position(a), pb = vertices_.Position(b),
-                  pc = vertices_.Position(c), pd = vertices_.Position(d);
-  const glm::vec3 before[] = {Normal(pa, pb, pc), Normal(pb, pa, pd)};
-  const glm::vec3 after[] = {Normal(pa, pd, pc), Normal(pb, pc, pd)};
-  return Apart(after[0], before[0], cosine) || Apart(after[0], before[1], cosine) ||
-         Apart(after[1], before[0], cosine) || Apart(after[1], before[1], cosine);
-}
-
-void EditMesh::Flip(std::int32_t a, std::int32_t b) {
-  const auto [c, d] = Across(a, b);
-  const std::int32_t at_c = FaceRunning(a, b), at_d = FaceRunning(b, a);
-  ReplaceCorner(at_c, b, d);  // (a, b, c) becomes (a, d, c)
-  ReplaceCorner(at_d, a, c);  // (b, a, d) becomes (b, c, d)
-}
-
-EditMesh::Packed EditMesh::Pack() const {
-  Packed out;
-  out.vertices.width = vertices_.width;
+Mesh EditMesh::Pack() const {
+  Mesh out;
   std::vector<std::int32_t> number(around_.size(), -1);
   for (std::size_t v = 0; v < around_.size(); ++v) {
     if (around_[v].empty()) continue;
-    number[v] = static_cast<std::int32_t>(out.vertices.count());
-    const auto row = vertices_.values.begin() + static_cast<std::ptrdiff_t>(v * vertices_.width);
-    out.vertices.values.insert(out.vertices.values.end(), row,
-                               row + static_cast<std::ptrdiff_t>(vertices_.width));
+    number[v] = static_cast<std::int32_t>(out.positions.size());
+    out.positions.push_back(positions_[v]);
   }
   for (const Face& f : faces_) {
     if (f[0] >= 0)

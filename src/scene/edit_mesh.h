@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A closed triangle mesh that is changed edge by edge and stays a closed manifold: edges are
-// collapsed, split and flipped, and what vertices carry (positions, an optimiser's moments) goes
-// along.
+// A closed triangle mesh whose edges are collapsed one by one, and that stays a closed manifold.
 #pragma once
 
 #include <array>
@@ -15,28 +13,16 @@
 
 namespace tilegrad {
 
-// V vertices of `width` numbers each; the first three are the position.
-struct VertexRows {
-  std::size_t width = 3;
-  std::vector<float> values;  // [V, width]
-
-  std::size_t count() const { return values.size() / width; }
-  glm::vec3 Position(std::int32_t v) const {
-    const float* p = &values[static_cast<std::size_t>(v) * width];
-    return {p[0], p[1], p[2]};
-  }
-};
-
 class EditMesh {
  public:
   // An error unless each edge has exactly two faces, which run along it in opposite directions, and
   // the faces of each vertex are one fan.
-  static Result<EditMesh> Make(VertexRows vertices, std::vector<Face> faces);
+  static Result<EditMesh> Make(std::vector<glm::vec3> positions, std::vector<Face> faces);
 
-  const VertexRows& vertices() const { return vertices_; }
+  std::size_t vertices() const { return positions_.size(); }
+  glm::vec3 Position(std::int32_t vertex) const { return positions_[Index(vertex)]; }
   const std::vector<Face>& faces() const { return faces_; }
   // Vertices and faces keep their numbers until Pack; those that were taken out are not alive.
-  bool IsAlive(std::int32_t vertex) const { return !around_[Index(vertex)].empty(); }
   bool IsFaceAlive(std::int32_t face) const { return faces_[Index(face)][0] >= 0; }
   std::span<const std::int32_t> FacesAt(std::int32_t vertex) const {
     return around_[Index(vertex)];
@@ -54,26 +40,11 @@ class EditMesh {
   bool CanCollapse(std::int32_t a, std::int32_t b) const;
   // Whether faces would turn by more than the angle of this cosine if a and b stood at `place`.
   bool CollapseTurnsFaces(std::int32_t a, std::int32_t b, glm::vec3 place, float cosine) const;
-  // b goes; a stands at `place`, and its other numbers are the means of both.
+  // b goes; a stands at `place`.
   void Collapse(std::int32_t a, std::int32_t b, glm::vec3 place);
 
-  void Move(std::int32_t vertex, glm::vec3 place);
-
-  // The new vertex, in the middle.
-  std::int32_t Split(std::int32_t a, std::int32_t b);
-
-  // Whether the edge can join its opposite corners instead: they are not joined yet, and each end
-  // keeps three faces.
-  bool CanFlip(std::int32_t a, std::int32_t b) const;
-  bool FlipTurnsFaces(std::int32_t a, std::int32_t b, float cosine) const;
-  void Flip(std::int32_t a, std::int32_t b);
-
-  // What is alive, in the order it was made, renumbered.
-  struct Packed {
-    VertexRows vertices;
-    std::vector<Face> faces;
-  };
-  Packed Pack() const;
+  // What is alive, renumbered.
+  Mesh Pack() const;
 
  private:
   static std::size_t Index(std::int32_t i) { return static_cast<std::size_t>(i); }
@@ -84,7 +55,7 @@ class EditMesh {
   void ReplaceCorner(std::int32_t face, std::int32_t from, std::int32_t to);
   void Forget(std::int32_t vertex, std::int32_t face);
 
-  VertexRows vertices_;
+  std::vector<glm::vec3> positions_;
   std::vector<Face> faces_;
   std::vector<std::vector<std::int32_t>> around_;  // faces of each vertex
 };

@@ -56,14 +56,10 @@ struct Later {
 
 class Simplification {
  public:
-  Simplification(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh)
-      : mesh_(*mesh),
-        keep_(keep),
-        limits_(limits),
-        stamps_(mesh_.vertices().count()),
-        quadrics_(stamps_.size()) {
+  Simplification(const SimplifyLimits& limits, EditMesh* mesh)
+      : mesh_(*mesh), limits_(limits), stamps_(mesh_.vertices()), quadrics_(stamps_.size()) {
     // About the first vertex: sums of squares far from the origin lose digits.
-    if (!stamps_.empty()) origin_ = mesh_.vertices().Position(0);
+    if (!stamps_.empty()) origin_ = mesh_.Position(0);
     for (std::int32_t f = 0; f < static_cast<std::int32_t>(mesh_.faces().size()); ++f) {
       if (!mesh_.IsFaceAlive(f)) continue;
       AddPlaneOf(mesh_.faces()[Index(f)]), ++faces_;
@@ -91,7 +87,7 @@ class Simplification {
  private:
   static std::size_t Index(std::int32_t i) { return static_cast<std::size_t>(i); }
   glm::dvec3 At(std::int32_t v) const {
-    return glm::dvec3(mesh_.vertices().Position(v)) - glm::dvec3(origin_);
+    return glm::dvec3(mesh_.Position(v)) - glm::dvec3(origin_);
   }
 
   void AddPlaneOf(const Face& f) {
@@ -117,7 +113,6 @@ class Simplification {
   }
 
   void Push(std::int32_t a, std::int32_t b) {
-    if (!keep_.empty() && (keep_[Index(a)] || keep_[Index(b)])) return;
     queue_.push(
         {static_cast<float>(BestOf(a, b).cost), a, b, stamps_[Index(a)] + stamps_[Index(b)]});
   }
@@ -134,7 +129,7 @@ class Simplification {
     for (const std::int32_t moved : {c.a, c.b}) {
       for (const std::int32_t f : mesh_.FacesAt(moved)) {
         for (const std::int32_t v : mesh_.faces()[Index(f)]) {
-          const glm::vec3 d = mesh_.vertices().Position(v) - place;
+          const glm::vec3 d = mesh_.Position(v) - place;
           if (v != c.a && v != c.b && glm::dot(d, d) > most) return true;
         }
       }
@@ -155,7 +150,6 @@ class Simplification {
   }
 
   EditMesh& mesh_;
-  std::span<const char> keep_;
   SimplifyLimits limits_;
   std::size_t faces_ = 0;
   glm::vec3 origin_ = {0, 0, 0};
@@ -166,21 +160,10 @@ class Simplification {
 
 }  // namespace
 
-Status Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh) {
-  return Simplification(limits, keep, mesh).Run();
-}
-
 Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
-  VertexRows rows;
-  for (const glm::vec3& p : mesh.positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
-  TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(std::move(rows), mesh.faces));
-  TILEGRAD_TRY(Simplify(limits, {}, &edit));
-  const EditMesh::Packed packed = edit.Pack();
-  Mesh out;
-  out.faces = packed.faces;
-  for (std::size_t v = 0; v < packed.vertices.count(); ++v)
-    out.positions.push_back(packed.vertices.Position(static_cast<std::int32_t>(v)));
-  return out;
+  TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(mesh.positions, mesh.faces));
+  TILEGRAD_TRY(Simplification(limits, &edit).Run());
+  return edit.Pack();
 }
 
 }  // namespace tilegrad

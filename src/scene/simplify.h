@@ -26,8 +26,4 @@ struct SimplifyLimits {
 // error if `mesh` is not a closed manifold (scene/edit_mesh.h).
 Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits);
 
-// The same in place, with what vertices carry. Vertices for which `keep` is not 0 stay where they
-// are and are not taken out; empty: none.
-Status Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh);
-
 }  // namespace tilegrad

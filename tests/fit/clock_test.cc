@@ -49,14 +49,12 @@ TEST(FitClock, HurriesFromWhereTheLossStays) {
   EXPECT_EQ(StepsOf(config, 1000), 200 + 267);
 }
 
-TEST(FitClock, WaitsForFullResolutionForCamerasAndForEdges) {
+TEST(FitClock, WaitsForFullResolutionAndForCameras) {
   FitConfig config = Config(1000);
   config.levels = 3;  // until step 550: windows end at 650, 750
   EXPECT_EQ(StepsOf(config, 0), 750 + 84);
   config.levels = 1, config.cameras_rest = 0.4;
   EXPECT_EQ(StepsOf(config, 0), 600 + 134);
-  config.remeshes = 2;
-  EXPECT_EQ(StepsOf(config, 0), 800 + 67);
 }
 
 class HurriedFit : public TempFolderTest {

@@ -107,9 +107,7 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
   EXPECT_EQ(Euler(*hull), 0);
   const auto truth = Voxelize(mesh, 32), found = Voxelize(*hull, 32);
   EXPECT_GT(VoxelIou(*truth, *found), 0.7);
-  VertexRows rows;
-  for (const glm::vec3& p : hull->positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
-  EXPECT_TRUE(EditMesh::Make(rows, hull->faces).ok());
+  EXPECT_TRUE(EditMesh::Make(hull->positions, hull->faces).ok());
 }
 
 TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {

@@ -110,7 +110,6 @@ FitJob AnyJob(Numbers* n) {
   job.config.mask_tolerance = n->Below(2) == 0 ? 0 : 0.3;
   job.config.levels = static_cast<int>(n->Below(4));
   job.config.vertex_colors = n->Below(4) == 0;
-  job.config.remeshes = static_cast<int>(n->Below(2));
   if (n->Below(8) == 0) job.config.perturb_cameras = 10;
   job.out = ScratchFolder() / "fit";
   return job;

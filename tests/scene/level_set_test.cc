@@ -24,12 +24,6 @@ ScalarGrid GridOf(int n, const std::function<float(glm::vec3)>& value) {
   return grid;
 }
 
-VertexRows RowsOf(const Mesh& mesh) {
-  VertexRows rows;
-  for (const glm::vec3& p : mesh.positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
-  return rows;
-}
-
 long Euler(const Mesh& mesh) {
   const auto edges = BuildTopology(mesh.faces, mesh.positions.size()).edges.size();
   return static_cast<long>(mesh.positions.size()) - static_cast<long>(edges) +
@@ -56,7 +50,7 @@ TEST(LevelSet, OfRandomNumbersIsAClosedManifold) {
       return static_cast<float>(rng.Uniform() < share ? 1 : -rng.Uniform());
     }));
     ASSERT_GT(mesh.faces.size(), 100u);
-    const auto edit = EditMesh::Make(RowsOf(mesh), mesh.faces);
+    const auto edit = EditMesh::Make(mesh.positions, mesh.faces);
     EXPECT_TRUE(edit.ok()) << "seed " << seed << ": " << edit.status().message();
     EXPECT_GT(Volume(mesh), 0);
   }
@@ -83,7 +77,7 @@ TEST(LevelSet, KeepsPartsApart) {
            std::min(glm::length(p - glm::vec3(0.5f, 0, 0)), glm::length(p + glm::vec3(0.5f, 0, 0)));
   }));
   EXPECT_EQ(Euler(two), 4);
-  EXPECT_TRUE(EditMesh::Make(RowsOf(two), two.faces).ok());
+  EXPECT_TRUE(EditMesh::Make(two.positions, two.faces).ok());
 }
 
 }  // namespace tilegrad::level_set_test
