@@ -21,7 +21,6 @@ constexpr int kSphereLevels = 3;
 // the rest. At 1 thin things vanish.
 constexpr double kHullArea = 0.3;
 constexpr double kLateLight = 0.1;  // rate of light once colours move
-constexpr double kRounding = 1e-9;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 constexpr std::size_t kFirstRates = 8;

@@ -1,74 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/diffusion.h"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 namespace tilegrad::train {
-namespace {
 
-constexpr double kTolerance = 1e-5;
-
-double Dot(const std::vector<float>& a, const std::vector<float>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    sum += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+// Cholesky's factor of 1 + lambda L, whose rows are ordered so that it stays sparse.
+struct Diffusion::System {
+  System(const Topology& topology, double lambda) {
+    const auto count = static_cast<int>(topology.offsets.size()) - 1;
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int v = 0; v < count; ++v) {
+      const auto* const range = &topology.offsets[static_cast<std::size_t>(v)];
+      entries.emplace_back(v, v, 1 + lambda * (range[1] - range[0]));
+      for (std::int32_t n = range[0]; n < range[1]; ++n)
+        entries.emplace_back(v, topology.neighbors[static_cast<std::size_t>(n)], -lambda);
+    }
+    Eigen::SparseMatrix<double> matrix(count, count);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    factor.compute(matrix);
+    rows.resize(count, 3);
   }
-  return sum;
-}
 
-// y += factor x
-void AddScaled(double factor, const std::vector<float>& x, std::vector<float>* y) {
-  const auto f = static_cast<float>(factor);
-  for (std::size_t i = 0; i < x.size(); ++i) (*y)[i] += f * x[i];
-}
-
-}  // namespace
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor;
+  Eigen::MatrixX3d rows;  // right sides, in the factor's order, then solutions
+};
 
 Diffusion::Diffusion(const Topology& topology, double lambda)
-    : topology_(&topology), lambda_(static_cast<float>(lambda)) {
-  const std::size_t size = 3 * (topology.offsets.size() - 1);
-  for (auto* array : {&solution_, &residual_, &direction_, &image_}) array->resize(size);
-}
-
-void Diffusion::Multiply(const std::vector<float>& x, std::vector<float>* y) const {
-  const Topology& t = *topology_;
-  for (std::size_t v = 0; v + 1 < t.offsets.size(); ++v) {
-    float sum[3] = {};
-    for (std::int32_t n = t.offsets[v]; n < t.offsets[v + 1]; ++n) {
-      const float* from =
-          &x[3 * static_cast<std::size_t>(t.neighbors[static_cast<std::size_t>(n)])];
-      for (std::size_t c = 0; c < 3; ++c) sum[c] += from[c];
-    }
-    const auto degree = static_cast<float>(t.offsets[v + 1] - t.offsets[v]);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float own = x[3 * v + c];
-      (*y)[3 * v + c] = own + lambda_ * (degree * own - sum[c]);
-    }
-  }
-}
+    : topology_(&topology), lambda_(lambda) {}
+Diffusion::Diffusion(Diffusion&&) noexcept = default;
+Diffusion& Diffusion::operator=(Diffusion&&) noexcept = default;
+Diffusion::~Diffusion() = default;
 
 void Diffusion::Apply(std::span<float> x) {
   if (lambda_ == 0) return;
-  std::fill(solution_.begin(), solution_.end(), 0.0f);
-  residual_.assign(x.begin(), x.end());
-  direction_ = residual_;
-  double square = Dot(residual_, residual_);
-  const double enough = kTolerance * kTolerance * square;
-  for (int i = 0; i < kMostIterations && square > enough; ++i) {
-    Multiply(direction_, &image_);
-    const double length = square / Dot(direction_, image_);
-    AddScaled(length, direction_, &solution_);
-    AddScaled(-length, image_, &residual_);
-    const double next = Dot(residual_, residual_);
-    const auto keep = static_cast<float>(next / square);
-    for (std::size_t k = 0; k < direction_.size(); ++k) {
-      direction_[k] = residual_[k] + keep * direction_[k];
-    }
-    square = next;
-  }
-  std::copy(solution_.begin(), solution_.end(), x.begin());
+  if (!system_) system_ = std::make_unique<System>(*topology_, lambda_);
+  auto& [factor, rows] = *system_;
+  Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>> vertices(x.data(),
+                                                                                rows.rows(), 3);
+  const auto& order = factor.permutationP().indices();
+  for (Eigen::Index v = 0; v < rows.rows(); ++v)
+    rows.row(order[v]) = vertices.row(v).cast<double>();
+  factor.matrixL().solveInPlace(rows);
+  factor.matrixU().solveInPlace(rows);
+  for (Eigen::Index v = 0; v < rows.rows(); ++v) vertices.row(v) = rows.row(order[v]).cast<float>();
 }
 
 void UniformAdamStep(const UniformAdam& adam, Diffusion* smooth, std::span<float> gradient,

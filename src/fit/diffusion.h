@@ -6,8 +6,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "scene/topology.h"
 
@@ -17,19 +17,19 @@ class Diffusion {
  public:
   // `topology` must outlive this. lambda >= 0; 0 changes nothing.
   Diffusion(const Topology& topology, double lambda);
+  Diffusion(Diffusion&&) noexcept;
+  Diffusion& operator=(Diffusion&&) noexcept;
+  ~Diffusion();
 
-  // x [V,3] <- (1 + lambda L)^-1 x by conjugate gradients, to a relative residual of 1e-5 or
-  // kMostIterations. Allocates nothing. A pure function of x.
+  // x [V,3] <- (1 + lambda L)^-1 x. The first call factorises the matrix; later ones allocate
+  // nothing. A pure function of x.
   void Apply(std::span<float> x);
 
-  static constexpr int kMostIterations = 300;
-
  private:
-  void Multiply(const std::vector<float>& x, std::vector<float>* y) const;
-
+  struct System;
   const Topology* topology_;
-  float lambda_;
-  std::vector<float> solution_, residual_, direction_, image_;
+  double lambda_;
+  std::unique_ptr<System> system_;
 };
 
 // Adam with one second moment for all numbers, as that paper proposes: a step keeps the direction

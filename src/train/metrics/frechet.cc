@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one home of Eigen.
 #include "train/metrics/frechet.h"
 
 #include <Eigen/Eigenvalues>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/rigid_motion.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +10,6 @@
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
 #include "train/data/photographs/points3.h"
-#include "train/data/photographs/small_systems.h"
 
 namespace tilegrad::train {
 namespace {
@@ -26,6 +27,19 @@ struct Motion {
   std::array<double, 2> shift{};
 };
 
+Eigen::Map<const Eigen::Vector3d> VectorOf(const Point& p) {
+  return Eigen::Map<const Eigen::Vector3d>(p.data());
+}
+
+// x of a x = b with a symmetric and positive definite; zeros where it is not.
+template <int N>
+Eigen::Vector<double, N> SolvePositive(const Eigen::Matrix<double, N, N>& a,
+                                       const Eigen::Vector<double, N>& b) {
+  const Eigen::LLT<Eigen::Matrix<double, N, N>> root(a);
+  if (root.info() != Eigen::Success) return Eigen::Vector<double, N>::Zero();
+  return root.solve(b);
+}
+
 struct Affine {
   std::vector<Motion> motions;
   std::vector<Point> shape;
@@ -34,40 +48,42 @@ struct Affine {
 
 // Of one view: [S 1] -> x and y by least squares.
 Motion FitMotion(const std::vector<Point>& shape, const std::vector<Keypoint>& view) {
-  Matrix<4> a{};
-  Vector<4> b[2] = {};
+  Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b[2] = {Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
   double weight = 0;
   for (std::size_t k = 0; k < shape.size(); ++k) {
     if (!view[k].visible) continue;
-    const Vector<4> row = {shape[k][0], shape[k][1], shape[k][2], 1};
-    AddOuter(row, 1, &a);
-    for (std::size_t i = 0; i < 4; ++i)
-      b[0][i] += row[i] * view[k].x, b[1][i] += row[i] * view[k].y;
+    const Eigen::Vector4d row(shape[k][0], shape[k][1], shape[k][2], 1);
+    a += row * row.transpose();
+    b[0] += row * view[k].x;
+    b[1] += row * view[k].y;
     weight += 1;
   }
-  for (std::size_t i = 0; i < 4; ++i) a[i][i] += kRidge * weight;
+  a.diagonal().array() += kRidge * weight;
   Motion out;
   for (std::size_t r = 0; r < 2; ++r) {
-    const Vector<4> x = SolvePositive(a, b[r]);
-    out.rows[r] = {x[0], x[1], x[2]}, out.shift[r] = x[3];
+    const Eigen::Vector4d x = SolvePositive<4>(a, b[r]);
+    out.rows[r] = {x[0], x[1], x[2]};
+    out.shift[r] = x[3];
   }
   return out;
 }
 
 // Of one keypoint, over all views that see it. Stays where none does.
 void FitPoint(const std::vector<Motion>& motions, const Views& views, std::size_t k, Point* point) {
-  Matrix<3> a{};
-  Vector<3> b{};
+  Eigen::Matrix3d a = 1e-9 * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (!views[v][k].visible) continue;
     for (std::size_t r = 0; r < 2; ++r) {
       const double want = (r == 0 ? views[v][k].x : views[v][k].y) - motions[v].shift[r];
-      AddOuter(motions[v].rows[r], 1, &a);
-      for (std::size_t i = 0; i < 3; ++i) b[i] += motions[v].rows[r][i] * want;
+      const auto row = VectorOf(motions[v].rows[r]);
+      a += row * row.transpose();
+      b += row * want;
     }
   }
-  for (std::size_t i = 0; i < 3; ++i) a[i][i] += 1e-9;
-  *point = SolvePositive(a, b);
+  const Eigen::Vector3d x = SolvePositive<3>(a, b);
+  *point = {x[0], x[1], x[2]};
 }
 
 double Squares(const std::vector<Motion>& motions, const std::vector<Point>& shape,
@@ -101,61 +117,48 @@ Affine Alternate(const Views& views, std::uint64_t seed) {
 }
 
 // a Q b as a row over the six numbers of a symmetric Q.
-Vector<6> QuadraticRow(const Point& a, const Point& b) {
+Eigen::Vector<double, 6> QuadraticRow(const Point& a, const Point& b) {
   return {a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[2] * b[0],
           a[1] * b[1], a[1] * b[2] + a[2] * b[1], a[2] * b[2]};
 }
 
 // A 3 x 3 map after which the two rows of each motion are as long as each other and orthogonal, as
-// well as that goes. Columns of the result: A of M -> M A.
-Matrix<3> MetricUpgrade(const std::vector<Motion>& motions) {
-  Matrix<6> a{};
-  Vector<6> mean{};
-  for (const Motion& m : motions) {
-    const Vector<6> first = QuadraticRow(m.rows[0], m.rows[0]),
-                    second = QuadraticRow(m.rows[1], m.rows[1]);
-    Vector<6> difference;
-    for (std::size_t i = 0; i < 6; ++i) {
-      difference[i] = first[i] - second[i];
-      mean[i] += (first[i] + second[i]) / static_cast<double>(2 * motions.size());
-    }
-    AddOuter(difference, 1, &a);
-    AddOuter(QuadraticRow(m.rows[0], m.rows[1]), 4, &a);
-  }
+// well as that goes: A of M -> M A.
+Eigen::Matrix3d MetricUpgrade(const std::vector<Motion>& motions) {
+  using Vector6 = Eigen::Vector<double, 6>;
   const auto weight = static_cast<double>(motions.size());
-  AddOuter(mean, weight, &a);
-  Vector<6> b;
-  for (std::size_t i = 0; i < 6; ++i) b[i] = weight * mean[i], a[i][i] += 1e-12 * weight;
-  const Vector<6> q = SolvePositive(a, b);
-  Vector<3> values;
-  Matrix<3> vectors;
-  Eigen<3>({{{q[0], q[1], q[2]}, {q[1], q[3], q[4]}, {q[2], q[4], q[5]}}}, &values, &vectors);
-  const double largest = std::max({values[0], values[1], values[2], 1e-300});
-  for (std::size_t c = 0; c < 3; ++c) {
-    const double root = std::sqrt(std::max(values[c], 1e-4 * largest));
-    for (std::size_t r = 0; r < 3; ++r) vectors[r][c] *= root;
+  Eigen::Matrix<double, 6, 6> a = 1e-12 * weight * Eigen::Matrix<double, 6, 6>::Identity();
+  Vector6 mean = Vector6::Zero();
+  for (const Motion& m : motions) {
+    const Vector6 first = QuadraticRow(m.rows[0], m.rows[0]),
+                  second = QuadraticRow(m.rows[1], m.rows[1]),
+                  both = QuadraticRow(m.rows[0], m.rows[1]), difference = first - second;
+    mean += (first + second) / (2 * weight);
+    a += difference * difference.transpose() + 4 * both * both.transpose();
   }
-  return vectors;
+  a += weight * mean * mean.transpose();
+  const Vector6 q = SolvePositive<6>(a, weight * mean);
+  Eigen::Matrix3d metric;
+  metric << q[0], q[1], q[2], q[1], q[3], q[4], q[2], q[4], q[5];
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(metric);
+  const double least = 1e-4 * std::max(parts.eigenvalues().maxCoeff(), 1e-300);
+  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).cwiseSqrt().asDiagonal();
 }
 
 // The scaled rotation nearest to two rows: (M M^T)^(-1/2) M.
 WeakPerspective NearestCamera(const Motion& m) {
-  Vector<2> values;
-  Matrix<2> vectors;
   const double cross = Dot(m.rows[0], m.rows[1]);
-  Eigen<2>({{{Dot(m.rows[0], m.rows[0]), cross}, {cross, Dot(m.rows[1], m.rows[1])}}}, &values,
-           &vectors);
-  Point rows[2] = {};
-  for (std::size_t i = 0; i < 2; ++i) {
-    const double inverse = 1 / std::sqrt(std::max(values[i], 1e-12));
-    for (std::size_t r = 0; r < 2; ++r) {
-      for (std::size_t c = 0; c < 2; ++c)
-        rows[r] = rows[r] + (inverse * vectors[r][i] * vectors[c][i]) * m.rows[c];
-    }
-  }
+  Eigen::Matrix2d products;
+  products << Dot(m.rows[0], m.rows[0]), cross, cross, Dot(m.rows[1], m.rows[1]);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(products);
+  const Eigen::Vector2d roots = parts.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
+  const Eigen::Matrix2d inverse =
+      parts.eigenvectors() * roots.cwiseInverse().asDiagonal() * parts.eigenvectors().transpose();
+  Point rows[2];
+  for (int r = 0; r < 2; ++r) rows[r] = inverse(r, 0) * m.rows[0] + inverse(r, 1) * m.rows[1];
   const Point x = Unit(rows[0]), z = Unit(Cross(x, rows[1])), y = Cross(z, x);
   WeakPerspective out;
-  out.scale = 0.5 * (std::sqrt(std::max(values[0], 1e-12)) + std::sqrt(std::max(values[1], 1e-12)));
+  out.scale = 0.5 * roots.sum();
   out.translation = m.shift;
   out.quaternion = QuaternionOf({x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]});
   return out;
@@ -169,15 +172,14 @@ Motion MotionOf(const WeakPerspective& camera) {
 }
 
 RigidMotion MakeRigid(const Affine& affine, const Views& views) {
-  const Matrix<3> a = MetricUpgrade(affine.motions);
+  const Eigen::Matrix3d a = MetricUpgrade(affine.motions);
   RigidMotion out;
   std::vector<Motion> motions;
   for (const Motion& m : affine.motions) {
     Motion upgraded{{}, m.shift};
     for (std::size_t r = 0; r < 2; ++r) {
-      for (std::size_t c = 0; c < 3; ++c)
-        upgraded.rows[r][c] =
-            m.rows[r][0] * a[0][c] + m.rows[r][1] * a[1][c] + m.rows[r][2] * a[2][c];
+      const Eigen::Vector3d row = a.transpose() * VectorOf(m.rows[r]);
+      upgraded.rows[r] = {row[0], row[1], row[2]};
     }
     out.cameras.push_back(NearestCamera(upgraded));
     motions.push_back(MotionOf(out.cameras.back()));

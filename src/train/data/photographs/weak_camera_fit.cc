@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
-#include "train/data/photographs/small_systems.h"
 
 namespace tilegrad::train {
 namespace {
@@ -12,9 +12,10 @@ namespace {
 using PlanePoint = std::array<double, 3>;
 
 // scale, x, y, and a turn about each axis of the camera.
+using Vector6 = Eigen::Vector<double, 6>;
 struct NormalEquations {
-  Matrix<6> a{};
-  Vector<6> b{};
+  Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
+  Vector6 b = Vector6::Zero();
   double squares = 0;
 };
 
@@ -26,11 +27,11 @@ NormalEquations Build(const std::vector<PlanePoint>& shape, const std::vector<Ke
     const PlanePoint seen = ProjectWeakly(camera, shape[k]);
     const double s = camera.scale, x = (seen[0] - camera.translation[0]) / s,
                  y = (seen[1] - camera.translation[1]) / s, z = seen[2];
-    const Vector<6> rows[2] = {{x, 1, 0, 0, s * z, -s * y}, {y, 0, 1, -s * z, 0, s * x}};
+    const Vector6 rows[2] = {{x, 1, 0, 0, s * z, -s * y}, {y, 0, 1, -s * z, 0, s * x}};
     const double residuals[2] = {keypoints[k].x - seen[0], keypoints[k].y - seen[1]};
     for (int r = 0; r < 2; ++r) {
-      AddOuter(rows[r], 1, &out.a);
-      for (std::size_t i = 0; i < 6; ++i) out.b[i] += rows[r][i] * residuals[r];
+      out.a += rows[r] * rows[r].transpose();
+      out.b += rows[r] * residuals[r];
       out.squares += residuals[r] * residuals[r];
     }
   }
@@ -46,7 +47,7 @@ std::array<double, 4> Turned(const std::array<double, 4>& q, double x, double y,
                                            t[0] * q[3] + t[1] * q[2] - t[2] * q[1] + t[3] * q[0]});
 }
 
-WeakPerspective Moved(const WeakPerspective& camera, const Vector<6>& by) {
+WeakPerspective Moved(const WeakPerspective& camera, const Vector6& by) {
   WeakPerspective out = camera;
   out.scale = std::max(camera.scale + by[0], 0.1 * camera.scale);
   out.translation[0] += by[1], out.translation[1] += by[2];
@@ -61,9 +62,10 @@ WeakPerspective FitWeakCamera(const std::vector<PlanePoint>& shape,
   NormalEquations at = Build(shape, keypoints, camera);
   double damping = 1e-3;
   for (int step = 0; step < 60 && damping < 1e8; ++step) {
-    Matrix<6> a = at.a;
-    for (std::size_t i = 0; i < 6; ++i) a[i][i] += damping * (at.a[i][i] + 1e-9);
-    const WeakPerspective next = Moved(camera, SolvePositive(a, at.b));
+    Eigen::Matrix<double, 6, 6> a = at.a;
+    a.diagonal().array() += damping * (at.a.diagonal().array() + 1e-9);
+    // Where `a` is not positive what comes is no number, and no better.
+    const WeakPerspective next = Moved(camera, a.llt().solve(at.b));
     const NormalEquations there = Build(shape, keypoints, next);
     if (!(there.squares < at.squares)) {
       damping *= 10;

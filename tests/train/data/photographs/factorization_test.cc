@@ -10,7 +10,6 @@
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
 #include "support/temp_folder.h"
-#include "train/data/photographs/small_systems.h"
 
 namespace tilegrad::train::factorization_test {
 
@@ -157,23 +156,6 @@ TEST(WeakCameraFit, FindsTheCamera) {
     EXPECT_LT(WeakCameraError(kShape, scene.job.views[v], found), 1e-5);
     EXPECT_LT(AngleBetween(found, scene.cameras[v]), 1e-3);
   }
-}
-
-TEST(SmallSystems, SolveAndDecompose) {
-  const Matrix<3> a = {{{4, 1, 0}, {1, 3, -1}, {0, -1, 2}}};
-  const Vector<3> x = SolvePositive<3>(a, {6, 4, 4});  // by hand: (1, 2, 3)
-  EXPECT_NEAR(x[0], 1, 1e-12);
-  EXPECT_NEAR(x[1], 2, 1e-12);
-  EXPECT_NEAR(x[2], 3, 1e-12);
-  Vector<3> values;
-  Matrix<3> v;
-  Eigen<3>(a, &values, &v);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      double sum = 0;
-      for (int k = 0; k < 3; ++k) sum += v[i][k] * values[k] * v[j][k];
-      EXPECT_NEAR(sum, a[i][j], 1e-12);
-    }
 }
 
 }  // namespace tilegrad::train::factorization_test
