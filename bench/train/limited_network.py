@@ -82,7 +82,6 @@ def main():
     parser = step_times.parser(__doc__, {"ranks": 2, "portions": 4, "steps": 20})
     parser.add_argument("--gbits", type=float, nargs="+", default=[0.5, 1, 4])
     args = parser.parse_args()
-    sharded = "schedule.shard_optimizer=false" not in args.set
     with tempfile.TemporaryDirectory() as folder:
         def measure(gbits):
             with Network(args.ranks, gbits):
@@ -96,7 +95,7 @@ def main():
             free, before = (before + after) / 2, after  # other programs come and go
             # All computing of the batch, as if by one rank as slow as these are.
             compute = free * args.ranks
-            model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions, sharded)
+            model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions)
             print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, {free * 1e3:.1f} without a limit before and after, waiting "
                   f"{wait * 100:.0f} %; the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})", flush=True)
 

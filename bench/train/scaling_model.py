@@ -16,15 +16,13 @@ TCP = 0.93  # share of a network's bandwidth that TCP carries
 PLACING = 8 / 36  # bytes moved to put a weight that came in its place, over those that updating it moves
 
 
-def step_time(ranks, compute, update, numbers, gbits, portions, sharded=True):
+def step_time(ranks, compute, update, numbers, gbits, portions):
     computing = compute * -(-portions // ranks) / portions
     if ranks == 1:
         return computing + update
     travel = (ranks - 1) / ranks * 4 * numbers / (TCP * gbits * 1e9 / 8)  # of sums, and of what comes back
     buckets = max(1, -(-numbers // BUCKET))
     overlap = BACKWARD * compute / portions
-    if not sharded:
-        return computing + max(2 * travel - overlap, 2 * travel / buckets) + update
     moved = update / ranks  # weights, whose buckets leave one by one
     placing = PLACING * update * (ranks - 1) / ranks
     exposed = max(travel - overlap, travel / buckets)

@@ -38,9 +38,7 @@ Result<std::unique_ptr<PortionedUpdate>> PortionedUpdate::Make(nn::Context& cont
   if (context.dtype() != nn::DType::kF32) return InternalError("portions are summed in F32");
   TILEGRAD_ASSIGN(auto statistics, task.Statistics());
   auto sums = std::make_unique<GradientSums>(
-      context,
-      GradientSums::Shape{
-          .portions = portions, .ranks = RanksOf(crew), .shares_update = schedule.shard_optimizer},
+      context, GradientSums::Shape{.portions = portions, .ranks = RanksOf(crew)},
       std::move(statistics));
   return std::unique_ptr<PortionedUpdate>(
       new PortionedUpdate(task, crew, portions, std::move(sums)));

@@ -132,8 +132,7 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
   TILEGRAD_ASSIGN(const std::string settings,
                   training->ResultSettings(plan.settings, "configuration"));
   const Status ready = job.crew->leads() ? CheckExistingRun(plan, *training) : Status();
-  TILEGRAD_TRY(job.crew->Agree(
-      ready, CommonTraits(settings + (job.config.schedule.shard_optimizer ? "sharded" : ""))));
+  TILEGRAD_TRY(job.crew->Agree(ready, CommonTraits(settings)));
   Status started = start();
   Trait data{"dataset", "",
              fmt::format("{}, and runs that the configuration names, must hold the same files "

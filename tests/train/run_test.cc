@@ -86,6 +86,10 @@ TEST_F(RunTest, KeysOfFormerVersionsArePassedOver) {
   ExpectMessage(set("network.wrap=maybe"), "unknown key \"network.wrap\"");
 }
 
+TEST_F(RunTest, KeysWithoutAResultMayHaveHadAnyValue) {
+  EXPECT_TRUE(ParseConfig("schedule.shard_optimizer = false\n", "old").ok());
+}
+
 TEST_F(RunTest, NumbersOfFormerVersionsAreCompared) {
   EXPECT_TRUE(ParseConfig("network.stiffness = 0.0\n", "old").ok());
   ExpectMessage(ParseConfig("network.stiffness = 5.0\n", "old").status(), "network.stiffness",

@@ -47,8 +47,7 @@ void Exchange::Begin(const Job& job) {
   const auto foreign = static_cast<std::size_t>(std::count_if(
       subtrees_.begin(), subtrees_.end(), [&](auto& s) { return s.owner != ranks_.rank(); }));
   foreign_.resize(std::max(foreign_.size(), foreign * piece_numbers_));
-  const std::size_t rounds = job_.sends_totals ? 1 : 2;
-  moving_.resize(std::max(moving_.size(), rounds * job_.layout->buckets()));
+  moving_.resize(std::max(moving_.size(), 2 * job_.layout->buckets()));
   started_ = done_ = 0;
 }
 
@@ -78,36 +77,29 @@ void Exchange::Start(std::size_t bucket) {
                                    BytesOf(job_.own[place_[i]] + piece.begin, piece.size())));
     }
   }
-  if (job_.sends_totals) ReceiveTotals(&m);
   changed_.notify_all();
 }
 
 void Exchange::Spread(std::size_t bucket) {
   const std::scoped_lock lock(mutex_);
   Moving& m = moving_[started_++];
-  m.bucket = bucket, m.phase = Phase::kTotals;
-  ReceiveTotals(&m);
-  SendTotals(&m);
-  changed_.notify_all();
-}
-
-void Exchange::ReceiveTotals(Moving* m) {
+  m.bucket = bucket;
+  m.phase = Phase::kTotals;
+  const int number = static_cast<int>(bucket);
+  const Range mine = Piece(bucket, ranks_.rank());
   for (int peer = 0; peer < ranks_.size(); ++peer) {
-    const Range piece = Piece(m->bucket, peer);
-    if (peer == ranks_.rank() || piece.size() == 0) continue;
-    m->rest.push_back(ranks_.Receive({peer, MessageKind::kTotal, static_cast<int>(m->bucket)},
-                                     WritableBytesOf(job_.total + piece.begin, piece.size())));
-  }
-}
-
-void Exchange::SendTotals(Moving* m) {
-  const Range piece = Piece(m->bucket, ranks_.rank());
-  if (piece.size() == 0) return;
-  for (int peer = 0; peer < ranks_.size(); ++peer) {
+    const Range piece = Piece(bucket, peer);
     if (peer == ranks_.rank()) continue;
-    m->rest.push_back(ranks_.Send({peer, MessageKind::kTotal, static_cast<int>(m->bucket)},
-                                  BytesOf(job_.total + piece.begin, piece.size())));
+    if (piece.size() > 0) {
+      m.rest.push_back(ranks_.Receive({peer, MessageKind::kTotal, number},
+                                      WritableBytesOf(job_.total + piece.begin, piece.size())));
+    }
+    if (mine.size() > 0) {
+      m.rest.push_back(ranks_.Send({peer, MessageKind::kTotal, number},
+                                   BytesOf(job_.total + mine.begin, mine.size())));
+    }
   }
+  changed_.notify_all();
 }
 
 // Sums this rank's piece.
@@ -139,7 +131,6 @@ bool Exchange::Advance() {
     moved |= Drop(&m.rest);
     if (m.phase == Phase::kParts && m.parts.empty()) {
       Fold(m.bucket);
-      if (job_.sends_totals) SendTotals(&m);
       m.phase = Phase::kTotals, moved = true;
     }
     if (m.phase == Phase::kTotals && m.rest.empty()) m.phase = Phase::kDone, ++done_, moved = true;

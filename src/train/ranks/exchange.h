@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums of all ranks: bucket by bucket, while the backward pass goes on. Of each bucket every rank
-// gets a piece of all subtrees' sums, folds them in the order of the tree, and sends the total to
-// all others. So each rank sends and receives 2 (R - 1) / R of the numbers where each has one
-// subtree, and no sum depends on what arrives first.
+// gets a piece of all subtrees' sums, folds them in the order of the tree, and later sends what it
+// made of the total to all others. So each rank sends and receives 2 (R - 1) / R of the numbers
+// where each has one subtree, and no sum depends on what arrives first.
 #pragma once
 
 #include <atomic>
@@ -32,7 +32,6 @@ class Exchange {
     std::vector<float*> own;  // sums of this rank's subtrees, layout->total() numbers each
     float* total = nullptr;   // of all, times `scale`
     float scale = 1;
-    bool sends_totals = true;  // each as soon as it is there; else Spread does
   };
   // The memory belongs to the exchange until Wait returns true.
   void Begin(const Job& job);
@@ -41,8 +40,8 @@ class Exchange {
   // Sends this rank's piece of a bucket in `total`, whatever it holds by now, and receives the
   // others. Each bucket once, after Wait; from any thread.
   void Spread(std::size_t bucket);
-  // Until the totals of all buckets are there, without sends_totals this rank's pieces of them;
-  // false if `meanwhile` says false first, which ends the exchange for good.
+  // Until this rank's pieces of the totals of all buckets are there; false if `meanwhile` says
+  // false first, which ends the exchange for good.
   bool Wait(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 1); }
   // The same for what Spread brings.
   bool WaitForSpread(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 2); }
@@ -56,8 +55,6 @@ class Exchange {
   };
 
   bool Wait(const std::function<bool()>& meanwhile, std::size_t rounds);
-  void ReceiveTotals(Moving* m);
-  void SendTotals(Moving* m);
   void Run();
   bool Advance();
   bool Drop(std::vector<Transport::Ticket>* tickets);

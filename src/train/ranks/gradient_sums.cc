@@ -37,9 +37,9 @@ GradientSums::GradientSums(nn::Context& context, const Shape& shape,
     own_.push_back(s);
   }
   levels_.resize(levels), sums_.resize(own_.size());
-  if (ranks > 1) exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
-  if (exchange_ && shape.shares_update)
-    share_ = std::make_unique<WeightShare>(*shape.ranks, context.workers(), *exchange_);
+  if (ranks <= 1) return;
+  exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
+  share_ = std::make_unique<WeightShare>(*shape.ranks, context.workers(), *exchange_);
 }
 
 void GradientSums::CopyStatistics(float* to) {
@@ -84,7 +84,6 @@ void GradientSums::LayOut(const Things& things) {
   if (!exchange_) return;
   total_.resize(std::max(total_.size(), layout_.total()));
   Exchange::Job job{&layout_, {}, total_.data(), 1 / static_cast<float>(shape_.portions)};
-  job.sends_totals = !share_;
   for (auto& sum : sums_) job.own.push_back(sum.data());
   exchange_->Begin(job);
 }
@@ -160,8 +159,8 @@ void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
 }
 
 void GradientSums::TakeTotals() {
-  const float scale = exchange_ ? 1 : 1 / static_cast<float>(shape_.portions);
-  const float* totals = exchange_ ? total_.data() : sums_[0].data();
+  const float scale = 1 / static_cast<float>(shape_.portions);
+  const float* totals = sums_[0].data();
   for (std::size_t i = 0; i < means_.size(); ++i) {
     const Range range = layout_.parameter(i);
     nn::Tensor mean = means_[i].Value().value();

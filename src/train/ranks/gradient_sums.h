@@ -24,7 +24,6 @@ class GradientSums : public nn::GradientListener {
     std::int64_t portions = 1;
     Transport* ranks = nullptr;                 // null: all portions are of this process
     std::size_t bucket = std::size_t{1} << 18;  // numbers that travel together
-    bool shares_update = false;                 // with other ranks: share() is for the optimiser
   };
   // `statistics` are changed by each portion (nn::Buffers); all tensors are of kF32.
   GradientSums(nn::Context& context, const Shape& shape, std::vector<nn::NamedTensor> statistics);

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 #include <type_traits>
 
@@ -58,21 +59,22 @@ Status UnknownKey(const ConfigFields& fields, const std::string& key) {
 }
 
 // Keys of former versions, each with the value (of a switch: 0 or 1) that says what happens without
-// it: configurations of former runs have them.
+// it, or none where no result depends on it: configurations of former runs have them.
 struct GoneKey {
   std::string_view key;
-  double value;
+  std::optional<double> value;
 };
-constexpr GoneKey kGone[] = {{"network.stiffness", 0}, {"network.wrap", 1}};
+constexpr GoneKey kGone[] = {
+    {"network.stiffness", 0}, {"network.wrap", 1}, {"schedule.shard_optimizer", {}}};
 
 Status PassOver(const ConfigFields& fields, const std::string& key, const toml::node& node) {
   const auto* const gone = std::find_if(std::begin(kGone), std::end(kGone),
                                         [&](const GoneKey& g) { return g.key == key; });
   if (gone == std::end(kGone)) return UnknownKey(fields, key);
   const auto value = node.is_boolean() ? node.ref<bool>() : node.value<double>();
-  if (value == gone->value) return {};
+  if (!gone->value || value == gone->value) return {};
   return InvalidArgument("{} is gone, and this version does what {} stood for; leave it out", key,
-                         node.is_boolean() ? "true" : fmt::format("{}", gone->value));
+                         node.is_boolean() ? "true" : fmt::format("{}", *gone->value));
 }
 
 Status CheckRange(const ConfigField& field, double value) {

@@ -11,10 +11,8 @@ namespace tilegrad::train {
 // How long a run is, and what it leaves behind on the way.
 struct Schedule {
   std::int64_t steps = 50000;
-  std::int64_t seed = 1;      // of everything that is random
-  std::int64_t portions = 1;  // of a batch, run/portion.h
-  // Each rank moves its share of the weights and sends these; else all ranks move all.
-  bool shard_optimizer = true;
+  std::int64_t seed = 1;        // of everything that is random
+  std::int64_t portions = 1;    // of a batch, run/portion.h
   std::int64_t log_every = 20;  // steps
   std::int64_t sample_every = 1000;
   std::int64_t checkpoint_every = 500;
@@ -37,8 +35,6 @@ inline ConfigFields FieldsOf(Schedule* s) {
           {"schedule.seed", &s->seed, 0, kNoLimit, "of weights, order and views"},
           {"schedule.portions", &s->portions, 1, 1 << 20,
            "of a batch, each computed by itself, for as many processes; a power of two"},
-          {"schedule.shard_optimizer", &s->shard_optimizer, 0, 1,
-           "each of several processes moves its share of the weights; the same bits", reporting},
           {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
           {"schedule.sample_every", &s->sample_every, 1, kNoLimit,
            "steps; before them after 10, 20, 40 and so on", reporting},

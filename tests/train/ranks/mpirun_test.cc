@@ -54,7 +54,6 @@ const Kind kKinds[] = {
       "adversarial.halvings=2", "adversarial.updates=2", "adversarial.learning_rate=1e-3",
       "adversarial.place=interpolates"}},
     {"classify", kTinyClassifier},
-    {"unsharded", kTinyClassifier, {"schedule.shard_optimizer=false"}},
     kGan,
     {"photographs", kTinyPhotographs, {}, "cub"},
 };
@@ -304,11 +303,8 @@ TEST_F(Ranks, ThatExtractOtherTexturesAreRefused) {
 
 TEST_F(Ranks, OfAnotherConfigurationAreRefused) {
   Words other = TrainWords("run", 1);
-  for (const char* setting : {"optimizer.warmup=7", "schedule.shard_optimizer=false"}) {
-    other.insert(other.end(), {"--set", setting});
-    ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another configuration (");
-    other.resize(other.size() - 2);
-  }
+  other.insert(other.end(), {"--set", "optimizer.warmup=7"});
+  ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another configuration (");
 }
 
 TEST_F(Ranks, OfAnotherInstructionSetAreRefused) {
@@ -375,7 +371,7 @@ TEST_F(Ranks, EvaluateToTheSameBytes) {
   ASSERT_EQ(made.code, 0) << made.output;
   for (const Kind& kind : kKinds) {
     const std::string name = kind.name;
-    if (name == kGan.name || name == "critic" || name == "unsharded") continue;
+    if (name == kGan.name || name == "critic") continue;
     SCOPED_TRACE(kind.name);
     Use(kind);
     if (data_ == "data") data_ = "made";
