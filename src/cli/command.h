@@ -127,7 +127,6 @@ void AddConfigs(CommandList* list);
 void AddDataset(CommandList* list);
 void AddDatasetView(CommandList* list);
 void AddEval(CommandList* list);
-void AddFigure2(CommandList* list);
 void AddFit(CommandList* list);
 void AddInfo(CommandList* list);
 void AddLive(CommandList* list);

@@ -60,6 +60,7 @@ Status CheckFirstWord(const CommandList& commands, std::string* word) {
   if (std::find(known.begin(), known.end(), *word) != known.end()) return {};
   const std::vector<std::string> options = {"--help", "--version"};
   if (*word == "-h" || std::find(options.begin(), options.end(), *word) != options.end()) return {};
+  if (*word == "figure2") return InvalidArgument("figure2 is examples/python/figure2.py now");
   const bool option = word->starts_with('-');
   return InvalidArgument("unknown {} \"{}\"{}; see tilegrad --help", option ? "option" : "command",
                          *word, DidYouMean(*word, option ? options : known));
@@ -93,7 +94,7 @@ void AddCommands(CommandList* list) {
     add(list);
   }
   for (Command& reader : *list) AddReadLimitOption(&reader);
-  for (const auto add : {AddFigure2, AddSelftest}) add(list);
+  AddSelftest(list);
   for (Command& worker : *list) AddSpeechOptions(&worker);
   for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(list);
 }

@@ -20,7 +20,7 @@ constexpr int kSphereLevels = 3;
 // What a hull has too much of, tents on flat sides, has more area than what is right; masks hold
 // the rest. At 1 thin things vanish.
 constexpr double kHullArea = 0.3;
-constexpr double kLateLight = 0.1;  // rate of light once colours move
+constexpr double kLateLight = 0.1;                     // rate of light once colours move
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 constexpr std::size_t kFirstRates = 8;
@@ -121,8 +121,6 @@ std::string DescribeConfig(const FitConfig& config) {
     if (c.parameters[p]) line(fmt::format("rate_{}", NameOf(p)).c_str(), c.rates[p]);
   }
   line("final_rate", c.final_rate);
-  line("color_region", static_cast<int>(c.loss.region));
-  line("silhouette_loss", static_cast<int>(c.loss.silhouette));
   return out;
 }
 

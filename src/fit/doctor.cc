@@ -136,7 +136,7 @@ std::string WhyNoColor(const FitterOptions& options, const Sight& s, Parameter p
   if (options.loss.color_weight == 0) {
     return "only the silhouette counts (the colour weight is 0), and it does not depend on this";
   }
-  if (options.loss.region == ColorRegion::kOnObject && s.drawn_on_object == 0) {
+  if (s.drawn_on_object == 0) {
     return "the mesh is drawn only where the masks say that there is nothing";
   }
   if (p == Parameter::kLight || p == Parameter::kMaterial) {

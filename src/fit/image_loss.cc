@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "train/losses/color_l1.h"
 #include "train/losses/iou.h"
 
 namespace tilegrad::train {
@@ -20,15 +19,14 @@ struct OneImage {
 };
 
 // Mean of weight * |gain * color - truth|; the gradient times `scale`.
-double WeightedL1(const OneImage& image, ColorRegion region, double scale) {
+double WeightedL1(const OneImage& image, double scale) {
   const std::size_t plane = image.faces.size();
   const double step = scale / static_cast<double>(3 * plane);
   double sum = 0, d_gain = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t p = 0; p < plane; ++p) {
       const std::size_t i = c * plane + p;
-      const float on_object = image.faces[p] >= 0 ? image.truth_alpha[p] : 0.0f;
-      const float weight = region == ColorRegion::kOnObject ? on_object : 1.0f;
+      const float weight = image.faces[p] >= 0 ? image.truth_alpha[p] : 0.0f;
       const float gap = image.gain * image.color[i] - image.truth[i];
       sum += static_cast<double>(weight * std::abs(gap));
       const float sign = gap > 0 ? 1.0f : gap < 0 ? -1.0f : 0.0f;
@@ -39,13 +37,6 @@ double WeightedL1(const OneImage& image, ColorRegion region, double scale) {
   }
   if (image.d_gain != nullptr) *image.d_gain = static_cast<float>(d_gain);
   return sum / static_cast<double>(3 * plane);
-}
-
-double MeanL1(std::span<const float> truth, std::span<const float> predicted, double scale,
-              std::span<float> d_predicted) {
-  const auto count = static_cast<double>(truth.size());
-  AbsoluteDifferenceBackward<float>(truth, predicted, scale / count, d_predicted);
-  return AbsoluteDifference<float>(truth, predicted) / count;
 }
 
 double Iou(const OneImage& image, double scale) {
@@ -67,23 +58,13 @@ double Squared(const OneImage& image, double scale) {
   return sum / area;
 }
 
-double Silhouette(SilhouetteLoss loss, const OneImage& image, double scale) {
-  if (loss == SilhouetteLoss::kIou) return Iou(image, scale);
-  if (loss == SilhouetteLoss::kSquared) return Squared(image, scale);
-  return MeanL1(image.silhouette, image.alpha, scale, image.d_alpha);
-}
-
 ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double share) {
   ImageLossValue value;
-  if (loss.color_weight > 0) {
-    const double scale = share * loss.color_weight;
-    const bool weighted = loss.region == ColorRegion::kOnObject || image.d_gain != nullptr;
-    value.color = weighted ? WeightedL1(image, loss.region, scale)
-                           : MeanL1(image.truth, image.color, scale, image.d_color);
-  }
+  if (loss.color_weight > 0) value.color = WeightedL1(image, share * loss.color_weight);
   if (loss.silhouette_weight > 0) {
     const double scale = share * loss.silhouette_weight;
-    value.silhouette = Silhouette(loss.silhouette, image, scale);
+    value.silhouette =
+        loss.silhouette == SilhouetteLoss::kIou ? Iou(image, scale) : Squared(image, scale);
   }
   value.total = loss.color_weight * value.color + loss.silhouette_weight * value.silhouette;
   return value;

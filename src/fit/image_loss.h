@@ -24,17 +24,13 @@ struct TargetImages {
   }
 };
 
-enum class ColorRegion {
-  kEverywhere,  // targets are 0 where there is nothing, as renders are
-  kOnObject,    // where a face is drawn, weighted by the target's alpha
-};
-// Mean |difference|; equation 12; or the squared differences' sum over the silhouette's area, which
-// is least where both agree also between 0 and 1, while the other two want 0 or 1.
-enum class SilhouetteLoss { kL1, kIou, kSquared };
+// Equation 12; or the squared differences' sum over the silhouette's area, which is least where
+// both agree also between 0 and 1, while the other wants 0 or 1.
+enum class SilhouetteLoss { kIou, kSquared };
 
+// Colours count where a face is drawn, weighted by the target's alpha.
 struct ImageLoss {
   double color_weight = 1, silhouette_weight = 1;
-  ColorRegion region = ColorRegion::kOnObject;
   SilhouetteLoss silhouette = SilhouetteLoss::kIou;
 };
 

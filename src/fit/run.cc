@@ -60,7 +60,8 @@ RunPlan PlanOf(const FitJob& job) {
   return plan;
 }
 
-const std::set<std::string> kFormerLines = {"stop_gain = 0", "remeshes = 0"};
+const std::set<std::string> kFormerLines = {"stop_gain = 0", "remeshes = 0", "color_region = 1",
+                                            "silhouette_loss = 2"};
 
 class FitWork : public RunWork {
  public:

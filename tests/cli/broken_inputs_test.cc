@@ -243,7 +243,6 @@ TEST_F(BrokenInputs, OptionsThatMeanSomethingElse) {
   ExpectRefused(
       "dataset-view --data " + Data().string() + " --out " + (folder_ / "view.jpg").string(),
       "view.jpg", ".png");
-  ExpectRefused("figure2 --out " + (folder_ / "figure.png").string(), "figure.png", ".svg");
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
   ExpectRefused("dataset --source procedural --seed -1 --out " + (folder_ / "d").string(),
                 "--seed");

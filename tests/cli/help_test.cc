@@ -98,7 +98,7 @@ TEST_F(Help, BashCompletes) {
   EXPECT_EQ(completed("tilegrad fit --lighting p"), "phong\n");
   EXPECT_EQ(completed("tilegrad train --config qu"), "quick\n");
   EXPECT_EQ(completed("tilegrad fit --mesh comp"), "complete\n");
-  EXPECT_EQ(completed("tilegrad help fig"), "figure2\n");
+  EXPECT_EQ(completed("tilegrad help sel"), "selftest\n");
 }
 
 TEST_F(Help, OtherShellsReadTheirScripts) {

@@ -213,8 +213,6 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
 }
 
 TEST_F(Outputs, PagesAndStudies) {
-  Write("figure2.svg", std::string("mine"));
-  ExpectKept("figure2.svg", "figure2 --size 8 --steps 1", "--force");
   Write("tradeoff/tradeoff.csv", std::string("mine"));
   ExpectKept("tradeoff/tradeoff.csv", "tradeoff fuze.obj --size 8 --repetitions 1", "--force");
   EXPECT_FALSE(Exists("tradeoff/tradeoff.md"));

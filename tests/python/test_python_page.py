@@ -4,11 +4,13 @@
 import contextlib
 import io
 import os
+import pathlib
 import re
 import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 
 import numpy as np
 
@@ -74,9 +76,9 @@ class Pages(unittest.TestCase):
 
 
 class Examples(unittest.TestCase):
-    def run_example(self, name):
-        done = subprocess.run([sys.executable, SOURCE / "examples/python" / name],
-                              capture_output=True, text=True, timeout=60)
+    def run_example(self, name, *arguments):
+        done = subprocess.run([sys.executable, SOURCE / "examples/python" / name, *arguments],
+                              capture_output=True, text=True, timeout=120)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return done.stdout
 
@@ -87,6 +89,17 @@ class Examples(unittest.TestCase):
 
     def test_fit_vertex(self):
         self.assertRegex(self.run_example("fit_vertex.py"), r"0\.00\d+ world units from the truth")
+
+    def test_figure_2(self):
+        # It fails where one of the eight keeps more than 5 % of its loss.
+        with tempfile.TemporaryDirectory() as folder:
+            picture = pathlib.Path(folder, "figure2.svg")
+            lines = self.run_example("figure2.py", "--size", "48", "--steps", "300",
+                                     "--out", picture).splitlines()
+            root = xml.etree.ElementTree.fromstring(picture.read_text(encoding="utf-8"))
+        self.assertEqual([line[:3] for line in lines], [f"({label})" for label in "abcdefgh"])
+        self.assertEqual(sum(part.tag.endswith("image") for part in root.iter()), 3 * 8)
+        self.assertEqual(sum(part.tag.endswith("polyline") for part in root.iter()), 8)
 
 
 if __name__ == "__main__":
