@@ -23,15 +23,6 @@ inline double CosineRate(double rate, const CosineSchedule& schedule, std::int64
   return rate * (schedule.final_factor + (1 - schedule.final_factor) * cosine);
 }
 
-// Multiplied by `factor` after every `every` >= 1 steps.
-struct StepSchedule {
-  std::int64_t every = 1;
-  double factor = 0.1;
-};
-inline double StepRate(double rate, const StepSchedule& schedule, std::int64_t step) {
-  return rate * std::pow(schedule.factor, static_cast<double>(step / schedule.every));
-}
-
 // Rises to `rate` in equal steps: 1/steps of it at step 0, all of it at step steps - 1.
 inline double WarmedUp(double rate, std::int64_t steps, std::int64_t step) {
   return step < steps ? rate * static_cast<double>(step + 1) / static_cast<double>(steps) : rate;

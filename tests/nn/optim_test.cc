@@ -40,8 +40,6 @@ TEST(Schedules, FollowTheirFormulas) {
   EXPECT_DOUBLE_EQ(CosineRate(2, cosine, 50), 1.1);
   EXPECT_DOUBLE_EQ(CosineRate(2, cosine, 100), 0.2);
   EXPECT_DOUBLE_EQ(CosineRate(2, cosine, 1000), 0.2);
-  EXPECT_DOUBLE_EQ(StepRate(2, {10, 0.5}, 9), 2.0);
-  EXPECT_DOUBLE_EQ(StepRate(2, {10, 0.5}, 20), 0.5);
   EXPECT_DOUBLE_EQ(WarmedUp(2, 4, 0), 0.5);
   EXPECT_DOUBLE_EQ(WarmedUp(2, 4, 3), 2.0);
   EXPECT_DOUBLE_EQ(WarmedUp(2, 4, 9), 2.0);

@@ -10,9 +10,6 @@
 
 #include <hwy/highway.h>
 
-#include <cmath>
-#include <limits>
-
 #include "nn/kernels/pointwise_ref.h"
 //
 #include <hwy/contrib/math/math-inl.h>
@@ -45,48 +42,14 @@ HWY_INLINE VF SafeTanh(DF d, VF x) {
   return hn::IfThenElse(hn::IsNaN(x), x, y);
 }
 
-HWY_INLINE VF SafeExpm1(DF d, VF x) {
-  const VF y = hn::IfThenElse(hn::Gt(x, hn::Set(d, kExpOverflow)), hn::Inf(d), hn::Expm1(d, x));
-  return hn::IfThenElse(hn::IsNaN(x), x, y);
-}
 HWY_INLINE VF Softplus(DF d, VF x) {
   const VF y = hn::Log1p(d, SafeExp(d, hn::Neg(hn::Abs(x))));
   return hn::IfThenElse(hn::IsNaN(x), x, hn::Add(hn::Max(x, hn::Zero(d)), y));
 }
 
-// |x|^p of half a vector, in double: exp(p log x) in float would lose a digit for each power of ten
-// of the result.
-HWY_INLINE hn::Vec<hn::Half<DF>> PowHalf(hn::Vec<hn::Half<DF>> x, double p) {
-  const hn::Repartition<double, DF> dd;
-  const auto exponent = hn::Mul(hn::Set(dd, p), hn::Log(dd, hn::PromoteTo(dd, x)));
-  // Beyond these the result is 0 or infinite in float; Exp is good to 706.
-  const auto low = hn::Set(dd, -200.0), high = hn::Set(dd, 200.0);
-  const auto y = hn::Exp(dd, hn::Min(hn::Max(exponent, low), high));
-  return hn::DemoteTo(hn::Half<DF>(), y);
-}
-
-// With the limits and signs of the C library.
-HWY_INLINE VF Pow(DF d, VF x, VF p) {
-  const hn::Half<DF> half;
-  const auto power = static_cast<double>(hn::GetLane(p));
-  const bool whole = power == std::floor(power);
-  const bool odd = whole && std::fmod(power, 2.0) != 0;
-  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f), inf = hn::Inf(d), a = hn::Abs(x);
-  const VF largest = hn::Set(d, std::numeric_limits<float>::max());
-  VF y = hn::Combine(d, PowHalf(hn::UpperHalf(half, a), power),
-                     PowHalf(hn::LowerHalf(half, a), power));
-  y = hn::IfThenElse(hn::Ge(y, largest), inf, y);  // some targets' DemoteTo saturates
-  y = hn::IfThenElse(hn::Eq(a, zero), power > 0 ? zero : inf, y);
-  y = hn::IfThenElse(hn::Eq(a, inf), power > 0 ? inf : zero, y);
-  if (odd) y = hn::CopySign(y, x);
-  if (!whole) y = hn::IfThenElse(hn::Lt(x, zero), hn::NaN(d), y);
-  y = hn::IfThenElse(hn::IsNaN(x), x, y);
-  return power == 0 ? one : y;
-}
-
 // kOp is a constant of each loop: the switch costs nothing.
 template <UnaryOp kOp>
-HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
+HWY_INLINE VF ApplyUnary(DF d, VF x, VF p) {
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   switch (kOp) {
     case UnaryOp::kNeg:
@@ -97,16 +60,12 @@ HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
       return hn::Add(x, p);
     case UnaryOp::kExp:
       return SafeExp(d, x);
-    case UnaryOp::kExpm1:
-      return SafeExpm1(d, x);
     case UnaryOp::kLog:
       return SafeLog(d, x);
     case UnaryOp::kSqrt:
       return hn::Sqrt(x);
     case UnaryOp::kSquare:
       return hn::Mul(x, x);
-    case UnaryOp::kPow:
-      return Pow(d, x, p);
     case UnaryOp::kAbs:
       return hn::Abs(x);
     case UnaryOp::kSign:
@@ -121,10 +80,6 @@ HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
       return hn::Div(one, hn::Add(one, SafeExp(d, hn::Neg(x))));
     case UnaryOp::kSoftplus:
       return Softplus(d, x);
-    case UnaryOp::kClamp:
-      return hn::IfThenElse(hn::Lt(x, p), p, hn::IfThenElse(hn::Gt(x, q), q, x));
-    case UnaryOp::kInRange:
-      return hn::IfThenElseZero(hn::And(hn::Ge(x, p), hn::Le(x, q)), one);
   }
   return x;
 }
@@ -133,14 +88,13 @@ template <UnaryOp kOp>
 void UnaryLoop(const UnaryProblem<float>& problem, std::size_t begin, std::size_t end) {
   const DF d;
   const VF p = hn::Set(d, static_cast<float>(problem.p));
-  const VF q = hn::Set(d, static_cast<float>(problem.q));
   const std::size_t lanes = hn::Lanes(d);
   std::size_t i = begin;
   for (; i + lanes <= end; i += lanes) {
-    hn::StoreU(ApplyUnary<kOp>(d, hn::LoadU(d, problem.x + i), p, q), d, problem.y + i);
+    hn::StoreU(ApplyUnary<kOp>(d, hn::LoadU(d, problem.x + i), p), d, problem.y + i);
   }
   if (i == end) return;
-  const VF tail = ApplyUnary<kOp>(d, LoadTail(d, problem.x + i, end - i), p, q);
+  const VF tail = ApplyUnary<kOp>(d, LoadTail(d, problem.x + i, end - i), p);
   StoreTail(tail, d, problem.y + i, end - i);
 }
 
@@ -153,11 +107,9 @@ void UnaryRange(const UnaryProblem<float>& problem, std::size_t begin, std::size
     TILEGRAD_CASE(kScale);
     TILEGRAD_CASE(kAddScalar);
     TILEGRAD_CASE(kExp);
-    TILEGRAD_CASE(kExpm1);
     TILEGRAD_CASE(kLog);
     TILEGRAD_CASE(kSqrt);
     TILEGRAD_CASE(kSquare);
-    TILEGRAD_CASE(kPow);
     TILEGRAD_CASE(kAbs);
     TILEGRAD_CASE(kSign);
     TILEGRAD_CASE(kRelu);
@@ -165,15 +117,13 @@ void UnaryRange(const UnaryProblem<float>& problem, std::size_t begin, std::size
     TILEGRAD_CASE(kTanh);
     TILEGRAD_CASE(kSigmoid);
     TILEGRAD_CASE(kSoftplus);
-    TILEGRAD_CASE(kClamp);
-    TILEGRAD_CASE(kInRange);
 #undef TILEGRAD_CASE
   }
 }
 
 template <BinaryOp kOp>
 HWY_INLINE VF ApplyBinary(DF d, VF a, VF b, VF p) {
-  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const VF zero = hn::Zero(d);
   switch (kOp) {
     case BinaryOp::kAdd:
       return hn::Add(a, b);
@@ -183,14 +133,6 @@ HWY_INLINE VF ApplyBinary(DF d, VF a, VF b, VF p) {
       return hn::Mul(a, b);
     case BinaryOp::kDiv:
       return hn::Div(a, b);
-    case BinaryOp::kMax:
-      return hn::IfThenElse(hn::Or(hn::Ge(a, b), hn::IsNaN(a)), a, b);
-    case BinaryOp::kMin:
-      return hn::IfThenElse(hn::Or(hn::Le(a, b), hn::IsNaN(a)), a, b);
-    case BinaryOp::kGreater:
-      return hn::IfThenElseZero(hn::Gt(a, b), one);
-    case BinaryOp::kGreaterEqual:
-      return hn::IfThenElseZero(hn::Ge(a, b), one);
     case BinaryOp::kReluGrad:
       return hn::IfThenElseZero(hn::Gt(a, zero), b);
     case BinaryOp::kLeakyReluGrad:
@@ -249,10 +191,6 @@ void BinaryRange(const BinaryProblem<float>& problem, const RowRange& range) {
     TILEGRAD_CASE(kSub);
     TILEGRAD_CASE(kMul);
     TILEGRAD_CASE(kDiv);
-    TILEGRAD_CASE(kMax);
-    TILEGRAD_CASE(kMin);
-    TILEGRAD_CASE(kGreater);
-    TILEGRAD_CASE(kGreaterEqual);
     TILEGRAD_CASE(kReluGrad);
     TILEGRAD_CASE(kLeakyReluGrad);
 #undef TILEGRAD_CASE

@@ -15,11 +15,9 @@ enum class UnaryOp {
   kScale,      // p x
   kAddScalar,  // x + p
   kExp,
-  kExpm1,  // e^x - 1
   kLog,
   kSqrt,
   kSquare,
-  kPow,  // x^p; of x < 0 for whole p only, else NaN
   kAbs,
   kSign,  // -1, 0, 1
   kRelu,
@@ -27,8 +25,6 @@ enum class UnaryOp {
   kTanh,
   kSigmoid,
   kSoftplus,  // log(1 + e^x)
-  kClamp,     // to [p, q]
-  kInRange,   // p <= x <= q ? 1 : 0
 };
 
 enum class BinaryOp {
@@ -36,10 +32,6 @@ enum class BinaryOp {
   kSub,
   kMul,
   kDiv,
-  kMax,
-  kMin,
-  kGreater,       // a > b ? 1 : 0
-  kGreaterEqual,  // a >= b ? 1 : 0
   kReluGrad,      // a > 0 ? b : 0
   kLeakyReluGrad  // a > 0 ? b : p b
 };
@@ -50,7 +42,7 @@ struct UnaryProblem {
   const T* x = nullptr;  // [n]
   T* y = nullptr;        // [n]; may be x
   std::size_t n = 0;
-  double p = 0, q = 0;
+  double p = 0;
 };
 
 // y[i0,..,i4] = f(a[sum i strides_a], b[sum i strides_b]); y is dense. The last axis has strides 0

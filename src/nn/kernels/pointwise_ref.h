@@ -16,16 +16,8 @@ double RealPart(const T& x) {
   return static_cast<double>(std::real(x));
 }
 
-// e^x - 1 and log(1 + x) without cancellation. Of complex numbers, whose real part a complex step
-// does not read, by the plain formulas.
-template <class T>
-T Expm1Of(const T& x) {
-  if constexpr (std::is_floating_point_v<T>) {
-    return std::expm1(x);
-  } else {
-    return std::exp(x) - T(1);
-  }
-}
+// log(1 + x) without cancellation. Of complex numbers, whose real part a complex step does not
+// read, by the plain formula.
 template <class T>
 T Log1pOf(const T& x) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -36,9 +28,9 @@ T Log1pOf(const T& x) {
 }
 
 template <class T>
-T UnaryRef(UnaryOp op, T x, double p, double q) {
+T UnaryRef(UnaryOp op, T x, double p) {
   const double real = RealPart(x);
-  const T one(1), tp(static_cast<T>(p)), tq(static_cast<T>(q));
+  const T one(1), tp(static_cast<T>(p));
   switch (op) {
     case UnaryOp::kNeg:
       return -x;
@@ -48,16 +40,12 @@ T UnaryRef(UnaryOp op, T x, double p, double q) {
       return x + tp;
     case UnaryOp::kExp:
       return std::exp(x);
-    case UnaryOp::kExpm1:
-      return Expm1Of(x);
     case UnaryOp::kLog:
       return std::log(x);
     case UnaryOp::kSqrt:
       return std::sqrt(x);
     case UnaryOp::kSquare:
       return x * x;
-    case UnaryOp::kPow:
-      return std::pow(x, tp);
     case UnaryOp::kAbs:
       return real < 0 ? -x : x;
     case UnaryOp::kSign:
@@ -72,17 +60,13 @@ T UnaryRef(UnaryOp op, T x, double p, double q) {
       return one / (one + std::exp(-x));
     case UnaryOp::kSoftplus:
       return real > 0 ? x + Log1pOf(std::exp(-x)) : Log1pOf(std::exp(x));
-    case UnaryOp::kClamp:
-      return real < p ? tp : real > q ? tq : x;
-    case UnaryOp::kInRange:
-      return real >= p && real <= q ? one : T(0);
   }
   return x;
 }
 
 template <class T>
 T BinaryRef(BinaryOp op, T a, T b, double p) {
-  const double ra = RealPart(a), rb = RealPart(b);
+  const double ra = RealPart(a);
   switch (op) {
     case BinaryOp::kAdd:
       return a + b;
@@ -92,14 +76,6 @@ T BinaryRef(BinaryOp op, T a, T b, double p) {
       return a * b;
     case BinaryOp::kDiv:
       return a / b;
-    case BinaryOp::kMax:
-      return ra >= rb || ra != ra ? a : b;  // NaN wins
-    case BinaryOp::kMin:
-      return ra <= rb || ra != ra ? a : b;
-    case BinaryOp::kGreater:
-      return T(ra > rb ? 1 : 0);
-    case BinaryOp::kGreaterEqual:
-      return T(ra >= rb ? 1 : 0);
     case BinaryOp::kReluGrad:
       return ra > 0 ? b : T(0);
     case BinaryOp::kLeakyReluGrad:
@@ -129,7 +105,7 @@ RowOffsets OffsetsOfRow(const BinaryProblem<T>& problem, std::size_t row) {
 template <class T>
 void UnaryRangeRef(const UnaryProblem<T>& problem, std::size_t begin, std::size_t end) {
   for (std::size_t i = begin; i < end; ++i) {
-    problem.y[i] = UnaryRef(problem.op, problem.x[i], problem.p, problem.q);
+    problem.y[i] = UnaryRef(problem.op, problem.x[i], problem.p);
   }
 }
 

@@ -13,8 +13,7 @@ namespace {
 // The element of [0, extent) that stands at position i, which may lie outside.
 std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
   if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
-  if (mode == PadMode::kReplicate) return std::clamp<std::int64_t>(i, 0, extent - 1);
-  return i < 0 ? -i : i >= extent ? 2 * (extent - 1) - i : i;
+  return std::clamp<std::int64_t>(i, 0, extent - 1);
 }
 
 }  // namespace
@@ -24,8 +23,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
   if (mode == PadMode::kZero) return Pad(x, axis, before, after);
   const std::int64_t extent = axis >= 0 && axis < x.shape().rank() ? x.shape()[axis] : 0;
   const std::int64_t most = std::max(before, after);
-  const bool fits = mode == PadMode::kReflect ? most < extent : extent > 0;
-  if (!fits || before < 0 || after < 0 || most > AxisMap::kMostExtent ||
+  if (extent <= 0 || before < 0 || after < 0 || most > AxisMap::kMostExtent ||
       before + extent + after > AxisMap::kMostExtent) {
     return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", before, after,
                                    axis, x.shape().ToString()));

@@ -10,7 +10,6 @@ namespace tilegrad::nn {
 enum class PadMode {
   kZero,      // 0 0 a b c 0 0
   kCircular,  // b c a b c a b: textures that wrap around
-  kReflect,   // c b a b c b a: at most extent - 1 elements
   kReplicate  // a a a b c c c
 };
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/pointwise.h"
 
-#include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "base/error.h"
@@ -13,31 +11,19 @@
 namespace tilegrad::nn {
 namespace {
 
-struct UnaryParameters {
-  double p = 0, q = 0;
-};
-
-Tensor ComputeUnary(UnaryOp op, const Var& x, const UnaryParameters& parameters = {}) {
+Tensor ComputeUnary(UnaryOp op, const Var& x, double p = 0) {
   Tensor y = x.context().Empty(x.shape(), x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
-    Unary(UnaryProblem<T>{op, x.value().data<T>(), y.data<T>(), y.elements(), parameters.p,
-                          parameters.q},
+    Unary(UnaryProblem<T>{op, x.value().data<T>(), y.data<T>(), y.elements(), p},
           x.context().workers());
   });
   return y;
 }
 
 // y = f(x), d_x = rule(adjoint): what every unary operation below is.
-Var UnaryVar(const OpInfo& info, UnaryOp op, const Var& x, const UnaryParameters& parameters,
-             Rule rule) {
+Var UnaryVar(const OpInfo& info, UnaryOp op, const Var& x, double p, Rule rule) {
   if (!Usable(info.name, {&x})) return Invalid({&x});
-  return Record(info, ComputeUnary(op, x, parameters), {x}, std::move(rule));
-}
-
-// 1 where low <= x <= high.
-Var InRange(const Var& x, double low, double high) {
-  if (!Usable("in range", {&x})) return Invalid({&x});
-  return Constant(x.context(), ComputeUnary(UnaryOp::kInRange, x, {low, high}));
+  return Record(info, ComputeUnary(op, x, p), {x}, std::move(rule));
 }
 
 Var Sign(const Var& x) {
@@ -88,11 +74,6 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
 // Whether an operation that owns `v` may write its result there.
 bool IsExpendable(const Var& v) { return v.value().unique() && !v.context().recording(); }
 
-// No gradient flows out of a mask.
-Var Mask(const char* name, BinaryOp op, const Var& a, const Var& b) {
-  return BinaryVar({name}, {op}, Detach(a), Detach(b), nullptr);
-}
-
 }  // namespace
 
 Var Add(const Var& a, const Var& b) {
@@ -126,77 +107,43 @@ Var Div(const Var& a, const Var& b) {
   });
 }
 
-Var Max(const Var& a, const Var& b) {
-  return BinaryVar({"max"}, {BinaryOp::kMax}, a, b, [a, b](const Adjoint& adj) {
-    return Vars{SumTo(Mul(adj.dy(), GreaterEqual(a, b)), a.shape()),
-                SumTo(Mul(adj.dy(), Greater(b, a)), b.shape())};
-  });
-}
-
-Var Min(const Var& a, const Var& b) {
-  return BinaryVar({"min"}, {BinaryOp::kMin}, a, b, [a, b](const Adjoint& adj) {
-    return Vars{SumTo(Mul(adj.dy(), GreaterEqual(b, a)), a.shape()),
-                SumTo(Mul(adj.dy(), Greater(a, b)), b.shape())};
-  });
-}
-
-Var Greater(const Var& a, const Var& b) { return Mask("greater", BinaryOp::kGreater, a, b); }
-
-Var GreaterEqual(const Var& a, const Var& b) {
-  return Mask("greater equal", BinaryOp::kGreaterEqual, a, b);
-}
-
 Var Neg(const Var& x) {
-  return UnaryVar({"neg"}, UnaryOp::kNeg, x, {},
+  return UnaryVar({"neg"}, UnaryOp::kNeg, x, 0,
                   [](const Adjoint& adj) { return Vars{Neg(adj.dy())}; });
 }
 
 Var Scale(const Var& x, double factor) {
-  return UnaryVar({"scale"}, UnaryOp::kScale, x, {factor},
+  return UnaryVar({"scale"}, UnaryOp::kScale, x, factor,
                   [factor](const Adjoint& adj) { return Vars{Scale(adj.dy(), factor)}; });
 }
 
 Var AddScalar(const Var& x, double term) {
-  return UnaryVar({"add scalar"}, UnaryOp::kAddScalar, x, {term},
+  return UnaryVar({"add scalar"}, UnaryOp::kAddScalar, x, term,
                   [](const Adjoint& adj) { return Vars{adj.dy()}; });
 }
 
 Var Exp(const Var& x) {
-  return UnaryVar({"exp", true}, UnaryOp::kExp, x, {},
+  return UnaryVar({"exp", true}, UnaryOp::kExp, x, 0,
                   [](const Adjoint& adj) { return Vars{Mul(adj.dy(), adj.y())}; });
 }
 
-Var Expm1(const Var& x) {
-  return UnaryVar({"expm1", true}, UnaryOp::kExpm1, x, {},
-                  [](const Adjoint& adj) { return Vars{Mul(adj.dy(), AddScalar(adj.y(), 1.0))}; });
-}
-
 Var Log(const Var& x) {
-  return UnaryVar({"log"}, UnaryOp::kLog, x, {},
+  return UnaryVar({"log"}, UnaryOp::kLog, x, 0,
                   [x](const Adjoint& adj) { return Vars{Div(adj.dy(), x)}; });
 }
 
 Var Sqrt(const Var& x) {
-  return UnaryVar({"sqrt", true}, UnaryOp::kSqrt, x, {},
+  return UnaryVar({"sqrt", true}, UnaryOp::kSqrt, x, 0,
                   [](const Adjoint& adj) { return Vars{Scale(Div(adj.dy(), adj.y()), 0.5)}; });
 }
 
 Var Square(const Var& x) {
-  return UnaryVar({"square"}, UnaryOp::kSquare, x, {},
+  return UnaryVar({"square"}, UnaryOp::kSquare, x, 0,
                   [x](const Adjoint& adj) { return Vars{Scale(Mul(adj.dy(), x), 2.0)}; });
 }
 
-// The derivative of a constant is nothing, rather than 0 x^-1.
-Var Pow(const Var& x, double p) {
-  return UnaryVar({"pow"}, UnaryOp::kPow, x, {p}, [x, p](const Adjoint& adj) {
-    return Vars{p == 0 ? Var() : Mul(adj.dy(), Scale(Pow(x, p - 1.0), p))};
-  });
-}
-
-Var Pow(const Var& x, const Var& p) { return Exp(Mul(p, Log(x))); }
-
 Var Abs(const Var& x) {
-  return UnaryVar({"abs"}, UnaryOp::kAbs, x, {},
+  return UnaryVar({"abs"}, UnaryOp::kAbs, x, 0,
                   [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sign(x))}; });
 }
 
@@ -216,7 +163,7 @@ Var RectifierGrad(const BinaryCall& call, const Var& y, Var dy) {
 }  // namespace
 
 Var Relu(const Var& x) {
-  return UnaryVar({"relu", true}, UnaryOp::kRelu, x, {}, [](const Adjoint& adj) {
+  return UnaryVar({"relu", true}, UnaryOp::kRelu, x, 0, [](const Adjoint& adj) {
     return Vars{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.TakeDy())};
   });
 }
@@ -224,11 +171,10 @@ Var Relu(const Var& x) {
 Var LeakyRelu(const Var& x, double slope) {
   if (!Usable("leaky relu", {&x})) return Invalid({&x});
   if (!(slope >= 0)) return Fail(x, InvalidArgument("leaky relu: slope {} is negative", slope));
-  return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, {slope},
-                  [slope](const Adjoint& adj) {
-                    const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
-                    return Vars{RectifierGrad(call, adj.y(), adj.TakeDy())};
-                  });
+  return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, slope, [slope](const Adjoint& adj) {
+    const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
+    return Vars{RectifierGrad(call, adj.y(), adj.TakeDy())};
+  });
 }
 
 Var ReluGrad(const Var& y, Var dy) {
@@ -244,28 +190,20 @@ Var Accumulated(Var sum, const Var& term) {
 }
 
 Var Tanh(const Var& x) {  // 1 - y^2
-  return UnaryVar({"tanh", true}, UnaryOp::kTanh, x, {}, [](const Adjoint& adj) {
+  return UnaryVar({"tanh", true}, UnaryOp::kTanh, x, 0, [](const Adjoint& adj) {
     return Vars{Sub(adj.dy(), Mul(adj.dy(), Square(adj.y())))};
   });
 }
 
 Var Sigmoid(const Var& x) {  // y (1 - y)
-  return UnaryVar({"sigmoid", true}, UnaryOp::kSigmoid, x, {}, [](const Adjoint& adj) {
+  return UnaryVar({"sigmoid", true}, UnaryOp::kSigmoid, x, 0, [](const Adjoint& adj) {
     return Vars{Mul(adj.dy(), Sub(adj.y(), Square(adj.y())))};
   });
 }
 
 Var Softplus(const Var& x) {
-  return UnaryVar({"softplus"}, UnaryOp::kSoftplus, x, {},
+  return UnaryVar({"softplus"}, UnaryOp::kSoftplus, x, 0,
                   [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sigmoid(x))}; });
-}
-
-Var Clamp(const Var& x, double low, double high) {
-  if (!Usable("clamp", {&x})) return Invalid({&x});
-  if (!(low <= high)) return Fail(x, InvalidArgument("clamp: [{}, {}] is empty", low, high));
-  return UnaryVar({"clamp"}, UnaryOp::kClamp, x, {low, high}, [x, low, high](const Adjoint& adj) {
-    return Vars{Mul(adj.dy(), InRange(x, low, high))};
-  });
 }
 
 }  // namespace tilegrad::nn

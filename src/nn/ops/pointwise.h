@@ -11,26 +11,20 @@ Var Add(const Var& a, const Var& b);
 Var Sub(const Var& a, const Var& b);
 Var Mul(const Var& a, const Var& b);
 Var Div(const Var& a, const Var& b);
-Var Max(const Var& a, const Var& b);  // where equal, the gradient goes to a
-Var Min(const Var& a, const Var& b);
 
 Var Neg(const Var& x);
 Var Scale(const Var& x, double factor);
 Var AddScalar(const Var& x, double term);
 Var Exp(const Var& x);
-Var Expm1(const Var& x);  // e^x - 1, exact for small x
-Var Log(const Var& x);    // natural; NaN below 0, -inf at 0
-Var Sqrt(const Var& x);   // gradient infinite at 0: add an epsilon before
+Var Log(const Var& x);   // natural; NaN below 0, -inf at 0
+Var Sqrt(const Var& x);  // gradient infinite at 0: add an epsilon before
 Var Square(const Var& x);
-Var Pow(const Var& x, double p);            // of x < 0 for whole p only, else NaN; 0^0 = 1
-Var Pow(const Var& x, const Var& p);        // broadcasts; x > 0
 Var Abs(const Var& x);                      // gradient 0 at 0
 Var Relu(const Var& x);                     // gradient 0 at 0
 Var LeakyRelu(const Var& x, double slope);  // x > 0 ? x : slope x; slope at 0; slope >= 0
 Var Softplus(const Var& x);                 // log(1 + e^x)
 Var Tanh(const Var& x);
 Var Sigmoid(const Var& x);
-Var Clamp(const Var& x, double low, double high);  // gradient 1 within, bounds included; else 0
 
 inline Var operator+(const Var& a, const Var& b) { return Add(a, b); }
 inline Var operator-(const Var& a, const Var& b) { return Sub(a, b); }
@@ -40,7 +34,6 @@ inline Var operator-(const Var& x) { return Neg(x); }
 inline Var operator*(double s, const Var& x) { return Scale(x, s); }
 inline Var operator*(const Var& x, double s) { return Scale(x, s); }
 inline Var operator/(const Var& x, double s) { return Scale(x, 1.0 / s); }
-inline Var operator/(double s, const Var& x) { return Scale(Pow(x, -1.0), s); }
 inline Var operator+(const Var& x, double s) { return AddScalar(x, s); }
 inline Var operator-(const Var& x, double s) { return AddScalar(x, -s); }
 inline Var operator+(double s, const Var& x) { return AddScalar(x, s); }
@@ -52,9 +45,5 @@ Var ReluGrad(const Var& y, Var dy);
 
 // sum + term, equal shapes, in sum's memory if that is unshared and nothing is recorded.
 Var Accumulated(Var sum, const Var& term);
-
-// Masks, without gradient: 1 where the relation holds, else 0. Broadcast like the others.
-Var Greater(const Var& a, const Var& b);
-Var GreaterEqual(const Var& a, const Var& b);
 
 }  // namespace tilegrad::nn

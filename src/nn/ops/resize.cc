@@ -19,25 +19,12 @@ void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
   if (share > 0) terms.push_back({below + 1, share});
 }
 
-void AppendArea(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
-  const std::int64_t begin = i * e.in / e.out, end = ((i + 1) * e.in + e.out - 1) / e.out;
-  for (std::int64_t k = begin; k < end; ++k) {
-    terms.push_back({k, 1.0 / static_cast<double>(end - begin)});
-  }
-}
-
 Var ResizeAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
   const AxisExtents extents{x.shape()[axis], extent};
   if (extents.in == extent) return x;
   const auto row = [&](std::int64_t i, AxisTerms& terms) {
-    switch (mode) {
-      case ResizeMode::kNearest:
-        return terms.push_back({i * extents.in / extents.out, 1.0});
-      case ResizeMode::kBilinear:
-        return AppendBilinear(extents, i, terms);
-      case ResizeMode::kArea:
-        return AppendArea(extents, i, terms);
-    }
+    if (mode == ResizeMode::kBilinear) return AppendBilinear(extents, i, terms);
+    terms.push_back({i * extents.in / extents.out, 1.0});
   };
   return MapAxis(x, axis, MakeAxisMap(x, extents, row));
 }

@@ -9,9 +9,8 @@
 namespace tilegrad::nn {
 
 enum class ResizeMode {
-  kNearest,   // element floor(i in / out)
-  kBilinear,  // of the two neighbours; edges are repeated
-  kArea       // mean of the elements that output i touches: also adaptive average pooling
+  kNearest,  // element floor(i in / out)
+  kBilinear  // of the two neighbours; edges are repeated
 };
 
 // x [n, c, h, w] -> [n, c, size.height, size.width].

@@ -17,14 +17,9 @@ const UnaryCase kUnary[] = {
     {"scale", [](const Var& x) { return Scale(x, -1.7); }},
     {"add scalar", [](const Var& x) { return AddScalar(x, 0.3); }},
     {"exp", [](const Var& x) { return Exp(x); }},
-    {"expm1", [](const Var& x) { return Expm1(x); }},
     {"log", [](const Var& x) { return Log(x); }, 0.5, 2},
     {"sqrt", [](const Var& x) { return Sqrt(x); }, 0.5, 2},
     {"square", [](const Var& x) { return Square(x); }},
-    {"pow 2.5", [](const Var& x) { return Pow(x, 2.5); }, 0.5, 2},
-    {"pow 3", [](const Var& x) { return Pow(x, 3.0); }},
-    {"pow 1", [](const Var& x) { return Pow(x, 1.0); }},
-    {"reciprocal", [](const Var& x) { return 2.0 / x; }, -2, -0.5},
     {"tanh", [](const Var& x) { return Tanh(x); }},
     {"sigmoid", [](const Var& x) { return Sigmoid(x); }},
     {"softplus", [](const Var& x) { return Softplus(x); }, -3, 3},
@@ -34,8 +29,6 @@ const UnaryCase kUnary[] = {
     {"relu below", [](const Var& x) { return Square(Relu(x)); }, -1, -0.1},
     {"leaky relu", [](const Var& x) { return Square(LeakyRelu(x, 0.2)); }, 0.1, 1},
     {"leaky relu below", [](const Var& x) { return Square(LeakyRelu(x, 0.2)); }, -1, -0.1},
-    {"clamp", [](const Var& x) { return Square(Clamp(x, -0.05, 2.0)); }, 0, 1},
-    {"clamp below", [](const Var& x) { return Square(Clamp(x, -0.05, 2.0)); }, -1, -0.1},
 };
 
 struct BinaryCase {
@@ -50,9 +43,6 @@ const BinaryCase kBinary[] = {
     {"sub", [](const Var& a, const Var& b) { return Sub(a, b); }, {}, {}},
     {"mul", [](const Var& a, const Var& b) { return Mul(a, b); }, {}, {}},
     {"div", [](const Var& a, const Var& b) { return Div(a, b); }, {}, {{}, 0.7, 2}},
-    {"pow", [](const Var& a, const Var& b) { return Pow(a, b); }, {{}, 0.5, 2}, {}},
-    {"max", [](const Var& a, const Var& b) { return Square(Max(a, b)); }, {}, {{}, 2, 3}},
-    {"min", [](const Var& a, const Var& b) { return Square(Min(a, b)); }, {}, {{}, 2, 3}},
 };
 
 InputSpec Shaped(InputSpec range, const Shape& shape) {
