@@ -87,13 +87,12 @@ inline void MeasureRates(benchmark::State& state, double flop,
   state.counters["alone"] = 100 * alone_runs / static_cast<double>(contenders.size());
 }
 
-// What a kernel gains by a second worker, in wall time. Counters: speedup: one worker over two;
-// pinned: one worker over two that stay on their cores.
+// What a kernel gains by a second worker, in wall time. Counter: speedup: one worker over two.
 inline void MeasureSpeedup(benchmark::State& state,
                            const std::function<void(const KernelContext&)>& run) {
-  const Workers one(1), two(2), pinned(2, Pinning::kOn);
+  const Workers one(1), two(2);
   KernelScratch scratch;
-  Samples rate_one, rate_two, rate_pinned;
+  Samples rate_one, rate_two;
   run({two, scratch});
   const auto rate = [&](const Workers& workers) {
     return Rate(WallSeconds, 1, [&] { run({workers, scratch}); });
@@ -101,10 +100,8 @@ inline void MeasureSpeedup(benchmark::State& state,
   for (auto _ : state) {
     rate_one.Add(rate(one));
     rate_two.Add(rate(two));
-    rate_pinned.Add(rate(pinned));
   }
   state.counters["speedup"] = rate_two.Median() / rate_one.Median();
-  state.counters["pinned"] = rate_pinned.Median() / rate_one.Median();
 }
 
 }  // namespace tilegrad::nn::bench

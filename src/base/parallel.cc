@@ -4,7 +4,6 @@
 #include <sched.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <tbb/task_scheduler_observer.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,47 +21,6 @@
 
 namespace tilegrad {
 namespace {
-
-cpu_set_t CoresOfThread() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  if (sched_getaffinity(0, sizeof(set), &set) != 0) CPU_ZERO(&set);
-  return set;
-}
-
-// The set that holds only core number `index` (modulo their count) of `cores`; empty if they are.
-cpu_set_t OnlyCore(const cpu_set_t& cores, int index) {
-  cpu_set_t only;
-  CPU_ZERO(&only);
-  const int count = CPU_COUNT(&cores);
-  for (int core = 0, seen = 0; count > 0 && core < CPU_SETSIZE; ++core) {
-    if (CPU_ISSET(core, &cores) && seen++ == index % count) CPU_SET(core, &only);
-  }
-  return only;
-}
-
-// Pins every thread that enters the arena, the caller's included, to a core of its own, and
-// restores the process's cores when it leaves.
-class PinningObserver : public tbb::task_scheduler_observer {
- public:
-  explicit PinningObserver(tbb::task_arena& arena) : task_scheduler_observer(arena) {
-    observe(true);
-  }
-  ~PinningObserver() override { observe(false); }
-  PinningObserver(const PinningObserver&) = delete;
-  PinningObserver& operator=(const PinningObserver&) = delete;
-  void on_scheduler_entry(bool) override {
-    Bind(OnlyCore(cores_, tbb::this_task_arena::current_thread_index()));
-  }
-  void on_scheduler_exit(bool) override { Bind(cores_); }
-
- private:
-  // Where the system refuses, the thread stays where it may run: only speed is at stake.
-  static void Bind(const cpu_set_t& cores) {
-    if (CPU_COUNT(&cores) > 0) sched_setaffinity(0, sizeof(cores), &cores);
-  }
-  const cpu_set_t cores_ = CoresOfThread();
-};
 
 // The process that uses oneTBB, 0 before any does. A forked child inherits oneTBB's bookkeeping,
 // but not its threads, and possibly locks that those held: it must not touch oneTBB.
@@ -131,24 +89,22 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
 }  // namespace
 
 struct Workers::Impl {
-  Impl(int count, Pinning pinning) : arena(count) {
-    if (pinning == Pinning::kOn) observer.emplace(arena);
-  }
+  explicit Impl(int count) : arena(count) {}
   tbb::task_arena arena;
-  std::optional<PinningObserver> observer;
 };
 
 int AvailableCores() {
-  const cpu_set_t cores = CoresOfThread();
-  return std::max(1, CPU_COUNT(&cores));
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  return sched_getaffinity(0, sizeof(cores), &cores) == 0 ? std::max(1, CPU_COUNT(&cores)) : 1;
 }
 
-Workers::Workers(int count, Pinning pinning) : count_(count > 0 ? count : AvailableCores()) {
+Workers::Workers(int count) : count_(count > 0 ? count : AvailableCores()) {
   if (count_ == 1 || !ThisProcessOwnsTbb()) return;
   const int granted = AddTbbThreads(count_);
   if (granted < count_) NoteRefusal();
   count_ = granted;
-  if (count_ > 1) impl_ = std::make_unique<Impl>(count_, pinning);
+  if (count_ > 1) impl_ = std::make_unique<Impl>(count_);
 }
 
 Workers::~Workers() {

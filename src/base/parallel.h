@@ -12,10 +12,6 @@
 
 namespace tilegrad {
 
-// Whether each worker is pinned to one core while it works. Off by default: where other programs
-// run, a pinned worker waits for its core, and everything that waits for the worker waits too.
-enum class Pinning { kOff, kOn };
-
 // A fixed number of workers. Copies nothing; two Workers are independent. Where the system refuses
 // threads (limits of a container) there are fewer than asked for, the caller's own at the least.
 //
@@ -25,7 +21,7 @@ enum class Pinning { kOff, kOn };
 class Workers {
  public:
   // count 0: one per core that this process may use.
-  explicit Workers(int count = 0, Pinning pinning = Pinning::kOff);
+  explicit Workers(int count = 0);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;

@@ -39,10 +39,6 @@ class Rng {
     return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * Uniform());
   }
 
-  std::uint64_t counter() const { return counter_; }
-  // A jump; with the seed this restores a stream exactly.
-  void set_counter(std::uint64_t counter) { counter_ = counter; }
-
  private:
   std::uint64_t key_;
   std::uint64_t counter_ = 0;

@@ -31,9 +31,7 @@ class Context {
   Context& operator=(const Context&) = delete;
 
   const Workers& workers() const { return workers_; }
-  KernelContext kernels() { return {workers_, scratch_, winograd_}; }
-  // Whether convolutions may use kernels/conv2d/winograd.h (they do unless told otherwise).
-  void set_winograd(bool on) { winograd_ = on; }
+  KernelContext kernels() { return {workers_, scratch_}; }
   DType dtype() const { return dtype_; }
 
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
@@ -69,7 +67,6 @@ class Context {
   KernelScratch scratch_;
   Status status_;
   bool recording_ = true;
-  bool winograd_ = true;
   std::uint64_t order_ = 0;
 };
 

@@ -288,12 +288,4 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size) {
   return Checked(camera);
 }
 
-Result<GltfCamera> ToGltf(const Camera64& camera, ImageSize size) {
-  TILEGRAD_TRY(CheckSize(size));
-  TILEGRAD_TRY(CheckCentred(camera, size, "glTF"));
-  const double tangent = 0.5 * size.height / camera.fy;
-  return GltfCamera{CameraToWorld(camera), 2 * std::atan(tangent),
-                    0.5 * size.width / camera.fx / tangent, camera.near_plane};
-}
-
 }  // namespace tilegrad

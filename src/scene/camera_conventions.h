@@ -100,7 +100,6 @@ struct GltfCamera {
   double znear = 1e-2;
 };
 Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size);
-Result<GltfCamera> ToGltf(const Camera64& camera, ImageSize size);
 
 // The same view on an image of another size: everything scales, the field of view stays.
 inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {

@@ -27,10 +27,6 @@ std::array<double, 4> QuaternionOf(const Mat3Array& r) {
   return weak_ref::UnitQuaternion(q);
 }
 
-double QuaternionDistance(const std::array<double, 4>& a, const std::array<double, 4>& b) {
-  return 1 - std::abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
-}
-
 Result<WeakPerspective> WeakPerspectiveOf(const Camera64& camera, const Vec3Array& centre) {
   TILEGRAD_TRY(Validate(camera));
   if (std::abs(camera.fx - camera.fy) > 0.01 * camera.fy)

@@ -31,8 +31,6 @@ template <class T>
 std::array<T, 9> RotationOf(const std::array<T, 4>& quaternion);
 // Unit, w >= 0. The rotation's rows are orthonormal, its determinant 1.
 std::array<double, 4> QuaternionOf(const Mat3Array& rotation);
-// 1 - |q1 . q2| of unit quaternions: 0 for the same rotation, 1 for opposite ones. CMR's loss.
-double QuaternionDistance(const std::array<double, 4>& a, const std::array<double, 4>& b);
 
 // x, y and depth of a point.
 template <class T>

@@ -59,7 +59,7 @@ TEST_P(FewThreads, DoTheWork) {
 TEST_P(FewThreads, DoTheWorkOfSeveralAndOfWorkersThatCameLater) {
   InChild([](int granted) {
     const Workers a(3);
-    auto b = std::make_unique<Workers>(4, Pinning::kOn);
+    auto b = std::make_unique<Workers>(4);
     if (a.count() != std::min(3, granted + 1) || b->count() != std::min(4, granted + 1)) {
       return false;
     }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <numeric>
 
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
@@ -57,7 +58,7 @@ Scene MakeScene(int views, double noise, std::uint64_t seed) {
 double AngleBetween(const WeakPerspective& a, const WeakPerspective& b) {
   const auto qa = weak_ref::UnitQuaternion(a.quaternion),
              qb = weak_ref::UnitQuaternion(b.quaternion);
-  const double cosine = 1 - QuaternionDistance(qa, qb);
+  const double cosine = std::abs(std::inner_product(qa.begin(), qa.end(), qb.begin(), 0.0));
   return 2 * std::acos(std::min(1.0, cosine)) * 180 / std::numbers::pi;
 }
 
