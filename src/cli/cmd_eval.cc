@@ -48,7 +48,7 @@ struct Subject {
   std::optional<train::Predictor> predictor;
 };
 
-Status Prepare(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
+Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out) {
   TILEGRAD_ASSIGN(out->run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
   if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0)
@@ -70,7 +70,7 @@ Result<std::vector<train::Trait>> TraitsOf(const EvalOptions& options, const Sub
 }
 
 Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
-  Status ready = Prepare(options, workers, ranks, out);
+  Status ready = Prepare(options, workers, out);
   if (!ranks.crew()) return ready;
   std::vector<train::Trait> traits;
   if (ready.ok()) {
@@ -81,8 +81,7 @@ Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Su
   return ranks.crew()->Agree(ready, traits);
 }
 
-Status Tell(const train::Evaluation& evaluation, const EvalOptions& options,
-            const Subject& subject) {
+Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
   // Files first: printing may fail.
   if (!subject.files.empty()) TILEGRAD_TRY(train::WriteEvaluation(subject.run, evaluation));
   Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
@@ -113,7 +112,7 @@ Status RunEvaluation(const EvalOptions& options) {
   line.Finish();
   ranks.EndIfFailed(evaluation.status());
   if (!evaluation.ok()) return evaluation.status();
-  return ranks.follows() ? Status() : Tell(*evaluation, options, subject);
+  return ranks.follows() ? Status() : Tell(*evaluation, subject);
 }
 
 }  // namespace
