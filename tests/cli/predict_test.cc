@@ -39,6 +39,10 @@ class Predict : public TempFolderTest {
     EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
     return outcome.output;
   }
+  // What stands behind warnings, and progress where the machine is slow.
+  static nlohmann::json JsonOf(const std::string& output) {
+    return nlohmann::json::parse(output.substr(output.find("\n[") + 1));
+  }
   std::string Said(const std::string& image, const std::string& run = "r") const {
     return ExpectDone("predict --refine 0 --force --run " + In(run) + " --out " + In("out") + " " +
                       In(image));
@@ -56,7 +60,8 @@ TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
             std::string::npos);
   // It needs no dataset.
   std::filesystem::rename(folder_ / "d", folder_ / "gone");
-  EXPECT_EQ(Said("text.png"), said);
+  const auto first_line = [](const std::string& text) { return text.substr(0, text.find('\n')); };
+  EXPECT_EQ(first_line(Said("text.png")), first_line(said));
 }
 
 // The picture that was cut out, before a wall.
@@ -74,7 +79,7 @@ TEST_F(Predict, TakesPlainBackgroundsAway) {
   }
   ASSERT_TRUE(io::SavePng(folder_ / "wall.png", wall).ok());
   ASSERT_TRUE(io::SavePng(folder_ / "noise.png", noise).ok());
-  const auto result = nlohmann::json::parse(Said("wall.png --json"));
+  const auto result = JsonOf(Said("wall.png --json"));
   EXPECT_EQ(result[0]["mesh"], In("out/wall_predicted.glb"));
   const Outcome refused =
       RunProgram("predict --run " + In("r") + " --out " + In("out") + " " + In("noise.png"));
@@ -105,8 +110,7 @@ TEST_F(Predict, TheAnimationIsTheSameAgain) {
 
 TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   const std::string in = In("known.png"), to = " --run " + In("r") + " --out " + In("out") + " ";
-  const std::string output = ExpectDone("predict --refine 40 --json" + to + in);
-  const auto said = nlohmann::json::parse(output.substr(output.find("\n[") + 1));  // after warnings
+  const auto said = JsonOf(ExpectDone("predict --refine 40 --json" + to + in));
   const Bytes text = ReadFile(folder_ / "out/known_match.json").value();
   const auto record = nlohmann::json::parse(text.begin(), text.end());
   EXPECT_LT(record["silhouette_iou"][0], record["silhouette_iou"][1]);
