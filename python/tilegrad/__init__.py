@@ -13,7 +13,7 @@ from tilegrad._scene import Light, Scene, Surface, Texture
 from tilegrad._shapes import icosphere
 
 # Imported at first use: `tilegrad.files.load_mesh(...)`.
-_MODULES = ("compat", "fragments", "selftest", "torch")
+_MODULES = ("compat", "fragments", "torch")
 # Those of `_tools`, which builds with TILEGRAD_PROGRAM=OFF lack; and functions of such modules.
 _TOOL_MODULES = ("cameras", "dataset", "files", "images", "losses", "meshes", "predict", "runs",
                  "weights")
