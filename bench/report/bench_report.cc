@@ -29,7 +29,7 @@ Status Report(const Path& json, const Path& folder) {
     if (table.empty()) continue;
     tables += "\n" + table;
     TILEGRAD_TRY(WriteTextAtomic(folder / (std::string("growth_") + axis + ".svg"),
-                                 LogPlotSvg(GrowthPlot(all, axis))));
+                                 train::LogPlotSvg(GrowthPlot(all, axis))));
   }
   TILEGRAD_TRY(WriteTextAtomic(folder / "render.md", tables));
   std::printf("%s\nwritten: %s\n", tables.c_str(), folder.string().c_str());

@@ -62,9 +62,9 @@ constexpr Curve kCurves[] = {{"forward", "1", "tilegrad forward, E = 1e-7"},
                              {"forward", "culled", "scalar baseline, forward"},
                              {"backward", "culled", "scalar baseline, backward"}};
 
-LogSeries SeriesOf(const std::vector<Measurement>& all, const std::string& axis,
-                   const Curve& curve) {
-  LogSeries series{{curve.name}, {}};
+train::LogSeries SeriesOf(const std::vector<Measurement>& all, const std::string& axis,
+                          const Curve& curve) {
+  train::LogSeries series{{curve.name}, {}};
   for (const Measurement& m : all) {
     const auto place = PlaceOn(axis, m.scene);
     if (!place || m.direction != curve.direction || m.who != curve.who) continue;
@@ -131,27 +131,27 @@ std::string RequestTable(const std::vector<Measurement>& all) {
          out;
 }
 
-LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis) {
-  LogPlot plot{Name(axis), "CPU time, ms", {}};
+train::LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis) {
+  train::LogPlot plot{Name(axis), "CPU time, ms", {}};
   for (const Curve& curve : kCurves) {
-    LogSeries series = SeriesOf(all, axis, curve);
+    train::LogSeries series = SeriesOf(all, axis, curve);
     if (!series.points.empty()) plot.series.push_back(std::move(series));
   }
   return plot;
 }
 
 std::string GrowthTable(const std::vector<Measurement>& all, const std::string& axis) {
-  const LogPlot plot = GrowthPlot(all, axis);
+  const train::LogPlot plot = GrowthPlot(all, axis);
   if (plot.series.empty()) return "";
   std::string head = "| " + plot.x_label, line = "|--:", out;
-  for (const LogSeries& series : plot.series) {
+  for (const train::LogSeries& series : plot.series) {
     head += " | " + series.name[0] + ", ms", line += "|--:";
   }
-  for (const LogPoint& place : plot.series[0].points) {
+  for (const train::LogPoint& place : plot.series[0].points) {
     out += fmt::format("| {:g}", place.x);
-    for (const LogSeries& series : plot.series) {
+    for (const train::LogSeries& series : plot.series) {
       std::string cell;
-      for (const LogPoint& p : series.points) {
+      for (const train::LogPoint& p : series.points) {
         if (p.x == place.x) cell = fmt::format("{:.3g}", p.y);
       }
       out += " | " + cell;

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "base/log_plot.h"
 #include "report/measurements.h"
+#include "train/report/log_plot.h"
 
 namespace tilegrad::bench {
 
@@ -23,7 +23,7 @@ std::string RequestTable(const std::vector<Measurement>& all);
 
 // Growth series `axis` ("faces", "pixels" or "delta"): CPU time against it. Empty series where it
 // was not measured.
-LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis);
+train::LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis);
 // The same as Markdown; empty where it was not measured.
 std::string GrowthTable(const std::vector<Measurement>& all, const std::string& axis);
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "base/escape_text.h"
-#include "base/log_plot.h"
 #include "proof/tradeoff_study.h"
+#include "train/report/log_plot.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -85,11 +85,11 @@ std::string TrainingCsv(const std::vector<StudyTraining>& training) {
 }
 
 std::string StudyPicture(const std::vector<StudyResult>& results) {
-  LogPlot plot{"CPU time, forward and backward, ms", "largest error of alpha", {}};
+  train::LogPlot plot{"CPU time, forward and backward, ms", "largest error of alpha", {}};
   for (const StudyResult& r : results) {
-    LogSeries series{{fmt::format("{}, {} faces", EscapeControls(r.scene), r.tradeoff.faces),
-                      fmt::format("{} pixels, delta = {:.3g}", r.size, r.delta)},
-                     {}};
+    train::LogSeries series{{fmt::format("{}, {} faces", EscapeControls(r.scene), r.tradeoff.faces),
+                             fmt::format("{} pixels, delta = {:.3g}", r.size, r.delta)},
+                            {}};
     for (const TradeoffRow& row : r.tradeoff.rows) {
       if (row.rule == AlphaRule::kPaper) continue;  // no curve goes through it
       series.points.push_back({std::max(Cost(row), 1e-3), Shown(row.largest),
@@ -97,7 +97,7 @@ std::string StudyPicture(const std::vector<StudyResult>& results) {
     }
     plot.series.push_back(std::move(series));
   }
-  return LogPlotSvg(plot);
+  return train::LogPlotSvg(plot);
 }
 
 }  // namespace tilegrad::cli

@@ -104,7 +104,7 @@ TEST(BenchReport, CsvHasAllMeasurements) {
 
 TEST(BenchReport, GrowthAsCurvesAndTable) {
   const auto all = Parse(kSamples);
-  const LogPlot plot = GrowthPlot(all, "delta");
+  const train::LogPlot plot = GrowthPlot(all, "delta");
   ASSERT_EQ(plot.series.size(), 2u);
   ASSERT_EQ(plot.series[0].points.size(), 2u);
   EXPECT_EQ(plot.series[0].points[1].x, 1);
@@ -122,12 +122,13 @@ TEST(BenchReport, RefusesOtherFiles) {
 }
 
 TEST(LogPlotSvg, DrawsPointsWhereTheyBelongAndEscapesTexts) {
-  const std::string svg = LogPlotSvg({"a & b", "y", {{{"<s>"}, {{1, 1, ""}, {100, 10, ""}}}}});
+  const std::string svg =
+      train::LogPlotSvg({"a & b", "y", {{{"<s>"}, {{1, 1, ""}, {100, 10, ""}}}}});
   EXPECT_EQ(svg.rfind("<svg", 0), 0u);
   EXPECT_NE(svg.find("points=\"80.0,384.0 470.0,24.0 \""), std::string::npos) << svg;
   EXPECT_NE(svg.find("a &amp; b"), std::string::npos);
   EXPECT_NE(svg.find("&lt;s&gt;"), std::string::npos);
-  EXPECT_NE(LogPlotSvg({"x", "y", {}}).find("</svg>"), std::string::npos);
+  EXPECT_NE(train::LogPlotSvg({"x", "y", {}}).find("</svg>"), std::string::npos);
 }
 
 }  // namespace tilegrad::bench::report_test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/log_plot.h"
+#include "train/report/log_plot.h"
 
 #include <fmt/format.h>
 
@@ -10,15 +10,16 @@
 #include "base/escape_html.h"
 #include "base/whole_number.h"
 
-namespace tilegrad {
+namespace tilegrad::train {
 namespace {
 
-constexpr double kWidth = 720, kHeight = 440, kLeft = 80, kTop = 24, kRight = 250, kBottom = 56;
-constexpr std::array kColors = {"#0b6a9a", "#c2571a", "#3a7d44", "#7b4ea3",
-                                "#9a7d0a", "#a31f34", "#2a9d8f", "#555555"};
+constexpr double kPlotWidth = 720, kPlotHeight = 440, kPlotLeft = 80, kPlotTop = 24,
+                 kPlotRight = 250, kPlotBottom = 56;
+constexpr std::array kPlotColors = {"#0b6a9a", "#c2571a", "#3a7d44", "#7b4ea3",
+                                    "#9a7d0a", "#a31f34", "#2a9d8f", "#555555"};
 
 // In whole decades.
-struct Axis {
+struct LogAxis {
   double from, to;        // pixels
   int low = 0, high = 1;  // powers of ten
 
@@ -29,17 +30,21 @@ struct Axis {
   double At(double v) const { return from + (to - from) * (std::log10(v) - low) / (high - low); }
 };
 
-class Picture {
+class LogDrawing {
  public:
-  explicit Picture(const LogPlot& plot) {
+  explicit LogDrawing(const LogPlot& plot) {
     double x0 = HUGE_VAL, x1 = 0, y0 = HUGE_VAL, y1 = 0;
     for (const LogSeries& series : plot.series) {
       for (const LogPoint& p : series.points) {
-        x0 = std::min(x0, p.x), x1 = std::max(x1, p.x);
-        y0 = std::min(y0, p.y), y1 = std::max(y1, p.y);
+        x0 = std::min(x0, p.x);
+        x1 = std::max(x1, p.x);
+        y0 = std::min(y0, p.y);
+        y1 = std::max(y1, p.y);
       }
     }
-    if (x1 > 0) x_.Cover(x0, x1), y_.Cover(y0, y1);
+    if (x1 == 0) return;
+    x_.Cover(x0, x1);
+    y_.Cover(y0, y1);
   }
 
   std::string Draw(const LogPlot& plot) {
@@ -47,7 +52,7 @@ class Picture {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} "
         "{1}\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222222\">\n<rect "
         "width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-        kWidth, kHeight);
+        kPlotWidth, kPlotHeight);
     Grid(plot);
     for (std::size_t i = 0; i < plot.series.size(); ++i) Curve(plot.series[i], i);
     return svg_ + "</svg>\n";
@@ -74,13 +79,13 @@ class Picture {
       Line(x_.from, at, x_.to, at);
       Text(x_.from - 8, at + 4, "end", fmt::format("{:g}", std::pow(10.0, p)));
     }
-    Text((x_.from + x_.to) / 2, kHeight - 16, "middle", plot.x_label);
+    Text((x_.from + x_.to) / 2, kPlotHeight - 16, "middle", plot.x_label);
     svg_ += fmt::format(
         "<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
         (y_.from + y_.to) / 2, EscapeHtml(plot.y_label));
   }
   void Curve(const LogSeries& series, std::size_t index) {
-    const char* color = kColors[index % kColors.size()];
+    const char* color = kPlotColors[index % kPlotColors.size()];
     std::string line, dots;
     for (const LogPoint& p : series.points) {
       const double x = x_.At(p.x), y = y_.At(p.y);
@@ -92,7 +97,8 @@ class Picture {
     svg_ +=
         fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>\n{}",
                     line, color, dots);
-    const double key = kTop + 14 + 36 * static_cast<double>(index), left = kWidth - kRight + 24;
+    const double key = kPlotTop + 14 + 36 * static_cast<double>(index),
+                 left = kPlotWidth - kPlotRight + 24;
     svg_ +=
         fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\"/>\n", left, key - 4, color);
     for (std::size_t n = 0; n < series.name.size(); ++n) {
@@ -100,12 +106,12 @@ class Picture {
     }
   }
 
-  Axis x_{kLeft, kWidth - kRight}, y_{kHeight - kBottom, kTop};
+  LogAxis x_{kPlotLeft, kPlotWidth - kPlotRight}, y_{kPlotHeight - kPlotBottom, kPlotTop};
   std::string svg_;
 };
 
 }  // namespace
 
-std::string LogPlotSvg(const LogPlot& plot) { return Picture(plot).Draw(plot); }
+std::string LogPlotSvg(const LogPlot& plot) { return LogDrawing(plot).Draw(plot); }
 
-}  // namespace tilegrad
+}  // namespace tilegrad::train

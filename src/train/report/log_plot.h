@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace tilegrad {
+namespace tilegrad::train {
 
 struct LogPoint {
   double x, y;        // > 0
@@ -25,4 +25,4 @@ struct LogPlot {
 // 720 x 440 pixels; axes end at powers of ten. Texts are escaped.
 std::string LogPlotSvg(const LogPlot& plot);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::train
