@@ -137,16 +137,8 @@ inline void AddBrokenFaces(IntegerMesh* mesh) {
     mesh->faces.push_back(i);  // twice, turned, an edge
 }
 
-inline IntegerMesh MakeBroken(int size, std::uint64_t stream) {
-  IntegerMesh mesh = MakeCloud(size, kSoupCloud, stream);
-  AddBrokenFaces(&mesh);
-  return mesh;
-}
-
 inline IntegerMesh MakeMesh(Shape shape, int size, std::uint64_t stream) {
   switch (shape) {
-    case Shape::kTriangle:
-      return {{{-900, -800, 50}, {1000, -500, -100}, {100, 900, 0}}, {0, 1, 2}};
     case Shape::kBall:
       return BallMaker(size, stream).Make();
     case Shape::kSoup:
@@ -154,11 +146,11 @@ inline IntegerMesh MakeMesh(Shape shape, int size, std::uint64_t stream) {
     case Shape::kAround:
       return MakeCloud(size, kCloudAroundCamera, stream);
     case Shape::kBroken:
-      return MakeBroken(size, stream);
-    case Shape::kNothing:
       break;
   }
-  return {{{0, 0, 0}, {500, 0, 0}, {0, 500, 0}}, {}};
+  IntegerMesh mesh = MakeCloud(size, kSoupCloud, stream);
+  AddBrokenFaces(&mesh);
+  return mesh;
 }
 
 }  // namespace tilegrad::test

@@ -83,6 +83,19 @@ TEST_F(SelftestCommand, FingerprintsAreThoseOfAnyRun) {
   EXPECT_EQ(run("--workers 1"), run("--workers 3"));
 }
 
+// Of three training steps, by target. A change of these digits needs a reason in the commit
+// message.
+const std::map<std::string, std::string> kTrainingDigits = {{"AVX3", "29829ddc"}};
+
+TEST_F(SelftestCommand, TrainingHasTheBitsThatItHad) {
+  for (const std::string& target : RunnableTargets()) {
+    const auto digits = kTrainingDigits.find(target);
+    if (digits == kTrainingDigits.end()) continue;
+    const Outcome outcome = RunProgram("selftest --only training");
+    EXPECT_TRUE(Contains(outcome.output, target + " " + digits->second)) << outcome.output;
+  }
+}
+
 TEST_F(SelftestCommand, ListsItsChecksAndRunsSome) {
   const Outcome list = RunProgram("selftest --list");
   EXPECT_EQ(list.exit_code, 0);
