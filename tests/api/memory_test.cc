@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "api/test_scene.h"
+#include "base/sanitizers.h"
 #include "support/allocation_count.h"
 
 namespace tilegrad::memory_test {
@@ -43,6 +44,29 @@ class Step {
   Frame frame_;
   std::unique_ptr<TestCotangents<float>> cotangents_;
 };
+
+// With several threads the scratch of each grows until it has met the largest tile.
+bool IsSteadySoon(Step* step, Renderer* renderer, Frame* frame) {
+  for (int i = 0, quiet = 0; i < 100; ++i) {
+    const long before = g_allocations;
+    EXPECT_TRUE(step->Run(renderer, frame).ok());
+    quiet = g_allocations == before ? quiet + 1 : 0;
+    if (quiet == 10) return true;
+  }
+  return false;
+}
+
+TEST(ApiMemory, SeveralThreadsSoonAllocateNothing) {
+  if (kThreadSanitizer) GTEST_SKIP() << "which allocates itself";
+  RenderOptions options = kTestOptions;
+  options.width = options.height = 150;
+  Step step(Lighting::kPhong, options);
+  for (const int threads : {2, 3}) {
+    Renderer renderer{{.threads = threads}};
+    Frame frame;
+    EXPECT_TRUE(IsSteadySoon(&step, &renderer, &frame)) << threads;
+  }
+}
 
 TEST(ApiMemory, SteadyStateAllocatesNothing) {
   for (const Lighting lighting :

@@ -3,7 +3,7 @@
 // Arrays of gradients: gradient_arrays_test.cc; faces cut at the near plane: cut_faces_test.cc.
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -27,13 +27,16 @@ std::vector<T> Copy(std::span<const T> values) {
   return {values.begin(), values.end()};
 }
 
+template <class T>
+std::array<std::span<const T>, 7> AllOf(const ImagesT<T>& i) {
+  return {i.color, i.alpha, i.attributes, i.depth, i.normals, i.uv, i.barycentrics};
+}
+
 // All images of a frame behind each other.
 template <class T>
-std::vector<T> Flat(const ImagesT<T>& i) {
+std::vector<T> Flat(const ImagesT<T>& images) {
   std::vector<T> out;
-  for (const auto image :
-       {i.color, i.alpha, i.attributes, i.depth, i.normals, i.uv, i.barycentrics})
-    out.insert(out.end(), image.begin(), image.end());
+  for (const auto image : AllOf(images)) out.insert(out.end(), image.begin(), image.end());
   return out;
 }
 
@@ -65,9 +68,23 @@ TEST(ApiImages, HaveTheShapesThatTheHeaderSays) {
     EXPECT_EQ(i.face_ids[p] >= 0, i.alpha[p] == 1);
   }
   EXPECT_GT(faces, 300);  // there is something to see
-  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {false, false, false}, &frame).ok());
-  EXPECT_TRUE(frame.images().alpha.empty() && frame.images().color.empty());
-  EXPECT_EQ(frame.images().face_ids.size(), pixels);
+}
+
+TEST(ApiImages, DoNotDependOnWhatElseIsWanted) {
+  const TestScene<float> s(Lighting::kPhong);
+  Renderer renderer;
+  Frame all, one;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &all).ok());
+  bool Outputs::*const images[] = {&Outputs::color,       &Outputs::alpha,   &Outputs::attributes,
+                                   &Outputs::depth,       &Outputs::normals, &Outputs::uv,
+                                   &Outputs::barycentrics};
+  for (std::size_t i = 0; i < std::size(images); ++i) {
+    Outputs wanted{false, false, false};
+    wanted.*images[i] = true;
+    ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, wanted, &one).ok());
+    EXPECT_EQ(Flat(one.images()), Copy(AllOf(all.images())[i])) << i;
+    EXPECT_EQ(Copy(one.images().face_ids), Copy(all.images().face_ids)) << i;
+  }
 }
 
 // The engine is held to the reference elsewhere; here each image has to be the right one. Colours,
@@ -95,30 +112,40 @@ TEST(ApiImages, FloatAndDoubleAgree) {
   }
 }
 
+// So are their gradients.
 TEST(ApiImages, ScenesOfABatchAreRenderedAsAlone) {
   const TestScene<float> s(Lighting::kLambert);
-  std::vector<Scene> scenes(5, s.scene);
-  for (std::size_t n = 0; n < 5; ++n) scenes[n].camera.cx += static_cast<float>(n);
+  std::vector<Scene> scenes(3, s.scene);
+  for (std::size_t n = 0; n < 3; ++n) scenes[n].camera.cx += static_cast<float>(n);
   Renderer renderer;
   Frame batch, alone;
   ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &batch).ok());
-  const std::size_t pixels = 29 * 34;
-  for (std::size_t n = 0; n < 5; ++n) {
+  TestGradients<float> first(s), second(s), third(s), own(s);
+  const TestGradients<float>* const all[] = {&first, &second, &third};
+  const SceneGradients d_scenes[] = {first.d, second.d, third.d};
+  ASSERT_TRUE(renderer.Backward(batch, {.color = batch.images().color}, d_scenes).ok());
+  for (std::size_t n = 0; n < 3; ++n) {
     ASSERT_TRUE(renderer.Render({&scenes[n], 1}, kTestOptions, {}, &alone).ok());
-    EXPECT_EQ(Copy(batch.images().color.subspan(n * 3 * pixels, 3 * pixels)),
-              Copy(alone.images().color));
+    const auto color = alone.images().color;
+    EXPECT_EQ(Copy(batch.images().color.subspan(n * color.size(), color.size())), Copy(color));
+    ASSERT_TRUE(renderer.Backward(alone, {.color = color}, {&own.d, 1}).ok());
+    EXPECT_EQ(all[n]->positions, own.positions);
+    EXPECT_EQ(all[n]->texels, own.texels);
+    EXPECT_EQ(all[n]->camera.fx, own.camera.fx);
   }
-  EXPECT_TRUE(renderer.Render({}, kTestOptions, {}, &batch).ok());  // none is a batch too
-  EXPECT_EQ(batch.images().count, 0);
 }
 
-// One step of a batch of three on some number of threads: all images, all gradients.
-std::vector<float> Step(int threads) {
+// One step of a batch of three on some number of threads: all images, all gradients. An image of
+// side 150 is several bins and bands.
+std::vector<float> Step(int threads, int side = 29) {
   const TestScene<float> s(Lighting::kPhong);
   const std::vector<Scene> scenes(3, s.scene);
+  RenderOptions options = kTestOptions;
+  options.height = side;
+  options.width = side + 5;
   Renderer renderer{{.threads = threads}};
   Frame frame;
-  EXPECT_TRUE(renderer.Render(scenes, kTestOptions, kAll, &frame).ok());
+  EXPECT_TRUE(renderer.Render(scenes, options, kAll, &frame).ok());
   const TestCotangents<float> cotangents(frame.images());
   TestGradients<float> g(s);
   const std::vector<SceneGradients> d_scenes(3, g.d);
@@ -133,8 +160,10 @@ std::vector<float> Step(int threads) {
 }
 
 TEST(ApiThreads, AnyNumberGivesTheSameBits) {
-  const std::vector<float> one = Step(1);
-  for (const int threads : {0, 2, 7}) EXPECT_EQ(Step(threads), one) << threads;
+  for (const int side : {29, 150}) {
+    const std::vector<float> one = Step(1, side);
+    for (const int threads : {0, 2, 3, 7, 16}) EXPECT_EQ(Step(threads, side), one) << threads;
+  }
 }
 
 TEST(ApiThreads, RenderersOnTwoThreadsDoNotMeet) {
@@ -193,67 +222,94 @@ struct BadCall {
   std::function<void(Scene&, RenderOptions&)> spoil;
 };
 
+const std::vector<float> kSeven(7), kTwo(2), kInfinite(48, INFINITY);
+const std::vector<std::int32_t> kBeyond = {0, 1, 16}, kNegative = {0, 1, -1}, kOnes(18, 1);
+const std::vector<Light> kNoDirection = {{}, {.direction = {0, 0, 0}}};
+const std::vector<Light> kNoNumber = {{}, {.direction = {0, 0, 1}, .intensity = NAN}};
+const std::vector<Texture> kShort = {{kSeven, 5, 4}}, kNoTexels = {{{}, 0, 8}};
+const std::vector<Surface> kNoSuchTexture = {{.texture = 3}};
+const std::vector<Surface> kTooDull = {{.texture = 0, .shininess = -1}};
+
+std::vector<float> NanAt5() {
+  std::vector<float> out(48);
+  out[5] = NAN;
+  return out;
+}
+
+const std::vector<float> kNanAt5 = NanAt5();
+
+// Of the second of two scenes, unlit, of 16 vertices and 18 faces. What shading does not use is
+// looked at, too.
+const BadCall kBadCalls[] = {
+    {"scene 1: positions must be [V,3], got 7 numbers",
+     [](auto& s, auto&) { s.positions = kSeven; }},
+    {"scene 1: positions[5] is nan", [](auto& s, auto&) { s.positions = kNanAt5; }},
+    {"scene 1: faces must be [F,3], got 2 indices",
+     [](auto& s, auto&) { s.faces = s.faces.first(2); }},
+    {"scene 1: faces[2] is 16, outside of [0, 16)", [](auto& s, auto&) { s.faces = kBeyond; }},
+    {"scene 1: faces[2] is -1, outside of [0, 16)", [](auto& s, auto&) { s.faces = kNegative; }},
+    {"scene 1: colors must be [16,3], got 2 numbers",
+     [](auto& s, auto&) { s.colors.values = kTwo; }},
+    {"scene 1: colors[5] is nan", [](auto& s, auto&) { s.colors.values = kNanAt5; }},
+    {"scene 1: colors.rate is 9, must be in 0..1",
+     [](auto& s, auto&) { s.colors.rate = static_cast<Rate>(9); }},
+    {"scene 1: uvs must be [54,2], got 7 numbers", [](auto& s, auto&) { s.uvs.values = kSeven; }},
+    {"scene 1: the scene has textures, but no uvs", [](auto& s, auto&) { s.uvs.values = {}; }},
+    {"scene 1: attributes differ from those of scene 0: a batch must agree",
+     [](auto& s, auto&) {
+       s.channels = 1;
+       s.attributes.values = s.attributes.values.first(16);
+     }},
+    {"scene 1: attributes must be [16,3], got 32 numbers", [](auto& s, auto&) { s.channels = 3; }},
+    {"scene 1: attributes[5] is nan",
+     [](auto& s, auto&) { s.attributes.values = std::span(kNanAt5).first(32); }},
+    {"scene 1: normals must be [16,3], got 7 numbers",
+     [](auto& s, auto&) { s.normals.values = kSeven; }},
+    {"scene 1: normals[0] is inf", [](auto& s, auto&) { s.normals.values = kInfinite; }},
+    {"the scene has no normals", [](auto& s, auto&) { s.shading.normals = Normals::kGiven; }},
+    {"scene 1: light_directions must be [16,3], got 7 numbers",
+     [](auto& s, auto&) { s.light_directions = kSeven; }},
+    {"scene 1: light_directions[0] is inf", [](auto& s, auto&) { s.light_directions = kInfinite; }},
+    {"scene 1: sh has 7 numbers, expected 9", [](auto& s, auto&) { s.sh = kSeven; }},
+    {"scene 1: sh[0] is inf", [](auto& s, auto&) { s.sh = std::span(kInfinite).first(9); }},
+    {"scene 1: sh has 0",
+     [](auto& s, auto&) { s.shading.lighting = Lighting::kSphericalHarmonics; }},
+    {"scene 1: lights[1]", [](auto& s, auto&) { s.lights = kNoNumber; }},
+    {"scene 1: lights[1]: direction is 0 0 0, must not be 0",
+     [](auto& s, auto&) {
+       s.shading.lighting = Lighting::kPhong;
+       s.lights = kNoDirection;
+     }},
+    {"scene 1: lighting needs either lights or light_directions; the scene has neither",
+     [](auto& s, auto&) { s.shading.lighting = Lighting::kPhong; }},
+    {"scene 1: textures[0]: texels", [](auto& s, auto&) { s.textures = kShort; }},
+    {"scene 1: textures[0]: is 0 x 8", [](auto& s, auto&) { s.textures = kNoTexels; }},
+    {"scene 1: surfaces[0]: texture is 3", [](auto& s, auto&) { s.surfaces = kNoSuchTexture; }},
+    {"scene 1: surfaces[0]: shininess is -1", [](auto& s, auto&) { s.surfaces = kTooDull; }},
+    {"scene 1: face_surfaces[0] is 1", [](auto& s, auto&) { s.face_surfaces = kOnes; }},
+    {"scene 1: options of the shading model differ",
+     [](auto& s, auto&) { s.shading.clamp = true; }},
+    {"scene 1: camera.near_plane is 0", [](auto& s, auto&) { s.camera.near_plane = 0; }},
+    {"scene 1: camera.rotation[3] is nan", [](auto& s, auto&) { s.camera.rotation[3] = NAN; }},
+    {"scene 1: camera.fx is 0, must be finite and not 0", [](auto& s, auto&) { s.camera.fx = 0; }},
+    {"scene 1: camera.fy is inf, must be finite and not 0",
+     [](auto& s, auto&) { s.camera.fy = INFINITY; }},
+    {"scene 1: camera.cx is nan, must be finite", [](auto& s, auto&) { s.camera.cx = NAN; }},
+    {"options.width is 0", [](auto&, auto& o) { o.width = 0; }},
+    {"options.delta is -1", [](auto&, auto& o) { o.delta = -1; }},
+    {"options.max_alpha_error is 2", [](auto&, auto& o) { o.max_alpha_error = 2; }},
+    {"options.culling is 2", [](auto&, auto& o) { o.culling = static_cast<FaceCulling>(2); }},
+};
+
 TEST(ApiErrors, SayWhatIsWrongAndWhere) {
-  static const std::vector<float> seven(7), two(2);
-  static const std::vector<int> bad_faces = {0, 1, 16};
-  static std::vector<float> with_nan(48, 0.0f);
-  with_nan[5] = std::numeric_limits<float>::quiet_NaN();
-  static const std::vector<Light> no_direction = {{}, {.direction = {0, 0, 0}}};
-  const std::vector<BadCall> calls = {
-      {"scene 1: positions must be [V,3], got 7 numbers",
-       [](Scene& s, RenderOptions&) { s.positions = seven; }},
-      {"scene 1: faces[2] is 16, outside of [0, 16)",
-       [](Scene& s, RenderOptions&) {
-         s.faces = bad_faces;
-         s.uvs = {};
-         s.textures = {};
-         s.surfaces = {};
-       }},
-      {"scene 1: positions[5] is nan", [](Scene& s, RenderOptions&) { s.positions = with_nan; }},
-      {"scene 1: colors must be [16,3], got 2 numbers",
-       [](Scene& s, RenderOptions&) { s.colors.values = two; }},
-      {"scene 1: uvs must be [54,2], got 7 numbers",
-       [](Scene& s, RenderOptions&) { s.uvs.values = seven; }},
-      {"scene 1: colors.rate is 9, must be in 0..1",
-       [](Scene& s, RenderOptions&) { s.colors.rate = static_cast<Rate>(9); }},
-      {"scene 1: attributes differ from those of scene 0: a batch must agree",
-       [](Scene& s, RenderOptions&) {
-         s.channels = 1, s.attributes.values = s.attributes.values.first(16);
-       }},
-      {"scene 1: attributes must be [16,3], got 32 numbers",
-       [](Scene& s, RenderOptions&) { s.channels = 3; }},
-      {"scene 1: normals must be [16,3], got 7 numbers",  // of a scene that does not use them
-       [](Scene& s, RenderOptions&) { s.normals.values = seven; }},
-      {"scene 1: light_directions must be [16,3], got 7 numbers",
-       [](Scene& s, RenderOptions&) { s.light_directions = seven; }},
-      {"scene 1: sh has 7 numbers, expected 9", [](Scene& s, RenderOptions&) { s.sh = seven; }},
-      {"scene 1: camera.near_plane", [](Scene& s, RenderOptions&) { s.camera.near_plane = 0; }},
-      {"scene 1: camera.fx is 0, must be finite and not 0",
-       [](Scene& s, RenderOptions&) { s.camera.fx = 0; }},
-      {"scene 1: camera.fy is inf, must be finite and not 0",
-       [](Scene& s, RenderOptions&) { s.camera.fy = INFINITY; }},
-      {"scene 1: camera.cx is nan, must be finite",
-       [](Scene& s, RenderOptions&) { s.camera.cx = NAN; }},
-      {"scene 1: sh",
-       [](Scene& s, RenderOptions&) { s.shading.lighting = Lighting::kSphericalHarmonics; }},
-      {"scene 1: lights[1]: direction is 0 0 0, must not be 0",
-       [](Scene& s, RenderOptions&) {
-         s.shading.lighting = Lighting::kPhong, s.lights = no_direction;
-       }},
-      {"options.width is 0", [](Scene&, RenderOptions& o) { o.width = 0; }},
-      {"options.delta is -1", [](Scene&, RenderOptions& o) { o.delta = -1; }},
-      {"options.max_alpha_error is 2", [](Scene&, RenderOptions& o) { o.max_alpha_error = 2; }},
-      {"options.culling is 2",
-       [](Scene&, RenderOptions& o) { o.culling = static_cast<FaceCulling>(2); }},
-  };
   const TestScene<float> s(Lighting::kNone);
   Renderer renderer;
   Frame frame;
-  for (const BadCall& call : calls) {
+  for (const BadCall& call : kBadCalls) {
     std::vector<Scene> scenes = {s.scene, s.scene};
     RenderOptions options = kTestOptions;
     call.spoil(scenes[1], options);
-    const Status status = renderer.Render(scenes, options, {}, &frame);
+    const Status status = renderer.Render(scenes, options, {.attributes = false}, &frame);
     EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << call.expected;
     EXPECT_NE(status.message().find(call.expected), std::string::npos)
         << "got: " << status.message() << "\nexpected: " << call.expected;
@@ -327,9 +383,14 @@ void ExpectDepthOfBackgroundIsNotRead() {
   }
   std::vector<T> d_positions(s.positions.size());
   const SceneGradientsT<T> d_scene{.positions = d_positions};
-  const Status status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
+  Status status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
   EXPECT_TRUE(status.ok()) << status.message();
   for (const T d : d_positions) EXPECT_TRUE(std::isfinite(d));
+  const auto seen = std::find(d_depth.begin(), d_depth.end(), T(1));
+  *seen = std::numeric_limits<T>::infinity();
+  status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
+  EXPECT_EQ(status.message(),
+            "d_frame.depth[" + std::to_string(seen - d_depth.begin()) + "] is inf");
 }
 TEST(ApiBackward, CotangentsOfDepthAreNotReadAtTheBackground) {
   ExpectDepthOfBackgroundIsNotRead<float>();
@@ -350,6 +411,11 @@ TEST(ApiErrors, OfTheWayBackAndOfRenderers) {
   EXPECT_EQ(message({}, {&bad, 1}), "scene 0: d_scene.positions has 5 numbers, expected 48");
   EXPECT_EQ(message({}, {}), "1 scenes, but 0 d_scenes");
   EXPECT_EQ(message({.alpha = d_alpha}, {&none, 1}), "frame.alpha has 0 numbers, expected 986");
+  std::vector<float> d_color(3 * 34 * 29);
+  d_color[70] = NAN;
+  d_positions.resize(48);
+  const SceneGradients good{.positions = d_positions};
+  EXPECT_EQ(message({.color = d_color}, {&good, 1}), "d_frame.color[70] is nan");
   Renderer many{{.threads = 5000}};
   EXPECT_EQ(many.Render({}, {}, {}, &frame).message(),
             "options.threads is 5000, must be in 0..1024");

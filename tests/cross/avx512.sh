@@ -18,7 +18,7 @@ readonly PACKAGES='bochs bochs-term vgabios isolinux syslinux-common xorriso bus
 readonly KERNEL=$WORK/kernel ROOT=$WORK/root DISC=$WORK/disc
 readonly SYSLINUX=/usr/lib/syslinux/modules/bios/ldlinux.c32 ISOLINUX=/usr/lib/ISOLINUX/isolinux.bin
 readonly QUICK=(base_array_checks raster_project raster_visibility raster_interpolate_backward
-  raster_extremes render_pipeline_bits shade nn_reduce nn_axis_map nn_pointwise nn_adam 'nn_conv2d:Conv2dWinograd.*'
+  raster_extremes render_topologies shade nn_reduce nn_axis_map nn_pointwise nn_adam 'nn_conv2d:Conv2dWinograd.*'
   'nn_gemm:-*Random*')
 
 die() { printf 'avx512.sh: %s\n' "$*" >&2; exit 1; }
