@@ -340,12 +340,6 @@ TEST_F(Render, SoftAlphaReachesBeyondTheSilhouette) {
   EXPECT_GT(soft, 1.1 * hard);
 }
 
-TEST_F(Render, WorkersDoNotChangeAByte) {
-  ExpectDone("--out " + In("a.png") + " --size 100 --workers 1");
-  ExpectDone("--out " + In("b.png") + " --size 100 --workers 3");
-  EXPECT_EQ(ReadFile(folder_ / "a.png").value(), ReadFile(folder_ / "b.png").value());
-}
-
 TEST_F(Render, WrongCommandLines) {
   ExpectRefused("--out " + In("a.jpg"), 2, ".png, .exr or .npy");
   EXPECT_FALSE(Exists("a.jpg"));

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "base/simd_target.h"
 #include "nn/nn.h"
@@ -161,19 +160,6 @@ struct Trainer {
   Adam adam;
 };
 
-TEST(Training, SameBitsForAnyNumberOfWorkers) {
-  std::vector<float> want;
-  for (int count : {1, 2, 7}) {
-    const Workers workers(count);
-    Trainer trainer(workers);
-    for (std::uint64_t step = 0; step < 4; ++step) trainer.Step(step);
-    const auto got = trainer.Weights();
-    if (want.empty()) want = got;
-    ASSERT_EQ(got.size(), want.size());
-    EXPECT_EQ(std::memcmp(got.data(), want.data(), got.size() * sizeof(float)), 0) << count;
-  }
-}
-
 // The vector kernels in float against the scalar references in double, through a whole step. Sums
 // are of up to 450 terms; rounding errors of a sum of n terms behave like sqrt(n) u (Higham, Mary:
 // A new approach to probabilistic rounding error analysis, 2019); eight layers there and eight
@@ -200,37 +186,6 @@ TEST(Training, FloatOnEveryTargetAgreesWithDouble) {
     EXPECT_LT(std::sqrt(squares), tolerance * norm) << target;
   }
   ASSERT_TRUE(ForceTarget("").ok());
-}
-
-TEST(Training, LossFallsAndMemoryIsReused) {
-  const Workers workers(2);
-  Trainer trainer(workers);
-  const double before = trainer.Step(0);
-  trainer.Step(1);
-  const MemoryStats warm = trainer.context.memory().stats();
-  double after = 0;
-  for (std::uint64_t step = 2; step < 40; ++step) after = trainer.Step(step);
-  const MemoryStats end = trainer.context.memory().stats();
-  EXPECT_LT(after, 0.8 * before);
-  EXPECT_EQ(end.misses, warm.misses);
-  EXPECT_EQ(end.peak_bytes, warm.peak_bytes);
-  EXPECT_GT(end.requests, warm.requests + 1000);
-}
-
-TEST(Training, SavedAndRestoredIsBitEqual) {
-  const Workers workers(2);
-  Trainer a(workers), b(workers);
-  for (std::uint64_t step = 0; step < 3; ++step) a.Step(step);
-  TensorFile file{State(a.net), {{"step", "3"}}};
-  const auto moments = a.adam.State();
-  file.tensors.insert(file.tensors.end(), moments.begin(), moments.end());
-  const Bytes bytes = EncodeSafetensors(file).value();
-  const TensorFile back = DecodeSafetensors(b.context, bytes).value();
-  ASSERT_TRUE(LoadState(b.net, back.tensors).ok());
-  ASSERT_TRUE(b.adam.LoadState(back.tensors).ok());
-  EXPECT_EQ(b.adam.steps(), 3);
-  for (std::uint64_t step = 3; step < 5; ++step) EXPECT_EQ(a.Step(step), b.Step(step));
-  EXPECT_EQ(a.Weights(), b.Weights());
 }
 
 TEST(Training, LoadingChecksBeforeItChanges) {

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <optional>
 #include <utility>
 
 #include "compat/nvdiffrast/test_util.h"
@@ -272,29 +271,6 @@ TEST(AntialiasBackward, SharedPositionsSumOverImages) {
   d_outs.insert(d_outs.end(), d_out.begin(), d_out.end());
   const auto single = gradient(one, color, d_out), both = gradient(two, colors, d_outs);
   for (std::size_t i = 0; i < single.size(); ++i) EXPECT_NEAR(both[i], 2 * single[i], 1e-12);
-}
-
-TEST(Antialias, SameBitsForAnyNumberOfWorkers) {
-  Scene<double> wide = WavyGrid(12, 7, 200, 130);
-  for (const double v : Soup(20, 8, 1, 1).positions) wide.positions.push_back(v);
-  for (std::int32_t i = 0; i < 60; ++i) wide.faces.push_back(169 + i);
-  const Scene<float> scene = AsScene<float>(wide);
-  const auto rast = Rasterize(scene).rast;
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto color = RandomNumbers<float>(4 * scene.grid().pixels(), 8);
-  const auto d_out = RandomNumbers<float>(color.size(), 9);
-  const auto input = InputOf(scene, rings, rast, color, 4);
-  std::optional<Numbers<float>> images[3];
-  for (const int count : {1, 2, 7}) {
-    const Workers workers(count);
-    Numbers<float> results[3] = {Antialiased(input, workers), Numbers<float>(color.size()),
-                                 Numbers<float>(scene.positions.size())};
-    ASSERT_TRUE(AntialiasBackward<float>(input, d_out, workers, {results[1], results[2]}).ok());
-    for (int i = 0; i < 3; ++i) {
-      if (!images[i].has_value()) images[i] = results[i];
-      EXPECT_EQ(results[i], *images[i]) << i << " " << count;
-    }
-  }
 }
 
 TEST(Antialias, RingsOfOtherFacesAreRefused) {

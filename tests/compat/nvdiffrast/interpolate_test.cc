@@ -242,28 +242,6 @@ TEST(Interpolate, FloatIsTheReferenceUpToRounding) {
   }
 }
 
-TEST(Interpolate, SameBitsForAnyNumberOfWorkers) {
-  const Scene<float> scene = AsScene<float>(WavyGrid(12, 7, 200, 130));
-  const auto rasterized = Rasterize(scene);
-  Attributes<float> attributes;
-  attributes.values = RandomNumbers<float>(scene.vertices() * 3, 8);
-  const auto input = InputOf(scene, attributes, rasterized);
-  const auto d_out = RandomNumbers<float>(scene.grid().pixels() * 3, 9);
-  const auto d_da = RandomNumbers<float>(scene.grid().pixels() * 4, 10);
-  const auto expected = Interpolated(input);
-  Numbers<float> first;
-  for (const int count : {1, 2, 7}) {
-    const Workers workers(count);
-    const auto images = Interpolated(input, workers);
-    EXPECT_EQ(images.out, expected.out);
-    EXPECT_EQ(images.out_da, expected.out_da);
-    Numbers<float> d(attributes.values.size());
-    ASSERT_TRUE(InterpolateBackward<float>(input, {d_out, d_da}, workers, {d, {}, {}}).ok());
-    if (first.empty()) first = d;
-    EXPECT_EQ(d, first) << count;
-  }
-}
-
 TEST(Interpolate, BadInputIsNamed) {
   const Scene<float> scene = AsScene<float>(WavyGrid(1, 1, 4, 4));
   auto rasterized = Rasterize(scene);

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <optional>
-
 #include "compat/nvdiffrast/test_util.h"
 #include "compat/nvdiffrast/texture_cube.h"
 #include "compat/nvdiffrast/texture_lookups.h"
@@ -341,30 +339,5 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"bias_alone", kMipLinear, TextureBoundary::kZero, false, true, 1},
                     Case{"cube_mip", kMipLinear, TextureBoundary::kCube, true, true, 1}),
     [](const auto& test) { return std::string(test.param.name); });
-
-TEST(Texture, SameBitsForAnyNumberOfWorkers) {
-  Lookups<float> lookups;
-  lookups.filter = TextureFilter::kLinearMipmapLinear;
-  lookups.channels = 3;
-  lookups.grid = {2, 150, 40};
-  lookups.Random({32, 64}, 40);
-  lookups.uv = RandomNumbers<float>(lookups.grid.pixels() * 2, 41);
-  lookups.uv_da = RandomNumbers<float>(lookups.grid.pixels() * 4, 42);
-  for (float& v : lookups.uv_da) v *= 0.1f;
-  const auto d_out = RandomNumbers<float>(lookups.grid.pixels() * 3, 43);
-  std::optional<Numbers<float>> out, d_texels;
-  for (const int count : {1, 2, 7}) {
-    const Workers workers(count);
-    const auto image = Sampled(lookups, workers);
-    std::vector<Numbers<float>> d_levels;
-    std::vector<std::span<float>> spans;
-    for (const auto& level : lookups.levels) d_levels.emplace_back(level.size());
-    for (auto& level : d_levels) spans.push_back(level);
-    SampleTextureBackward<float>(lookups.input(), d_out, workers, {spans, {}, {}, {}});
-    if (!out.has_value()) out = image, d_texels = d_levels[1];
-    EXPECT_EQ(image, *out) << count;
-    EXPECT_EQ(d_levels[1], *d_texels) << count;
-  }
-}
 
 }  // namespace tilegrad::compat::nvdiffrast::texture_test

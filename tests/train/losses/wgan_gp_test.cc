@@ -156,33 +156,4 @@ TEST_F(WganGpThroughRenderer, GeneratorStepIsDifferentiated) {
       {positions_, colors_}, [&] { return WganGeneratorLoss(critic, Draw()); }, rng_);
 }
 
-// In float, both places: the same bits for any number of workers.
-TEST(WganGpBits, AreTheSameForAnyNumberOfWorkers) {
-  std::vector<float> first;
-  for (const int count : {1, 2, 7}) {
-    const Workers workers(count);
-    nn::Context context(workers);
-    Rng rng(4);
-    nn::Critic critic(context, {.base = 16, .halvings = 3}, rng);
-    const auto images = [&] {
-      nn::Tensor t = context.Empty({5, 3, 32, 32});
-      nn::FillUniform(t, rng, 0, 1);
-      return nn::Constant(context, t);
-    };
-    const nn::Var real = images(), fake = images();
-    std::vector<float> bits;
-    for (const PenaltyPlace place : {PenaltyPlace::kRendered, PenaltyPlace::kInterpolates}) {
-      const CriticLoss loss = WganCriticLoss(critic, real, fake, {0.5, place}, rng);
-      for (const nn::Var& d : nn::Grad(loss.total, WeightsOf(critic))) {
-        const auto numbers = d.value().span<float>();
-        bits.insert(bits.end(), numbers.begin(), numbers.end());
-      }
-    }
-    ASSERT_TRUE(context.status().ok()) << context.status().message();
-    if (first.empty()) first = bits;
-    ASSERT_EQ(bits.size(), first.size());
-    EXPECT_EQ(std::memcmp(bits.data(), first.data(), bits.size() * sizeof(float)), 0) << count;
-  }
-}
-
 }  // namespace tilegrad::train::wgan_gp_test
