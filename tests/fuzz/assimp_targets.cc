@@ -35,6 +35,6 @@ std::vector<Bytes> Seeds() {
   return out;
 }
 
-const Registration kTarget({"assimp", Assimp, Seeds, nullptr, true});
+const Registration kTarget({"assimp", Assimp, Seeds, nullptr, 40});
 
 }  // namespace tilegrad::fuzz::assimp_targets

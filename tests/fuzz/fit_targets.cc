@@ -148,6 +148,6 @@ std::vector<Bytes> Seeds() {
   return out;
 }
 
-const Registration kTarget({"fit", Fit, Seeds, nullptr, true});
+const Registration kTarget({"fit", Fit, Seeds, nullptr, 2});
 
 }  // namespace tilegrad::fuzz::fit_targets

@@ -218,7 +218,7 @@ const Registration kTargets[] = {
     Registration({"bmp_tga", Decode, RawSeeds}),
     Registration({"pnm", Decode, PnmSeeds}),
     Registration({"sgi", Decode, SgiSeeds}),
-    Registration({"exr", Exr, ExrSeeds, nullptr, true}),
+    Registration({"exr", Exr, ExrSeeds, nullptr, 2}),
     Registration({"exr_from_reader", ExrFromReader, ExrFromReaderSeeds}),
 };
 

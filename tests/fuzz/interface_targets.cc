@@ -24,6 +24,6 @@ std::vector<Bytes> Seeds() {
   return out;
 }
 
-const Registration kTarget({"c_interface", Calls, Seeds, nullptr, true});
+const Registration kTarget({"c_interface", Calls, Seeds, nullptr, 2});
 
 }  // namespace tilegrad::fuzz::interface_targets

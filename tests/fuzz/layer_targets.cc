@@ -118,7 +118,7 @@ std::vector<Bytes> Seeds() {
 }
 
 const Registration kTargets[] = {
-    Registration({"convolution", Convolution, Seeds, nullptr, true}),
+    Registration({"convolution", Convolution, Seeds, nullptr, 2}),
     Registration({"texture", Texture, Seeds}),
 };
 

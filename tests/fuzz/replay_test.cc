@@ -28,14 +28,14 @@ std::vector<Path> FilesIn(const Path& folder) {
   return out;
 }
 
-// Bytes that change, go, come twice, or come from another place.
+// Bytes that change, go, come twice, or come from another place; or the end is missing.
 Bytes Mutated(Bytes bytes, Rng* rng) {
   for (std::uint64_t n = 1 + rng->Below(4); n-- > 0 && !bytes.empty();) {
     const auto at = static_cast<std::ptrdiff_t>(rng->Below(bytes.size()));
     const auto left = static_cast<std::uint64_t>(bytes.size()) - static_cast<std::uint64_t>(at);
     const auto length =
         static_cast<std::ptrdiff_t>(1 + rng->Below(std::min<std::uint64_t>(left, 8)));
-    switch (rng->Below(4)) {
+    switch (rng->Below(5)) {
       case 0:
         bytes[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(rng->Next());
         break;
@@ -44,6 +44,9 @@ Bytes Mutated(Bytes bytes, Rng* rng) {
         break;
       case 2:
         bytes.erase(bytes.begin() + at, bytes.begin() + at + length);
+        break;
+      case 3:
+        bytes.erase(bytes.begin() + at, bytes.end());
         break;
       default: {
         const Bytes part(bytes.begin() + at, bytes.begin() + at + length);
@@ -85,7 +88,7 @@ TEST_P(Replay, SeedsAndMutationsOfThem) {
   for (const Bytes& seed : seeds) {
     Feed(target, seed);
     const char* more = std::getenv("TILEGRAD_FUZZ_MUTATIONS");
-    for (int n = more != nullptr ? std::atoi(more) : target.slow ? 2 : 200; n-- > 0;) {
+    for (int n = more != nullptr ? std::atoi(more) : target.mutations; n-- > 0;) {
       Bytes bytes = Mutated(seed, &rng);
       if (target.repair != nullptr) target.repair(bytes);
       Feed(target, bytes);

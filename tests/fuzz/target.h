@@ -23,7 +23,7 @@ struct Target {
   std::vector<Bytes> (*seeds)();  // small and sound; made by our own writers where there are any
   // Mends what a mutation breaks with certainty, as checksums; null: nothing.
   void (*repair)(std::span<std::uint8_t> bytes) = nullptr;
-  bool slow = false;  // it starts processes or threads: fewer mutations in tests
+  int mutations = 200;  // of each seed in tests: few where one starts processes or threads
 };
 
 // Of all targets that are linked in, by name.

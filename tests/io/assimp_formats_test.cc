@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each format that Assimp reads for us: a sound file gives its mesh, a damaged one an error or a
-// valid mesh.
+// Each format that Assimp reads for us: a sound file gives its mesh. Damaged ones: the fuzz target
+// `assimp`.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "base/rng.h"
 #include "io/mesh_file.h"
 #include "io/mesh_readers.h"
 #include "io/mesh_samples.h"
@@ -63,89 +62,5 @@ TEST_F(AssimpFormatsTest, UnknownEndingsNameTheKnownOnes) {
   ExpectMessage(LoadMesh(Write("a.max", "x")).status(), "a.max", "\".max\"", ".glb, .gltf, .obj",
                 ".fbx", ".ms3d", ".md2");
 }
-
-// Damage as transfers, editors and people cause it: bytes change, vanish, repeat, become extreme.
-Bytes Damage(Bytes bytes, Rng& rng) {
-  const auto place = [&] { return static_cast<std::ptrdiff_t>(rng.Below(bytes.size())); };
-  for (std::uint64_t rounds = 1 + rng.Below(4); rounds > 0 && bytes.size() > 8; --rounds) {
-    const std::ptrdiff_t at = place();
-    const auto length = static_cast<std::ptrdiff_t>(
-        std::min<std::uint64_t>(1 + rng.Below(40), bytes.size() - static_cast<std::size_t>(at)));
-    const auto begin = bytes.begin() + at, end = begin + length;
-    switch (rng.Below(7)) {
-      case 0:
-        *begin = static_cast<std::uint8_t>(rng.Next());
-        break;
-      case 1:
-        *begin ^= static_cast<std::uint8_t>(1u << rng.Below(8));
-        break;
-      case 2:
-        bytes.erase(begin, end);
-        break;
-      case 3: {
-        const Bytes piece(begin, end);
-        bytes.insert(bytes.begin() + place(), piece.begin(), piece.end());
-        break;
-      }
-      case 4:
-        std::fill(begin, begin + std::min<std::ptrdiff_t>(4, length), rng.Below(2) * 255);
-        break;
-      case 5: {  // a number of a text
-        const auto digit = std::find_if(begin, bytes.end(), [](int c) { return std::isdigit(c); });
-        const std::array<std::string, 4> numbers = {"-1", "4294967295", "1e39", "99999999"};
-        const std::string& number = numbers[rng.Below(4)];
-        bytes.insert(digit, number.begin(), number.end());
-        break;
-      }
-      default:
-        bytes.resize(std::max<std::size_t>(1, rng.Below(bytes.size())));
-        break;
-    }
-  }
-  return bytes;
-}
-
-// How often each thing happened to damaged copies of the samples.
-struct Tally {
-  int meshes = 0, errors = 0, stopped = 0;  // stopped: the reader crashed or ran into a limit
-};
-
-Tally ReadDamaged(const std::vector<MeshSample>& samples, const FileSource& folder, int copies,
-                  std::uint64_t seed) {
-  GuardLimits limits;
-  limits.cpu_seconds = 1;
-  limits.memory_bytes = std::size_t{512} << 20;
-  Tally tally;
-  for (std::size_t s = 0; s < samples.size(); ++s) {
-    Rng rng(seed, s);
-    for (int i = 0; i < copies; ++i) {
-      const auto loaded =
-          ReadByAssimp(folder, samples[s].name, Damage(samples[s].bytes, rng), limits);
-      if (loaded.ok()) {  // numbers that are not finite are LoadMesh's to find
-        ++(Validate(loaded->mesh).ok() ? tally.meshes : tally.errors);
-        continue;
-      }
-      const std::string message = loaded.status().message();
-      EXPECT_NE(message.find(samples[s].name), std::string::npos) << message;
-      ++(message.find(" reader ") == std::string::npos ? tally.errors : tally.stopped);
-    }
-  }
-  return tally;
-}
-
-void DamagedFilesAreErrorsOrMeshes(const Path& folder, int copies) {
-  constexpr std::uint64_t kSeed = 20190423;
-  const auto samples = MakeMeshSamples(folder);
-  const Tally tally = ReadDamaged(samples, *OpenFolder(folder), copies, kSeed);
-  EXPECT_GT(tally.meshes, copies);
-  EXPECT_GT(tally.errors, copies);
-  testing::Test::RecordProperty("meshes", tally.meshes);
-  testing::Test::RecordProperty("errors", tally.errors);
-  testing::Test::RecordProperty("stopped", tally.stopped);
-}
-
-TEST_F(AssimpFormatsTest, DamagedFiles) { DamagedFilesAreErrorsOrMeshes(folder_, 40); }
-
-TEST_F(AssimpFormatsTest, DamagedFilesLong) { DamagedFilesAreErrorsOrMeshes(folder_, 1000); }
 
 }  // namespace tilegrad::io::assimp_formats_test

@@ -74,17 +74,6 @@ TEST_F(Exr, DamagedFilesAreErrors) {
     ASSERT_FALSE(cut.ok()) << size;
     ExpectMessage(cut.status(), "a.exr: reading an EXR image");
   }
-  for (std::size_t at = 4; at < 400; at += 7) {  // an image or an error, whatever the header says
-    Bytes bent = whole;
-    bent[at] ^= 0xff;
-    const auto image = io::DecodeExr(bent, "a.exr");
-    if (image.ok()) {
-      EXPECT_EQ(image->values.size(), image->names.size() * static_cast<std::size_t>(image->width) *
-                                          static_cast<std::size_t>(image->height));
-    } else {
-      ExpectMessage(image.status(), "a.exr");
-    }
-  }
 }
 
 // --- windows: the picture is the display window, wherever the data lies ---

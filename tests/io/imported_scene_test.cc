@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "base/rng.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::imported_scene_test {
@@ -61,19 +60,10 @@ TEST(ImportedScene, IndicesAndCountsAreChecked) {
   }
 }
 
-TEST(ImportedScene, CutAndChangedBytes) {
+TEST(ImportedScene, CutBytesAreErrors) {
   const Bytes whole = EncodeScene(Scene());
   for (std::size_t length = 0; length < whole.size(); ++length)
     EXPECT_FALSE(DecodeScene({whole.data(), length}).ok()) << length;
-  Rng rng(1);
-  int errors = 0;
-  for (int i = 0; i < 20'000; ++i) {
-    Bytes bytes = whole;
-    for (int k = 0; k < 3; ++k)
-      bytes[rng.Below(bytes.size())] = static_cast<std::uint8_t>(rng.Next());
-    errors += !DecodeScene(bytes).ok();
-  }
-  EXPECT_GT(errors, 5000);
 }
 
 }  // namespace tilegrad::io::imported_scene_test

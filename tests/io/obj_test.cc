@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
-#include "base/rng.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
@@ -122,34 +121,6 @@ TEST_F(ObjTest, DamageNamesTheLine) {
   ExpectMessage(LoadStatus(kSquare + "f 1 2 2147483648\n"), "line 5", "vertex 2147483648");
   ExpectMessage(LoadStatus(kSquare + "f 1 2 -9223372036854775808\n"), "line 5");
   ExpectMessage(LoadStatus("\xff\xfev"), "a.obj", "UTF-16");
-}
-
-// Bytes change, vanish and repeat: an error with a file's name, or a valid mesh.
-TEST_F(ObjTest, DamagedFiles) {
-  const std::string obj =
-      "mtllib m.mtl\n" + kSquare + kUvs +
-      "vn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/3/1\nusemtl b\nf -4/-4 -2/-2 \\\n-1/-1\n";
-  const std::string mtl = "newmtl a\nKd 1 0 0\nd 0.5\nnewmtl b\nmap_Kd -s 2 2 -o 1 q.png\n";
-  int meshes = 0, errors = 0;
-  for (std::uint64_t i = 0; i < 2000; ++i) {
-    Rng rng(20190423, i);
-    std::string text = i % 2 == 0 ? obj : mtl;
-    const std::size_t at = rng.Below(text.size()), length = 1 + rng.Below(6);
-    const std::string pieces = "0-9/\\#\"\n\r .e\xff";
-    if (rng.Below(3) == 0) text.erase(at, length);
-    if (rng.Below(3) == 0) text.insert(at / 2, text.substr(at, length));
-    text[rng.Below(text.size())] = pieces[rng.Below(pieces.size())];
-    Write("m.mtl", i % 2 == 0 ? mtl : text);
-    const auto loaded = LoadMesh(Write("a.obj", i % 2 == 0 ? text : obj));
-    ++(loaded.ok() ? meshes : errors);
-    if (loaded.ok()) {
-      EXPECT_TRUE(Validate(loaded->mesh).ok());
-    } else {
-      ExpectMessage(loaded.status(), i % 2 == 0 ? "a.obj" : "m.mtl");
-    }
-  }
-  EXPECT_GT(meshes, 100);
-  EXPECT_GT(errors, 100);
 }
 
 TEST_F(ObjTest, WhatIsNotReadIsAWarning) {

@@ -2,7 +2,6 @@
 // SGI images, written here byte by byte from the format's description.
 #include <gtest/gtest.h>
 
-#include "base/rng.h"
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 
@@ -162,31 +161,6 @@ TEST(Sgi, RowsThatDoNotFit) {
   ExpectMessage(with(rows, 4), "a.rgb", "longer than the picture is wide");
   ExpectMessage(with(rows, 0), "a.rgb", "shorter than the picture is wide");
   ExpectMessage(with(tables + 4 * p.Rows() + 3, 3), "a.rgb", "ends within a run");
-}
-
-// Whatever a byte becomes: a picture of the header's size or an error that names the file.
-TEST(Sgi, DamagedFiles) {
-  for (int sample_bytes : {1, 2}) {
-    const Picture p{.width = 7, .height = 5, .channels = 4, .sample_bytes = sample_bytes};
-    for (const Bytes& whole : {Plain(p), Encoded(p)}) {
-      Rng rng(19, static_cast<std::uint64_t>(sample_bytes));
-      for (int i = 0; i < 4000; ++i) {
-        Bytes file = whole;
-        for (int k = 0; k < 3; ++k) {
-          const std::uint64_t at = k == 0 ? rng.Below(12) : rng.Below(file.size());
-          file[at] = static_cast<std::uint8_t>(rng.Below(2) == 0 ? rng.Next() : rng.Below(5));
-        }
-        file[0] = 1, file[1] = 0xda;
-        const auto image = DecodeImage(file, "bad.rgb");
-        if (image.ok()) {
-          EXPECT_EQ(image->pixels.size(),
-                    static_cast<std::size_t>(image->width) * image->height * image->channels);
-        } else {
-          ExpectMessage(image.status(), "bad.rgb");
-        }
-      }
-    }
-  }
 }
 
 }  // namespace tilegrad::io::sgi_test

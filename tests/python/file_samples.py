@@ -82,12 +82,3 @@ class FolderTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="tilegrad_python_")
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
-
-    def damaged(self, name: str, content: bytes, step: int):
-        """Files that are `content` cut short, and with bytes changed, one after the other."""
-        path = self.folder / name
-        for at in range(0, len(content), step):
-            path.write_bytes(content[:at])
-            yield path
-            path.write_bytes(content[:at] + bytes([content[at] ^ 0xff]) + content[at + 1:])
-            yield path

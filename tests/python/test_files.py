@@ -177,22 +177,6 @@ class Meshes(FolderTest):
         with self.assertRaises(TypeError):
             files.load_mesh(3)
 
-    def test_damaged_files_are_errors_or_meshes(self) -> None:
-        files.save_mesh(self.folder / "whole.glb", textured_mesh())
-        content = (self.folder / "whole.glb").read_bytes()
-        self.assertGreater(self._refused(content, "bent.glb"), 30)
-        self.assertGreater(self._refused(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj"), 3)
-
-    def _refused(self, content: bytes, name: str) -> int:
-        refused = 0
-        for path in self.damaged(name, content, max(1, len(content) // 40)):
-            try:
-                self.assertGreater(len(files.load_mesh(path).faces), 0)
-            except (ValueError, MemoryError) as error:
-                self.assertIn(name, str(error))
-                refused += 1
-        return refused
-
     def test_gltf_camera(self) -> None:
         camera = files.MeshCamera("eye", np.eye(4), 0.8, 0.0, 0.1).camera(64, 48)
         self.assertAlmostEqual(float(camera.fy), 24 / np.tan(0.4), places=9)
@@ -302,20 +286,6 @@ class Images(FolderTest):
             with self.assertRaisesRegex(FileNotFoundError, name):
                 files.load_image(self.folder / name)
 
-    def test_damaged_files_are_errors_or_images(self) -> None:
-        image = np.random.default_rng(4).random((9, 9, 3), np.float32)
-        for name, error_count in (("a.png", 40), ("a.exr", 30), ("a.npy", 25)):
-            files.save_image(self.folder / ("whole_" + name), image)
-            content = (self.folder / ("whole_" + name)).read_bytes()
-            refused = 0
-            for path in self.damaged(name, content, max(1, len(content) // 40)):
-                try:
-                    files.load_image(path)
-                except (ValueError, MemoryError) as error:
-                    self.assertIn(name, str(error))
-                    refused += 1
-            self.assertGreater(refused, error_count, name)
-
 
 class Weights(FolderTest):
     ARRAYS = {"a.weight": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array(2.5),
@@ -362,19 +332,6 @@ class Weights(FolderTest):
         with self.assertRaisesRegex(ValueError, ".safetensors or .npz"):
             files.load_weights(self.folder / "w.pt")
         self.assertFalse(path.exists())
-
-    def test_damaged_files_are_errors_or_weights(self) -> None:
-        for name in ("w.safetensors", "w.npz"):
-            files.save_weights(self.folder / ("whole_" + name), self.ARRAYS)
-            content = (self.folder / ("whole_" + name)).read_bytes()
-            refused = 0
-            for path in self.damaged(name, content, max(1, len(content) // 60)):
-                try:
-                    files.load_weights(path)
-                except (ValueError, MemoryError) as error:
-                    self.assertIn(name, str(error))
-                    refused += 1
-            self.assertGreater(refused, 50, name)
 
 
 if __name__ == "__main__":
