@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which checkpoint a run goes on from when not all of them can be read: only damaged ones are
-// passed over, and nothing that may be whole is renamed.
+// Checkpoints that cannot be read and may be whole: a run stops there, and nothing is renamed.
+// Damaged ones: run_test.cc, and how runs go on, trainer_test.cc.
 #include "train/run/checkpoint.h"
 
 #include <gtest/gtest.h>
@@ -10,9 +10,6 @@
 
 #include "nn/nn.h"
 #include "support/temp_folder.h"
-#include "tiny_run.h"
-#include "train/predictor.h"
-#include "train/trainer.h"
 
 namespace tilegrad::train::checkpoint_test {
 
@@ -101,60 +98,6 @@ TEST_F(CheckpointTest, AFolderThatCannotBeListedIsNoNewRun) {
   EXPECT_EQ(LoadNewestCheckpoint(context_, folder_).status().code(), StatusCode::kNotFound);
   std::filesystem::create_symlink(folder_ / "checkpoints", folder_ / "checkpoints");
   ExpectMessage(LoadNewestCheckpoint(context_, folder_).status(), "checkpoints", "cannot list");
-}
-
-TEST_F(CheckpointTest, WhatIsDamagedIsPassedOver) {
-  const Bytes whole = ReadFile(newest_).value();
-  Bytes other = whole;
-  other.back() ^= 1;
-  const Bytes cut(whole.begin(), whole.begin() + 20);
-  for (const Bytes& bytes : {other, cut, Bytes()}) {
-    Write("checkpoints/step_00000020.safetensors", bytes);
-    const auto found = LoadNewestCheckpoint(context_, folder_);
-    ASSERT_TRUE(found.ok()) << found.status().message();
-    EXPECT_EQ(found->checkpoint.info.step, 10);
-    EXPECT_EQ(found->broken, std::vector<Path>{newest_});
-  }
-}
-
-class ResumeTest : public TempFolderTest {
- protected:
-  ResumeTest() : workers_(1), context_(workers_) {
-    EXPECT_TRUE(WriteNoiseDataset(folder_ / "data").ok());
-    job_.config = ParseConfig(kTinyConfig, "tiny").value();
-    job_.config.schedule.steps = 4;
-    job_.data = folder_ / "data", job_.run = folder_ / "run";
-    EXPECT_TRUE(Train(job_, workers_, kSilent, stop_).ok());
-    job_.existing = ExistingRun::kContinue;
-    const Path newest = ListCheckpoints(job_.run).back();
-    nn::TensorFile file = nn::ReadSafetensors(context_, newest).value();
-    file.metadata["format"] = "tilegrad-checkpoint-2";
-    EXPECT_TRUE(nn::WriteSafetensors(newest, file).ok());
-  }
-  static inline const ProgressSink kSilent = [](const Progress&) {};
-  Workers workers_;
-  nn::Context context_;
-  TrainJob job_;
-  StopFlag stop_ = false;
-};
-
-// The run, and everything that takes weights from a run's folder.
-TEST_F(ResumeTest, StopsAtAnotherVersionsCheckpoint) {
-  const Bytes log = ReadFile(job_.run / "metrics.jsonl").value();
-  std::vector<std::string> warnings;
-  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
-  ExpectMessage(Train(job_, workers_, kSilent, stop_).status(), "step_00000004", "another version");
-  EXPECT_TRUE(warnings.empty());
-  EXPECT_EQ(ReadFile(job_.run / "metrics.jsonl").value(), log);
-  EXPECT_EQ(ListCheckpoints(job_.run).size(), 2u);
-  for (const Path& path : {job_.run, ListCheckpoints(job_.run).back()}) {
-    ExpectMessage(Predictor::Load(path, workers_).status(), "step_00000004", "another version");
-  }
-  // The remedy that the message names.
-  std::filesystem::rename(ListCheckpoints(job_.run).back(), folder_ / "aside");
-  const auto outcome = Train(job_, workers_, kSilent, stop_);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
-  EXPECT_EQ(outcome->first_step, 3);
 }
 
 }  // namespace tilegrad::train::checkpoint_test

@@ -126,8 +126,6 @@ TEST_F(RunTest, Overrides) {
     ASSERT_TRUE(again.ok()) << again.status().message();
     EXPECT_EQ(again->name, config.name);
   }
-  ExpectMessage(ApplyOverrides({"schedule.step=5"}, &config), "schedule.steps");
-  ExpectMessage(ApplyOverrides({"steps=5"}, &config), "did you mean schedule.steps?");
   ExpectMessage(ApplyOverrides({"training.batches=5"}, &config), "did you mean schedule.batch?");
   ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
@@ -270,21 +268,6 @@ TEST_F(RunTest, OneWrongBitIsFoundAnywhere) {
     EXPECT_EQ(std::as_const(loaded->tensors[0].value).data<float>()[5], 3);
   }
   EXPECT_LE(harmless, 8);
-}
-
-TEST_F(RunTest, WhatIsSetAsideDoesNotPushOutWhatIsWhole) {
-  for (const std::int64_t step : {10, 20}) {
-    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, SomeTensors(context_, 0)).ok());
-  }
-  Write("checkpoints/step_00000030.safetensors", "garbage");
-  const auto found = LoadNewestCheckpoint(context_, folder_);
-  ASSERT_TRUE(found.ok());
-  SetAside(found->broken);
-  PruneCheckpoints(folder_, 1);
-  const auto files = ListCheckpoints(folder_);
-  ASSERT_EQ(files.size(), 1u);
-  EXPECT_EQ(files[0].filename(), "step_00000020.safetensors");
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "checkpoints/step_00000030.safetensors.broken"));
 }
 
 TEST_F(RunTest, OnlyFilesOfStepsAreCheckpoints) {
