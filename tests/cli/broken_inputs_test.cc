@@ -11,22 +11,19 @@
 #include "scene/shapes.h"
 #include "support/run_program.h"
 #include "support/source_dir.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::broken_inputs_test {
 
 // A tiny dataset and a run of two steps, made once for all cases.
-class BrokenInputs : public TempFolderTest {
+class BrokenInputs : public ProgramTest {
  protected:
   static void SetUpTestSuite() {
     shared_ = Path(testing::TempDir()) / ("tilegrad_cli_" + std::to_string(::getpid()));
     std::filesystem::create_directories(shared_);
-    const Outcome data = RunProgram(
-        "dataset --source procedural --per-class 2 --size 16 --views 3 --out " + Data().string());
-    ASSERT_EQ(data.exit_code, 0) << data.output;
-    const Outcome train = RunProgram("train --config " + Config() + " --data " + Data().string() +
-                                     " --out " + RunFolder().string() + kTiny);
-    ASSERT_EQ(train.exit_code, 0) << train.output;
+    ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 3 --out " +
+               Data().string());
+    ExpectDone("train --config " + Config() + " --data " + Data().string() + " --out " +
+               RunFolder().string() + kTiny);
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(shared_); }
 

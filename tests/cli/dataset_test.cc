@@ -6,7 +6,6 @@
 
 #include "io/npz.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::dataset_test {
 
@@ -15,7 +14,7 @@ constexpr int kWedge[6][3] = {{0, 0, 0}, {3, 0, 0}, {0, 5, 0}, {0, 0, 2}, {3, 0,
 constexpr const char* kFaces =
     "f 1 3 2\nf 4 5 6\nf 1 2 5\nf 1 5 4\nf 2 3 6\nf 2 6 5\nf 3 1 4\nf 3 4 6\n";
 
-class DatasetTest : public TempFolderTest {
+class DatasetTest : public ProgramTest {
  protected:
   // A folder CLASS/MODEL of the wedge, its axes where `place` puts them; and the dataset's
   // pictures of it.
@@ -31,9 +30,8 @@ class DatasetTest : public TempFolderTest {
     Write(name + "/wedge/a.obj", obj + kFaces);
     Write(name + "/wedge/b.obj", obj + kFaces);  // one to train on, one to test with
     const std::string out = (folder_ / (name + "_data")).string();
-    const Outcome made = RunProgram("dataset --source folder --input " + (folder_ / name).string() +
-                                    " --size 16 --views 3 --out " + out + " " + options);
-    EXPECT_EQ(made.exit_code, 0) << made.output;
+    ExpectDone("dataset --source folder --input " + In(name) + " --size 16 --views 3 --out " + out +
+               " " + options);
     const auto images = io::LoadNpzArray(Path(out) / "models" / "wedge" / "a.npz", "images");
     EXPECT_TRUE(images.ok()) << images.status().message();
     return images.ok() ? images->As<std::uint8_t>().value() : std::vector<std::uint8_t>();
@@ -78,7 +76,7 @@ TEST_F(DatasetTest, AnotherAxisIsAnotherDataset) {
   EXPECT_NE(wrong.output.find("--up"), std::string::npos) << wrong.output;
 }
 
-void ExpectRefused(const std::string& options, const std::string& says) {
+void ExpectError(const std::string& options, const std::string& says) {
   const Outcome made = RunProgram("dataset " + options);
   EXPECT_NE(made.exit_code, 0) << options;
   EXPECT_NE(made.output.find(says), std::string::npos) << made.output;
@@ -86,22 +84,22 @@ void ExpectRefused(const std::string& options, const std::string& says) {
 
 TEST_F(DatasetTest, SourcesThatDoNotGoTogether) {
   const std::string folder = folder_.string(), out = " --out " + folder + "/out";
-  ExpectRefused("--source planes,folder --input " + folder + out, "reads several folders");
-  ExpectRefused("--source cars,folder" + out,
-                "different ones of sweethome3d, planes, ships and cars");
-  ExpectRefused("--source cars,cars" + out, "several must be different");
-  ExpectRefused("--source thirteen,cars" + out, "different ones of sweethome3d");
-  ExpectRefused("--source thirteen --input " + folder + out, "--input");
-  ExpectRefused("--source boats" + out, "boats");
+  ExpectError("--source planes,folder --input " + folder + out, "reads several folders");
+  ExpectError("--source cars,folder" + out,
+              "different ones of sweethome3d, planes, ships and cars");
+  ExpectError("--source cars,cars" + out, "several must be different");
+  ExpectError("--source thirteen,cars" + out, "different ones of sweethome3d");
+  ExpectError("--source thirteen --input " + folder + out, "--input");
+  ExpectError("--source boats" + out, "boats");
 }
 
 TEST_F(DatasetTest, MissingPackagesAndOptionsWithoutEffect) {
   const std::string folder = folder_.string(), out = " --out " + folder + "/out";
-  ExpectRefused("--source planes --input " + folder + out, "recommends flightgear-data-ai");
-  ExpectRefused("--source ships --input " + folder + out, "recommends flightgear-data-models");
-  ExpectRefused("--source cars --input " + folder + out, "recommends torcs-data");
-  ExpectRefused("--source folder --liveries 2 --input " + folder + out, "--liveries");
-  ExpectRefused("--source planes --up z" + out, "--up");
+  ExpectError("--source planes --input " + folder + out, "recommends flightgear-data-ai");
+  ExpectError("--source ships --input " + folder + out, "recommends flightgear-data-models");
+  ExpectError("--source cars --input " + folder + out, "recommends torcs-data");
+  ExpectError("--source folder --liveries 2 --input " + folder + out, "--liveries");
+  ExpectError("--source planes --up z" + out, "--up");
 }
 
 TEST_F(DatasetTest, WhatAFolderHoldsBesidesIsNamed) {

@@ -8,12 +8,11 @@
 
 #include "base/sanitizers.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::few_threads_test {
 
 // With support/few_threads.c as the system.
-class FewThreads : public TempFolderTest {
+class FewThreads : public ProgramTest {
  protected:
   void SetUp() override {
     if (kSanitizer) GTEST_SKIP() << "LD_PRELOAD comes before the sanitizer";
@@ -46,7 +45,6 @@ class FewThreads : public TempFolderTest {
       EXPECT_EQ(got, all) << granted;
     }
   }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
 };
 
 TEST_F(FewThreads, Render) {

@@ -10,26 +10,16 @@
 #include "io/glb_writer.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::help_test {
 
 using Json = nlohmann::json;
 
-class Help : public TempFolderTest {
- protected:
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-};
-
-std::string Said(const std::string& arguments, const std::string& before = "") {
-  const Outcome outcome = RunProgram(arguments, before);
-  EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-  return outcome.output;
-}
+class Help : public ProgramTest {};
 
 // The commands, as --help lists them.
-std::vector<std::string> Commands() {
-  std::istringstream text(Said("--help"));
+std::vector<std::string> Commands(const std::string& help) {
+  std::istringstream text(help);
   std::vector<std::string> names;
   bool begun = false;
   for (std::string line; std::getline(text, line);) {
@@ -45,8 +35,8 @@ bool Has(const char* program) {
 }
 
 TEST_F(Help, IsTheSameEitherWayRound) {
-  EXPECT_EQ(Said("help fit"), Said("fit --help"));
-  EXPECT_EQ(Said("help"), Said("--help"));
+  EXPECT_EQ(ExpectDone("help fit"), ExpectDone("fit --help"));
+  EXPECT_EQ(ExpectDone("help"), ExpectDone("--help"));
   const Outcome outcome = RunProgram("help trian");
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_NE(outcome.output.find("did you mean train?"), std::string::npos) << outcome.output;
@@ -62,18 +52,19 @@ TEST_F(Help, AReaderThatHasSeenEnoughIsNoError) {
 }
 
 TEST_F(Help, PagesAndCompletionsHaveEveryCommand) {
-  const std::vector<std::string> commands = Commands();
+  const std::vector<std::string> commands = Commands(ExpectDone("--help"));
   ASSERT_GT(commands.size(), 12u);
-  Said("man --out " + In("man"));
+  ExpectDone("man --out " + In("man"));
   for (const std::string& name : commands) {
     const auto page = ReadText(folder_ / "man" / ("tilegrad-" + name + ".1"));
     ASSERT_TRUE(page.ok()) << name;
     EXPECT_EQ(page->find(".TH tilegrad\\-"), 0u) << name;
-    EXPECT_EQ(Said("man " + name), *page);
+    EXPECT_EQ(ExpectDone("man " + name), *page);
     for (const char* shell : {"bash", "zsh", "fish"})
-      EXPECT_NE(Said(std::string("completion ") + shell).find(name), std::string::npos) << name;
+      EXPECT_NE(ExpectDone(std::string("completion ") + shell).find(name), std::string::npos)
+          << name;
   }
-  EXPECT_NE(Said("man fit").find("\\fB\\-\\-threads\\fR"), std::string::npos);
+  EXPECT_NE(ExpectDone("man fit").find("\\fB\\-\\-threads\\fR"), std::string::npos);
   if (!Has("mandoc")) GTEST_SKIP() << "mandoc is not installed";
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "man")) {
     const std::string check = "mandoc -T lint -W error " + entry.path().string() + " >&2";
@@ -82,7 +73,7 @@ TEST_F(Help, PagesAndCompletionsHaveEveryCommand) {
 }
 
 TEST_F(Help, BashCompletes) {
-  ASSERT_TRUE(WriteTextAtomic(folder_ / "complete", Said("completion bash")).ok());
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "complete", ExpectDone("completion bash")).ok());
   const auto completed = [&](const std::string& line) {
     const std::string script =
         "source " + In("complete") + "; cd " + folder_.string() + "; COMP_WORDS=(" + line +
@@ -106,7 +97,8 @@ TEST_F(Help, OtherShellsReadTheirScripts) {
   for (const char* shell : {"zsh", "fish"}) {
     if (!Has(shell)) continue;
     ++shells;
-    ASSERT_TRUE(WriteTextAtomic(folder_ / shell, Said(std::string("completion ") + shell)).ok());
+    ASSERT_TRUE(
+        WriteTextAtomic(folder_ / shell, ExpectDone(std::string("completion ") + shell)).ok());
     EXPECT_EQ(std::system((std::string(shell) + " -n " + In(shell)).c_str()), 0) << shell;
   }
   if (shells == 0) GTEST_SKIP() << "neither zsh nor fish is installed";
@@ -114,9 +106,9 @@ TEST_F(Help, OtherShellsReadTheirScripts) {
 
 TEST_F(Help, ConfigurationsAreKnownByNameAnywhere) {
   const std::string in_folder = "cd " + folder_.string() + " && ";
-  const std::string quick = Said("configs quick", in_folder);
+  const std::string quick = ExpectDone("configs quick", in_folder);
   EXPECT_EQ(quick, ReadText(Path(TILEGRAD_CONFIGS) / "quick.toml").value());
-  EXPECT_NE(Said("configs").find("paper"), std::string::npos);
+  EXPECT_NE(ExpectDone("configs").find("paper"), std::string::npos);
   const Outcome wrong = RunProgram("train --config qick --data x --out y", in_folder);
   EXPECT_EQ(wrong.exit_code, 3);
   EXPECT_NE(wrong.output.find("there are best, "), std::string::npos) << wrong.output;
@@ -129,18 +121,18 @@ TEST_F(Help, ConfigurationsAreKnownByNameAnywhere) {
 TEST_F(Help, JsonIsOneObjectAndQuietSaysNothing) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
   const std::string render = "render --size 16 --force " + In("a.glb") + " --out " + In("p.png");
-  EXPECT_EQ(Said(render + " --quiet"), "");
-  const auto files = Json::parse(Said(render + " --json"))["files"];
+  EXPECT_EQ(ExpectDone(render + " --quiet"), "");
+  const auto files = Json::parse(ExpectDone(render + " --json"))["files"];
   ASSERT_EQ(files.size(), 1u);
   EXPECT_EQ(files[0], In("p.png"));
   const auto views = Json::parse(
-      Said("views " + In("a.glb") + " --views 3 --size 16 --out " + In("views") + " --json"));
+      ExpectDone("views " + In("a.glb") + " --views 3 --size 16 --out " + In("views") + " --json"));
   EXPECT_EQ(views["views"], 3);
-  const auto fit = Json::parse(
-      Said("fit " + In("views") + " --steps 2 --template-level 1 --out " + In("fit") + " --json"));
+  const auto fit = Json::parse(ExpectDone(
+      "fit " + In("views") + " --steps 2 --template-level 1 --out " + In("fit") + " --json"));
   EXPECT_EQ(fit["steps"], 2);
   EXPECT_TRUE(std::filesystem::exists(fit["mesh"].get<std::string>()));
-  EXPECT_EQ(Json::parse(Said("info --json"))["target"].is_string(), true);
+  EXPECT_EQ(Json::parse(ExpectDone("info --json"))["target"].is_string(), true);
   // Errors stay sentences on the other stream.
   const Outcome wrong = RunProgram("render --json " + In("none.glb"), "");
   EXPECT_EQ(wrong.exit_code, 3);

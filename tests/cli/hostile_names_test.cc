@@ -4,13 +4,12 @@
 
 #include "support/run_program.h"
 #include "support/source_dir.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::hostile_names_test {
 
 constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n";
 
-class HostileNames : public TempFolderTest {
+class HostileNames : public ProgramTest {
  protected:
   std::string Quoted(const std::string& name) const {
     return "'" + (folder_ / name).string() + "'";
@@ -42,10 +41,8 @@ TEST_F(HostileNames, AreShownOnTheTerminalNotObeyed) {
 TEST_F(HostileNames, AreTextInMarkdownAndOneFieldInCsv) {
   const std::string name = "<img src=x onerror=alert(1)>, |a| [b](c).obj";
   Write(name, kTriangle);
-  const Outcome outcome =
-      RunProgram("tradeoff " + Quoted(name) + " --size 16 --repetitions 1 --out " + Quoted("out") +
-                 " --errors 0.1 --deltas 0.01");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ExpectDone("tradeoff " + Quoted(name) + " --size 16 --repetitions 1 --out " + Quoted("out") +
+             " --errors 0.1 --deltas 0.01");
   const std::string text = ReadText(folder_ / "out/tradeoff.md").value();
   EXPECT_EQ(text.find("<img"), std::string::npos) << text;
   EXPECT_NE(text.find("&lt;img src=x onerror=alert(1)&gt;, \\|a\\| \\[b\\](c)"), std::string::npos)

@@ -10,15 +10,8 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::info_test {
-
-std::string Info() {
-  const Outcome outcome = RunProgram("info");
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  return outcome.output;
-}
 
 // The rest of the line behind `start`.
 std::string LineBehind(const std::string& text, const std::string& start) {
@@ -28,32 +21,30 @@ std::string LineBehind(const std::string& text, const std::string& start) {
   return text.substr(from + start.size(), text.find('\n', from) - from - start.size());
 }
 
-TEST(InfoCommand, TakesTheBestTargetUnlessOneIsForced) {
+class InfoCommand : public ProgramTest {
+ protected:
+  nlohmann::json Described(const std::string& files) const {
+    return nlohmann::json::parse(ExpectDone("info --json " + files));
+  }
+};
+
+TEST_F(InfoCommand, TakesTheBestTargetUnlessOneIsForced) {
   ::unsetenv("TILEGRAD_TARGET");
-  std::istringstream targets(LineBehind(Info(), "best first: "));
+  std::istringstream targets(LineBehind(ExpectDone("info"), "best first: "));
   std::string best;
   targets >> best;
   std::string target = best;
-  EXPECT_EQ(LineBehind(Info(), "in use: ").rfind(best + " (the best", 0), 0u) << Info();
+  EXPECT_EQ(LineBehind(ExpectDone("info"), "in use: ").rfind(best + " (the best", 0), 0u)
+      << ExpectDone("info");
   while (targets >> target) {
     ::setenv("TILEGRAD_TARGET", target.c_str(), 1);
-    EXPECT_EQ(LineBehind(Info(), "in use: "), target + " (forced by TILEGRAD_TARGET)");
+    EXPECT_EQ(LineBehind(ExpectDone("info"), "in use: "), target + " (forced by TILEGRAD_TARGET)");
   }
   EXPECT_EQ(target, RunnableTargets().back());
   ::unsetenv("TILEGRAD_TARGET");
 }
 
-class InfoOfMeshes : public TempFolderTest {
- protected:
-  nlohmann::json Described(const std::string& files) const {
-    const Outcome outcome = RunProgram("info --json " + files);
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-    return nlohmann::json::parse(outcome.output);
-  }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-};
-
-TEST_F(InfoOfMeshes, SaysWhatAFileHolds) {
+TEST_F(InfoCommand, SaysWhatAFileHolds) {
   ASSERT_TRUE(io::SavePng(folder_ / "wood.png", ImageU8(4, 2, 3)).ok());
   Write("wood.mtl", std::string("newmtl wood\nmap_Kd wood.png\nnewmtl steel\nKd 1 1 1\n"));
   Write("a.obj", std::string("mtllib wood.mtl\nv 10 0 0\nv 12 0 0\nv 10 1 0\nv 10 0 -3\n"
@@ -79,7 +70,7 @@ TEST_F(InfoOfMeshes, SaysWhatAFileHolds) {
 
 // By place: a cube whose sides have vertices of their own, as normals ask for, is closed. One face
 // less, or one more, is not.
-TEST_F(InfoOfMeshes, KnowsWhatIsWatertight) {
+TEST_F(InfoCommand, KnowsWhatIsWatertight) {
   const Mesh box = Box({0, 0, 0}, {1, 1, 1});
   Mesh torn = box;
   torn.positions.clear(), torn.faces.clear();

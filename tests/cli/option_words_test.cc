@@ -6,25 +6,14 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::option_words_test {
 
-class OptionWords : public TempFolderTest {
+class OptionWords : public ProgramTest {
  protected:
   void SetUp() override {
     ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
     ASSERT_TRUE(io::SaveGlb(folder_ / "b.glb", Box({0, 0, 0}, {1, 1, 1})).ok());
-  }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-  void ExpectDone(const std::string& arguments) const {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-  }
-  void ExpectRefused(const std::string& arguments, int code, const std::string& part) const {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
-    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
   }
   Bytes Picture(const std::string& arguments) const {
     ExpectDone("render --size 16 " + arguments + " --out " + In("p.png") + " --force");

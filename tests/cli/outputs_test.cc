@@ -7,11 +7,10 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::outputs_test {
 
-class Outputs : public TempFolderTest {
+class Outputs : public ProgramTest {
  protected:
   void SetUp() override {
     // fuze.obj, its material and its texture, all of one stem.
@@ -20,18 +19,12 @@ class Outputs : public TempFolderTest {
     Write("fuze.obj", std::string("mtllib fuze.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
                                   "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
   }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   // In the folder, as RunProgram starts the program where the test is.
   Outcome Run(const std::string& arguments) const {
-    const Path before = std::filesystem::current_path();
-    std::filesystem::current_path(folder_);
-    const Outcome outcome = RunProgram(arguments);
-    std::filesystem::current_path(before);
-    return outcome;
+    return RunProgram(arguments, "cd '" + folder_.string() + "' && ");
   }
   void ExpectDone(const std::string& arguments) const {
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    ProgramTest::ExpectDone(arguments, "cd '" + folder_.string() + "' && ");
   }
   // ... and `file` is what it was.
   void ExpectKept(const std::string& file, const std::string& arguments,
@@ -42,7 +35,6 @@ class Outputs : public TempFolderTest {
     EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
     EXPECT_EQ(ReadText(folder_ / file).value(), before) << arguments;
   }
-  bool Exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
 };
 
 TEST_F(Outputs, DefaultNamesCannotBeThoseOfTextures) {

@@ -5,20 +5,11 @@
 
 #include "io/image_file.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 #include "train/data/photographs/miniature.h"
 
 namespace tilegrad::photographs_test {
 
-class Photographs : public TempFolderTest {
- protected:
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-  std::string ExpectDone(const std::string& arguments) const {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    return outcome.output;
-  }
-};
+class Photographs : public ProgramTest {};
 
 constexpr const char* kSmall =
     " --set schedule.steps=3 --set schedule.batch=2 --set network.base=4 --set network.most=8"

@@ -9,11 +9,10 @@
 #include "fit/refine.h"
 #include "io/image_file.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::predict_test {
 
-class Predict : public TempFolderTest {
+class Predict : public ProgramTest {
  protected:
   void SetUp() override {
     ExpectDone("dataset --source procedural --per-class 6 --size 16 --views 4 --out " + In("d"));
@@ -32,12 +31,6 @@ class Predict : public TempFolderTest {
       }
     }
     ASSERT_TRUE(io::SavePng(folder_ / "text.png", stripes).ok());
-  }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-  std::string ExpectDone(const std::string& arguments) const {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    return outcome.output;
   }
   // What stands behind warnings, and progress where the machine is slow.
   static nlohmann::json JsonOf(const std::string& output) {

@@ -11,31 +11,25 @@
 #include "io/npz.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::render_test {
 
-class Render : public TempFolderTest {
+class Render : public ProgramTest {
  protected:
   void SetUp() override {
     Mesh sphere = Icosphere(2, 1);
     SetColor(sphere, {1, 0, 0, 1});
     ASSERT_TRUE(io::SaveGlb(folder_ / "ball.glb", sphere).ok());
   }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   Outcome Run(const std::string& arguments) const {
     return RunProgram("render " + In("ball.glb") + " " + arguments);
   }
   void ExpectDone(const std::string& arguments) {
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    ProgramTest::ExpectDone("render " + In("ball.glb") + " " + arguments);
   }
   void ExpectRefused(const std::string& arguments, int code, const std::string& part) {
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
-    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+    ProgramTest::ExpectRefused("render " + In("ball.glb") + " " + arguments, code, part);
   }
-  bool Exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
   std::vector<float> Floats(const std::string& name) const {
     return io::LoadNpy(folder_ / name).value().As<float>().value();
   }
@@ -59,8 +53,7 @@ void WriteNearAndFar(const Path& folder, const Mesh& mesh) {
 class RenderFar : public Render {
  protected:
   std::vector<std::uint8_t> Picture(const std::string& arguments, const std::string& name) const {
-    const Outcome outcome = RunProgram("render " + arguments + " --out " + In(name));
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    ProgramTest::ExpectDone("render " + arguments + " --out " + In(name));
     return io::LoadImage(folder_ / name).value().pixels;
   }
   // Digits of 5e-7 move edges by less than 1e-4 pixels.
@@ -182,9 +175,8 @@ TEST_F(Render, MeshesWithAnotherAxisUp) {
   bar("x.glb", {1, 0.1f, 0.2f});
   const auto picture = [&](const std::string& mesh, const std::string& options) {
     const std::string out = In(mesh + "_" + std::to_string(options.size()) + ".png");
-    const Outcome outcome = RunProgram("render " + In(mesh + ".glb") + " --size 32 --force " +
-                                       options + " --out " + out);
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    ProgramTest::ExpectDone("render " + In(mesh + ".glb") + " --size 32 --force " + options +
+                            " --out " + out);
     return io::LoadImage(out).value();
   };
   const ImageU8 upright = picture("y", "");

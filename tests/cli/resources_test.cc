@@ -16,11 +16,10 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::resources_test {
 
-class Resources : public TempFolderTest {
+class Resources : public ProgramTest {
  protected:
   // Three models with side files, of readers in this process and in one of their own.
   void WriteModels() {
@@ -83,7 +82,7 @@ TEST_F(Resources, LittleMemoryIsNoDamage) {
 }
 
 // A mesh whose reader takes seconds.
-class Signals : public TempFolderTest {
+class Signals : public ProgramTest {
  protected:
   static std::size_t ResidentBytes(pid_t process) {
     std::ifstream file("/proc/" + std::to_string(process) + "/statm");

@@ -7,26 +7,19 @@
 #include "io/glb_writer.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::runs_test {
 
 using Json = nlohmann::json;
 
-class Runs : public TempFolderTest {
+class Runs : public ProgramTest {
  protected:
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   // Under --json, what it says.
   Json Done(const std::string& arguments) const {
     const Outcome outcome = RunProgram(arguments + " --json");
     EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
     const auto begin = outcome.output.find('{');
     return begin == std::string::npos ? Json() : Json::parse(outcome.output.substr(begin));
-  }
-  void ExpectRefused(const std::string& arguments, int code, const std::string& part) const {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
-    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
   }
   Bytes Checkpoint(const std::string& run, const std::string& step) const {
     return ReadFile(folder_ / run / "checkpoints" / ("step_" + step + ".safetensors")).value();

@@ -7,7 +7,6 @@
 
 #include "io/mesh_file.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::sample_test {
 
@@ -54,7 +53,7 @@ batch = 2
 )";
 
 // One run for all tests.
-class Sample : public TempFolderTest {
+class Sample : public ProgramTest {
  protected:
   static void SetUpTestSuite() {
     runs_ = Path(testing::TempDir()) / ("tilegrad_sample_runs_" + std::to_string(::getpid()));
@@ -70,12 +69,6 @@ class Sample : public TempFolderTest {
   static void TearDownTestSuite() { std::filesystem::remove_all(runs_); }
 
   static std::string Run(const std::string& name) { return (runs_ / name).string(); }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-  static std::string ExpectDone(const std::string& arguments) {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    return outcome.output;
-  }
   void ExpectRefused(const std::string& arguments, const std::string& part) const {
     const Outcome outcome = RunProgram(arguments);
     EXPECT_NE(outcome.exit_code, 0) << arguments;

@@ -9,22 +9,18 @@
 #include "io/glb_writer.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::terminal_test {
 
 // A machine that does other work, too, takes its time.
 constexpr double kSoon = 2;
 
-class TerminalTest : public TempFolderTest {
+class TerminalTest : public ProgramTest {
  protected:
   void SetUp() override {
     ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Box({0, 0, 0}, {1, 0.6f, 0.8f})).ok());
-    const Outcome made =
-        RunProgram("views " + In("a.glb") + " --views 8 --size 64 --out " + In("v"));
-    ASSERT_EQ(made.exit_code, 0) << made.output;
+    ExpectDone("views " + In("a.glb") + " --views 8 --size 64 --out " + In("v"));
   }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
 };
 
 std::size_t Longest(const std::vector<std::string>& lines, const std::string& begin) {

@@ -8,11 +8,10 @@
 
 #include "support/run_program.h"
 #include "support/source_dir.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::tradeoff_test {
 
-class TradeoffCommand : public TempFolderTest {
+class TradeoffCommand : public ProgramTest {
  protected:
   Outcome Run(const std::string& arguments) {
     return RunProgram("tradeoff --out " + (folder_ / "out").string() + " " + arguments);
@@ -64,9 +63,7 @@ TEST_F(TradeoffCommand, MeasuresAMeshFileAndWritesTableCsvAndPicture) {
 TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
   Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
   const std::string data = (folder_ / "data").string();
-  const Outcome made =
-      RunProgram("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
-  ASSERT_EQ(made.exit_code, 0) << made.output;
+  ExpectDone("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
   const Outcome outcome = Run(
       (folder_ / "tent.obj").string() +
       " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " + data +
@@ -100,9 +97,7 @@ TEST_F(TradeoffCommand, TrainingsWarnOfBrokenCheckpoints) {
   ASSERT_NE(config->find(every), std::string::npos);
   Write("often.toml", config->replace(config->find(every), every.size() + 3, every + "1"));
   const std::string data = (folder_ / "data").string();
-  const Outcome made =
-      RunProgram("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
-  ASSERT_EQ(made.exit_code, 0) << made.output;
+  ExpectDone("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
   const std::string study = (folder_ / "tent.obj").string() +
                             " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " +
                             data + " --training-errors 1e-2 --steps 2 --config " +
