@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <map>
 #include <string>
 
 #include "base/file.h"
@@ -39,6 +40,17 @@ class TempFolderTest : public testing::Test {
   }
   Path Write(const std::string& name, const Bytes& bytes) const {
     return Write(name, std::string(bytes.begin(), bytes.end()));
+  }
+
+  // Relative path -> bytes, of all files below `folder`.
+  static std::map<std::string, Bytes> Contents(const Path& folder) {
+    std::map<std::string, Bytes> out;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      if (!entry.is_regular_file()) continue;
+      out[std::filesystem::relative(entry.path(), folder).string()] =
+          ReadFile(entry.path()).value();
+    }
+    return out;
   }
 
   Path folder_;

@@ -3,31 +3,30 @@
 #include <gtest/gtest.h>
 
 #include "io/npz.h"
+#include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/data/temp_folder.h"
 
 namespace tilegrad::train::index_test {
 
-class IndexTest : public FolderTest {
+class IndexTest : public TempFolderTest {
  protected:
   void SetUp() override {
-    FolderTest::SetUp();
     BuildOptions options;
     options.image_size = 8;
     options.views = 1;
     const StopFlag stop = false;
-    ASSERT_TRUE(BuildDataset(*ProceduralSource(1, 0), options, root_, Workers(1), {}, stop).ok());
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(1, 0), options, folder_, Workers(1), {}, stop).ok());
   }
 
   // Replaces the first `from` in a file of the dataset.
   void Edit(const char* file, const std::string& from, const std::string& to) {
-    std::string text = ReadText(root_ / file).value();
+    std::string text = ReadText(folder_ / file).value();
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
-    ASSERT_TRUE(WriteTextAtomic(root_ / file, text.replace(at, from.size(), to)).ok());
+    ASSERT_TRUE(WriteTextAtomic(folder_ / file, text.replace(at, from.size(), to)).ok());
   }
   void ExpectOpenError(const std::vector<std::string>& words) {
-    const auto dataset = Dataset::Open(root_);
+    const auto dataset = Dataset::Open(folder_);
     ASSERT_FALSE(dataset.ok());
     for (const auto& word : words) {
       EXPECT_NE(dataset.status().message().find(word), std::string::npos)
@@ -36,16 +35,16 @@ class IndexTest : public FolderTest {
   }
 };
 
-TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(root_).ok()); }
+TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(folder_).ok()); }
 
 // Datasets of before have none; a shape of its own is written nowhere.
 TEST_F(IndexTest, ShapesAreOptional) {
-  auto models = ReadModels(root_, ReadDatasetInfo(root_).value()).value();
-  EXPECT_EQ(ReadText(ModelsPath(root_)).value().find("shape"), std::string::npos);
+  auto models = ReadModels(folder_, ReadDatasetInfo(folder_).value()).value();
+  EXPECT_EQ(ReadText(ModelsPath(folder_)).value().find("shape"), std::string::npos);
   EXPECT_EQ(CountShapes(models), models.size());
   models[1].shape = "one";
-  ASSERT_TRUE(WriteModels(root_, ReadDatasetInfo(root_).value(), models).ok());
-  const auto again = Dataset::Open(root_).value();
+  ASSERT_TRUE(WriteModels(folder_, ReadDatasetInfo(folder_).value(), models).ok());
+  const auto again = Dataset::Open(folder_).value();
   EXPECT_EQ(again.models()[1].shape, "one");
   EXPECT_EQ(again.models()[0].shape, "");
   Edit("models.jsonl", "\"shape\":\"one\"", "\"shape\":1");
@@ -53,7 +52,7 @@ TEST_F(IndexTest, ShapesAreOptional) {
 }
 
 TEST_F(IndexTest, MissingFolder) {
-  const auto dataset = Dataset::Open(root_ / "no");
+  const auto dataset = Dataset::Open(folder_ / "no");
   EXPECT_EQ(dataset.status().code(), StatusCode::kNotFound);
 }
 
@@ -80,12 +79,12 @@ TEST_F(IndexTest, MissingCamera) {
 }
 
 TEST_F(IndexTest, CamerasThatCannotBe) {
-  std::string before = ReadText(root_ / "dataset.json").value();
+  std::string before = ReadText(folder_ / "dataset.json").value();
   const auto expect = [&](const std::string& key, const std::string& value) {
     const auto at = before.find("\"" + key + "\": ") + key.size() + 4;
     ASSERT_NE(before.find(key), std::string::npos);
     std::string text = before;
-    ASSERT_TRUE(WriteTextAtomic(root_ / "dataset.json",
+    ASSERT_TRUE(WriteTextAtomic(folder_ / "dataset.json",
                                 text.replace(at, text.find_first_of(",\n", at) - at, value))
                     .ok());
     ExpectOpenError({"dataset.json", "\"camera\"", "\"" + key + "\" is " + value});
@@ -122,25 +121,25 @@ TEST_F(IndexTest, ValuesNestedDeeply) {
 }
 
 TEST_F(IndexTest, ALineCutByACrash) {
-  std::string text = ReadText(root_ / "models.jsonl").value();
+  std::string text = ReadText(folder_ / "models.jsonl").value();
   text.resize(text.size() - 20);
-  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", text).ok());
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "models.jsonl", text).ok());
   ExpectOpenError({"models.jsonl", "line 5"});
 }
 
 TEST_F(IndexTest, TheSameIdTwice) {
-  const std::string text = ReadText(root_ / "models.jsonl").value();
-  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", text + text).ok());
+  const std::string text = ReadText(folder_ / "models.jsonl").value();
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "models.jsonl", text + text).ok());
   ExpectOpenError({"models.jsonl", "line 6", "twice"});
 }
 
 TEST_F(IndexTest, NoModels) {
-  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", "").ok());
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "models.jsonl", "").ok());
   ExpectOpenError({"models.jsonl", "no models"});
 }
 
 TEST_F(IndexTest, ModelFilesThatAreNotWhatTheyShould) {
-  const auto dataset = Dataset::Open(root_);
+  const auto dataset = Dataset::Open(folder_);
   ASSERT_TRUE(dataset.ok());
   const Path file = dataset->ModelPath(0);
   const auto arrays = io::LoadNpz(file).value();

@@ -3,33 +3,32 @@
 #include <gtest/gtest.h>
 
 #include "scene/shapes.h"
+#include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/data/temp_folder.h"
 #include "train/eval/evaluate.h"
 
 namespace tilegrad::train::evaluate_shapes_test {
 
-class EvaluateShapesTest : public FolderTest {
+class EvaluateShapesTest : public TempFolderTest {
  protected:
   void SetUp() override {
-    FolderTest::SetUp();
     BuildOptions options;
     options.image_size = 8, options.views = 1;
     const StopFlag stop = false;
-    ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, root_, Workers(1), {}, stop).ok());
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, folder_, Workers(1), {}, stop).ok());
   }
 
   // Of each class: models 0 and 1 to train on, 2 to 5 to test with, of which 2, 3 and 4 are
   // `shape`.
   Dataset WithShape(const std::string& shape) const {
-    Dataset before = Dataset::Open(root_).value();
+    Dataset before = Dataset::Open(folder_).value();
     std::vector<ModelInfo> models = before.models();
     for (std::size_t m = 0; m < models.size(); ++m) {
       models[m].split = m % 6 < 2 ? Split::kTrain : Split::kTest;
       if (m % 6 >= 2 && m % 6 < 5) models[m].shape = shape;
     }
-    EXPECT_TRUE(WriteModels(root_, before.info(), models).ok());
-    return Dataset::Open(root_).value();
+    EXPECT_TRUE(WriteModels(folder_, before.info(), models).ok());
+    return Dataset::Open(folder_).value();
   }
 
   // Predicts a ball, then ever flatter boxes, so that scores differ.

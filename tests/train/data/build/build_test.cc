@@ -11,7 +11,7 @@
 #include "base/folder_lock.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
-#include "train/data/temp_folder.h"
+#include "support/temp_folder.h"
 
 namespace tilegrad::train::build_test {
 
@@ -22,7 +22,7 @@ BuildOptions SmallOptions() {
   return options;
 }
 
-class BuildTest : public FolderTest {
+class BuildTest : public TempFolderTest {
  protected:
   Result<BuildSummary> Build(const ModelSource& source, const Path& folder, int workers = 1,
                              const ProgressSink& progress = {}) {
@@ -35,12 +35,12 @@ class BuildTest : public FolderTest {
 
 TEST_F(BuildTest, ProceduralSetEndToEnd) {
   const auto source = ProceduralSource(4, 1);
-  const auto summary = Build(*source, root_ / "set", 2);
+  const auto summary = Build(*source, folder_ / "set", 2);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   EXPECT_EQ(summary->models.size(), 20u);
   EXPECT_TRUE(summary->rejected.empty());
 
-  const auto dataset = Dataset::Open(root_ / "set");
+  const auto dataset = Dataset::Open(folder_ / "set");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();
   EXPECT_EQ(dataset->info().classes,
             (std::vector<std::string>{"car", "chair", "lamp", "plane", "table"}));
@@ -60,15 +60,15 @@ TEST_F(BuildTest, ProceduralSetEndToEnd) {
     EXPECT_NEAR(reach, 0.45f, 1e-6f);  // one rounding of the scale and one of the shift
     EXPECT_LE(data->mesh.faces.size(), static_cast<std::size_t>(kTruthFaces));
   }
-  const auto sheet = io::LoadImage(root_ / "set" / "contact_sheet.png");
+  const auto sheet = io::LoadImage(folder_ / "set" / "contact_sheet.png");
   ASSERT_TRUE(sheet.ok());
   EXPECT_GT(sheet->width, 6 * 3 * 16);
 }
 
 TEST_F(BuildTest, RgbIsPremultiplied) {
   const auto source = ProceduralSource(2, 5);
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
-  const auto images = Dataset::Open(root_ / "set")->LoadImages(0).value();
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+  const auto images = Dataset::Open(folder_ / "set")->LoadImages(0).value();
   constexpr std::size_t kPlane = 16 * 16;
   int partial = 0;
   for (std::size_t view = 0; view < 3; ++view) {
@@ -84,81 +84,81 @@ TEST_F(BuildTest, RgbIsPremultiplied) {
 
 TEST_F(BuildTest, WorkersDoNotChangeAByte) {
   const auto source = ProceduralSource(2, 3);
-  ASSERT_TRUE(Build(*source, root_ / "one", 1).ok());
-  ASSERT_TRUE(Build(*source, root_ / "two", 2).ok());
-  ASSERT_TRUE(Build(*source, root_ / "seven", 7).ok());
-  const auto one = Contents(root_ / "one");
+  ASSERT_TRUE(Build(*source, folder_ / "one", 1).ok());
+  ASSERT_TRUE(Build(*source, folder_ / "two", 2).ok());
+  ASSERT_TRUE(Build(*source, folder_ / "seven", 7).ok());
+  const auto one = Contents(folder_ / "one");
   EXPECT_EQ(one.size(), 10u + 4u);  // models; dataset.json, two lists, the sheet
-  EXPECT_EQ(one, Contents(root_ / "two"));
-  EXPECT_EQ(one, Contents(root_ / "seven"));
+  EXPECT_EQ(one, Contents(folder_ / "two"));
+  EXPECT_EQ(one, Contents(folder_ / "seven"));
 }
 
 TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
   const auto source = ProceduralSource(2, 3);
-  ASSERT_TRUE(Build(*source, root_ / "whole").ok());
+  ASSERT_TRUE(Build(*source, folder_ / "whole").ok());
   const auto stop_after_four = [&](const Progress& p) {
     if (p.stage == "rendering" && p.done == 4) stop_ = true;
   };
-  const auto stopped = Build(*source, root_ / "parts", 1, stop_after_four);
+  const auto stopped = Build(*source, folder_ / "parts", 1, stop_after_four);
   ASSERT_FALSE(stopped.ok());
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
-  const auto incomplete = Dataset::Open(root_ / "parts");
+  const auto incomplete = Dataset::Open(folder_ / "parts");
   ASSERT_FALSE(incomplete.ok());
   EXPECT_NE(incomplete.status().message().find("not complete"), std::string::npos);
 
   stop_ = false;
-  const auto resumed = Build(*source, root_ / "parts");
+  const auto resumed = Build(*source, folder_ / "parts");
   ASSERT_TRUE(resumed.ok()) << resumed.status().message();
   EXPECT_EQ(resumed->reused, 4);
-  EXPECT_EQ(Contents(root_ / "whole"), Contents(root_ / "parts"));
-  EXPECT_EQ(Build(*source, root_ / "parts")->reused, 10);
+  EXPECT_EQ(Contents(folder_ / "whole"), Contents(folder_ / "parts"));
+  EXPECT_EQ(Build(*source, folder_ / "parts")->reused, 10);
 }
 
 TEST_F(BuildTest, HalfWrittenFilesOfAKilledCommandGo) {
   const auto source = ProceduralSource(1, 3);
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
-  const auto whole = Contents(root_ / "set");
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+  const auto whole = Contents(folder_ / "set");
   for (const char* name : {"models/lamp/lamp-00000.npz", "models.jsonl"}) {
-    ASSERT_TRUE(WriteTextAtomic(root_ / "set" / (std::string(name) + ".4194305.tmp"), "x").ok());
+    ASSERT_TRUE(WriteTextAtomic(folder_ / "set" / (std::string(name) + ".4194305.tmp"), "x").ok());
   }
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
-  EXPECT_EQ(Contents(root_ / "set"), whole);
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+  EXPECT_EQ(Contents(folder_ / "set"), whole);
 }
 
 TEST_F(BuildTest, OneProcessAtATime) {
   const auto source = ProceduralSource(1, 3);
   {
-    const auto lock = FolderLock::Take(root_ / "set");
+    const auto lock = FolderLock::Take(folder_ / "set");
     ASSERT_TRUE(lock.ok());
-    const auto refused = Build(*source, root_ / "set");
+    const auto refused = Build(*source, folder_ / "set");
     ASSERT_FALSE(refused.ok());
     EXPECT_NE(refused.status().message().find("another process"), std::string::npos);
-    EXPECT_FALSE(std::filesystem::exists(root_ / "set" / "dataset.json"));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "set" / "dataset.json"));
   }
-  EXPECT_TRUE(Build(*source, root_ / "set").ok());
+  EXPECT_TRUE(Build(*source, folder_ / "set").ok());
 }
 
 TEST_F(BuildTest, StoppedWithOtherClassesTheIndexStillFits) {
   const auto source = ProceduralSource(2, 1);
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
   options_.limit = 2;
   stop_ = true;
-  ASSERT_EQ(Build(*source, root_ / "set").status().code(), StatusCode::kCancelled);
-  const auto dataset = Dataset::Open(root_ / "set");
+  ASSERT_EQ(Build(*source, folder_ / "set").status().code(), StatusCode::kCancelled);
+  const auto dataset = Dataset::Open(folder_ / "set");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();
   EXPECT_EQ(dataset->models().size(), 10u);
 }
 
 TEST_F(BuildTest, BrokenModelFilesAreMadeAgain) {
   const auto source = ProceduralSource(1, 3);
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
-  const auto whole = Contents(root_ / "set");
-  const Path file = root_ / "set" / "models" / "lamp" / "lamp-00000.npz";
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+  const auto whole = Contents(folder_ / "set");
+  const Path file = folder_ / "set" / "models" / "lamp" / "lamp-00000.npz";
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  const auto again = Build(*source, root_ / "set");
+  const auto again = Build(*source, folder_ / "set");
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(again->reused, 4);
-  EXPECT_EQ(Contents(root_ / "set"), whole);
+  EXPECT_EQ(Contents(folder_ / "set"), whole);
 }
 
 // What cannot be opened may be whole: it is neither made again nor taken for missing.
@@ -166,11 +166,11 @@ TEST_F(BuildTest, FilesThatTheSystemDoesNotGiveStopIt) {
   const auto source = ProceduralSource(1, 3);
   for (const char* name : {"models/lamp/lamp-00000.npz", "dataset.json"}) {
     SCOPED_TRACE(name);
-    ASSERT_TRUE(Build(*source, root_ / "set").ok());
-    const Path file = root_ / "set" / name;
+    ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+    const Path file = folder_ / "set" / name;
     std::filesystem::remove(file);
     std::filesystem::create_symlink(file, file);  // also stops root, unlike permissions
-    const Status status = Build(*source, root_ / "set").status();
+    const Status status = Build(*source, folder_ / "set").status();
     EXPECT_EQ(status.code(), StatusCode::kIo) << status.message();
     EXPECT_NE(status.message().find(file.string()), std::string::npos) << status.message();
     EXPECT_TRUE(std::filesystem::is_symlink(file));
@@ -180,33 +180,33 @@ TEST_F(BuildTest, FilesThatTheSystemDoesNotGiveStopIt) {
 
 TEST_F(BuildTest, OtherSettingsDoNotOverwrite) {
   const auto source = ProceduralSource(1, 3);
-  ASSERT_TRUE(Build(*source, root_ / "set").ok());
-  const auto whole = Contents(root_ / "set");
+  ASSERT_TRUE(Build(*source, folder_ / "set").ok());
+  const auto whole = Contents(folder_ / "set");
   options_.image_size = 32;
-  const auto other = Build(*source, root_ / "set");
+  const auto other = Build(*source, folder_ / "set");
   ASSERT_FALSE(other.ok());
   EXPECT_EQ(other.status().code(), StatusCode::kInvalidArgument);
-  EXPECT_EQ(Build(*ProceduralSource(1, 4), root_ / "set").status().code(),
+  EXPECT_EQ(Build(*ProceduralSource(1, 4), folder_ / "set").status().code(),
             StatusCode::kInvalidArgument);
-  EXPECT_EQ(Contents(root_ / "set"), whole);
+  EXPECT_EQ(Contents(folder_ / "set"), whole);
 }
 
 TEST_F(BuildTest, PerClassAndLimitChoose) {
   const auto source = ProceduralSource(6, 3);
   options_.per_class = 2;
-  EXPECT_EQ(Build(*source, root_ / "a")->models.size(), 10u);
+  EXPECT_EQ(Build(*source, folder_ / "a")->models.size(), 10u);
   options_.limit = 7;
-  EXPECT_EQ(Build(*source, root_ / "b")->models.size(), 7u);
+  EXPECT_EQ(Build(*source, folder_ / "b")->models.size(), 7u);
 }
 
 TEST_F(BuildTest, OptionsOutOfRangeAreErrors) {
   const auto source = ProceduralSource(1, 3);
   options_.views = 0;
-  EXPECT_EQ(Build(*source, root_ / "a").status().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(Build(*source, folder_ / "a").status().code(), StatusCode::kInvalidArgument);
   options_ = SmallOptions();
   options_.split.test_share = std::nan("");
-  EXPECT_EQ(Build(*source, root_ / "a").status().code(), StatusCode::kInvalidArgument);
-  EXPECT_FALSE(std::filesystem::exists(root_ / "a"));
+  EXPECT_EQ(Build(*source, folder_ / "a").status().code(), StatusCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a"));
 }
 
 // A sphere, the same in red, and three that cannot be used.
@@ -239,12 +239,12 @@ class MixedSource : public ModelSource {
 };
 
 TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
-  const auto summary = Build(MixedSource(), root_ / "set", 2);
+  const auto summary = Build(MixedSource(), folder_ / "set", 2);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   EXPECT_EQ(summary->models.size(), 2u);
   ASSERT_EQ(summary->rejected.size(), 3u);
   EXPECT_EQ(summary->rejected[0].reason, "broken.obj: line 3: no number");
-  const std::string list = ReadText(root_ / "set" / "rejected.jsonl").value();
+  const std::string list = ReadText(folder_ / "set" / "rejected.jsonl").value();
   EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 3);
   for (const char* word : {"\"broken\"", "\"empty.obj\"", "\"flat-point\""}) {
     EXPECT_NE(list.find(word), std::string::npos) << word;
@@ -252,7 +252,7 @@ TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
 }
 
 TEST_F(BuildTest, WarningsOfReadingAreReported) {
-  const auto summary = Build(MixedSource(), root_ / "set", 2);
+  const auto summary = Build(MixedSource(), folder_ / "set", 2);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   ASSERT_EQ(summary->warnings.size(), 1u);
   EXPECT_EQ(summary->warnings[0].file, "red.obj");
@@ -260,7 +260,7 @@ TEST_F(BuildTest, WarningsOfReadingAreReported) {
 }
 
 TEST_F(BuildTest, RecolouredCopiesAreOnOneSideOfTheSplit) {
-  const auto summary = Build(MixedSource(), root_ / "set");
+  const auto summary = Build(MixedSource(), folder_ / "set");
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->models[0].geometry, summary->models[1].geometry);
   EXPECT_NE(summary->models[0].geometry, 0u);

@@ -11,9 +11,9 @@
 #include "io/archive.h"
 #include "io/image_file.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/sources/package_textures.h"
-#include "train/data/temp_folder.h"
 
 namespace tilegrad::train::package_models_test {
 
@@ -28,10 +28,9 @@ std::string Poly(const std::string& name, const std::string& x, const std::strin
          "1\nkids 0\n";
 }
 
-class PackageModelsTest : public FolderTest {
+class PackageModelsTest : public TempFolderTest {
  protected:
   void SetUp() override {
-    FolderTest::SetUp();
     const std::string head =
         "AC3Db\nMATERIAL \"m\" rgb 1 1 1 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\n"
         "OBJECT world\nkids 2\n";
@@ -45,20 +44,13 @@ class PackageModelsTest : public FolderTest {
         for (const char* image : {"/t.png", "/b.png"})
           Paint(folder + "/Textures/L" + std::to_string(livery) + image, livery);
     }
-    ASSERT_TRUE(MakeFolder(root_ / "flightgear/AI/Aircraft/one/Textures/Empty").ok());
+    ASSERT_TRUE(MakeFolder(folder_ / "flightgear/AI/Aircraft/one/Textures/Empty").ok());
   }
 
-  void Write(const std::string& name, std::string_view text) {
-    ASSERT_TRUE(MakeFolder((root_ / name).parent_path()).ok());
-    ASSERT_TRUE(WriteTextAtomic(root_ / name, text).ok());
-  }
   static Bytes Png(int grey) {
     return io::EncodePng(ImageU8(2, 2, 3, static_cast<std::uint8_t>(grey))).value();
   }
-  void Paint(const std::string& name, int grey) {
-    ASSERT_TRUE(MakeFolder((root_ / name).parent_path()).ok());
-    ASSERT_TRUE(WriteFileAtomic(root_ / name, Png(grey)).ok());
-  }
+  void Paint(const std::string& name, int grey) { Write(name, Png(grey)); }
 
   static std::string Row(const std::string& shape) {
     return "airplane\t" + shape + "\tPlane " + shape + "\tflightgear-data-ai\tGPL-2+\t" + shape +
@@ -66,7 +58,7 @@ class PackageModelsTest : public FolderTest {
   }
   std::unique_ptr<ModelSource> Open(const std::string& rows) {
     text_ = kHead + rows;
-    auto source = PackageModels({"planes", text_, {"blur"}}, root_);
+    auto source = PackageModels({"planes", text_, {"blur"}}, folder_);
     EXPECT_TRUE(source.ok()) << source.status().message();
     return source.ok() ? std::move(*source) : nullptr;
   }
@@ -111,7 +103,7 @@ TEST_F(PackageModelsTest, ALineMayLeaveOutMore) {
   for (const auto& [words, faces] : cases) {
     std::string row = Row("one");
     const std::string text = kHead + row.replace(row.find("\ty\t\t\t") + 4, 0, words);
-    const auto source = PackageModels({"planes", text, {}}, root_);
+    const auto source = PackageModels({"planes", text, {}}, folder_);
     ASSERT_TRUE(source.ok()) << source.status().message();
     const auto model = (*source)->Load(0);
     ASSERT_TRUE(model.ok()) << model.status().message();
@@ -123,10 +115,10 @@ TEST_F(PackageModelsTest, ImagesOfAListPaintAModelOfAZip) {
   const std::string obj =
       "v 0 0 0\nv 1 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl none\nf 1/1 2/2 3/3\n";
   const Bytes mesh(obj.begin(), obj.end());
-  ASSERT_TRUE(MakeFolder(root_ / "trigger-rally").ok());
+  ASSERT_TRUE(MakeFolder(folder_ / "trigger-rally").ok());
   ASSERT_TRUE(
       io::WriteZip(
-          root_ / "trigger-rally/data.zip",
+          folder_ / "trigger-rally/data.zip",
           {{"c/car.obj", mesh}, {"c/a.png", Png(10)}, {"c/b.png", Png(20)}, {"c/wheel.obj", mesh}})
           .ok());
   const auto source = Open(
@@ -170,13 +162,13 @@ TEST_F(PackageModelsTest, MissingPackagesAreNamed) {
               std::string::npos)
         << source.status().message();
   };
-  expect(PlanesSource(root_), "flightgear-data-ai");
-  expect(ShipsSource(root_), "flightgear-data-models");
-  expect(CarsSource(root_), "torcs-data");
+  expect(PlanesSource(folder_), "flightgear-data-ai");
+  expect(ShipsSource(folder_), "flightgear-data-models");
+  expect(CarsSource(folder_), "torcs-data");
 }
 
 TEST_F(PackageModelsTest, TextureSetsByPattern) {
-  const Path archive = root_ / "flightgear/AI/Aircraft";
+  const Path archive = folder_ / "flightgear/AI/Aircraft";
   const auto names = [&](const char* column) {
     std::vector<std::string> out;
     for (const TextureSet& set : FindTextureSets(column, archive))
@@ -199,9 +191,9 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   BuildOptions options;
   options.image_size = 8, options.views = 2, options.split.test_share = 0.5;
   const StopFlag stop = false;
-  const auto summary = BuildDataset(*source, options, root_ / "out", Workers(2), {}, stop);
+  const auto summary = BuildDataset(*source, options, folder_ / "out", Workers(2), {}, stop);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
-  const auto dataset = Dataset::Open(root_ / "out");
+  const auto dataset = Dataset::Open(folder_ / "out");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();
   ASSERT_EQ(dataset->models().size(), 6u);
   EXPECT_EQ(CountShapes(dataset->models()), 2u);
@@ -214,12 +206,12 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   EXPECT_NE(dataset->LoadImages(0).value(), dataset->LoadImages(2).value());
 
   options.liveries = 1;  // of the files that are there
-  const auto fewer = BuildDataset(*source, options, root_ / "out", Workers(1), {}, stop);
+  const auto fewer = BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_TRUE(fewer.ok()) << fewer.status().message();
   EXPECT_EQ(fewer->models.size(), 2u);
   EXPECT_EQ(fewer->reused, 2);
   options.liveries = 0, options.per_class = 1;
-  const auto one = BuildDataset(*source, options, root_ / "out", Workers(1), {}, stop);
+  const auto one = BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_TRUE(one.ok()) << one.status().message();
   EXPECT_EQ(one->models.size(), 3u);
   EXPECT_EQ(CountShapes(one->models), 1u);
@@ -232,12 +224,12 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   BuildOptions options;
   options.image_size = 8, options.views = 1;
   const StopFlag stop = false;
-  ASSERT_TRUE(BuildDataset(*source, options, root_ / "out", Workers(1), {}, stop).ok());
+  ASSERT_TRUE(BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop).ok());
   std::string row = Row("one");
   const std::string text = kHead + row.replace(row.find("\t-x\t") + 1, 2, "-z");
-  auto turned = PackageModels({"planes", text, {"blur"}}, root_);
+  auto turned = PackageModels({"planes", text, {"blur"}}, folder_);
   ASSERT_TRUE(turned.ok()) << turned.status().message();
-  const auto again = BuildDataset(**turned, options, root_ / "out", Workers(1), {}, stop);
+  const auto again = BuildDataset(**turned, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_FALSE(again.ok());
   EXPECT_NE(again.status().message().find("other settings"), std::string::npos);
   std::vector<std::unique_ptr<ModelSource>> one;
@@ -249,7 +241,7 @@ TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
   std::vector<std::unique_ptr<ModelSource>> sources;
   const std::string first = kHead + Row("one"), second = kHead + Row("two");
   for (const std::string* text : {&second, &first}) {
-    auto source = PackageModels({"planes", *text, {}}, root_);
+    auto source = PackageModels({"planes", *text, {}}, folder_);
     ASSERT_TRUE(source.ok()) << source.status().message();
     sources.push_back(std::move(*source));
   }

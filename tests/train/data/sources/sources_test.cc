@@ -8,22 +8,17 @@
 
 #include "io/npz.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/sources/procedural.h"
 #include "train/data/sources/sweethome3d_list.h"
-#include "train/data/temp_folder.h"
 
 namespace tilegrad::train::sources_test {
 
 constexpr const char* kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
-class SourcesTest : public FolderTest {
- protected:
-  void Write(const std::string& name, std::string_view text) {
-    ASSERT_TRUE(WriteTextAtomic(root_ / name, text).ok());
-  }
-};
+class SourcesTest : public TempFolderTest {};
 
 TEST(Procedural, ModelsAreValidDifferentAndRepeatable) {
   for (int c = 0; c < static_cast<int>(ProceduralClasses().size()); ++c) {
@@ -65,7 +60,7 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   Write("set/solid/c.obj", "v 0 0 0\nf 1 2 9\n");
   Write("set/solid/notes.txt", "no model");
   Write("set/readme.md", "no class");
-  const auto source = FolderSource(root_ / "set");
+  const auto source = FolderSource(folder_ / "set");
   ASSERT_TRUE(source.ok()) << source.status().message();
   ASSERT_EQ((*source)->entries().size(), 2u);
   EXPECT_EQ((*source)->entries()[0].id, "a_b");
@@ -73,7 +68,7 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   BuildOptions options;
   options.image_size = 8, options.views = 2;
   const StopFlag stop = false;
-  const auto summary = BuildDataset(**source, options, root_ / "out", Workers(1), {}, stop);
+  const auto summary = BuildDataset(**source, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   EXPECT_EQ(summary->models.size(), 1u);
   ASSERT_EQ(summary->rejected.size(), 1u);
@@ -92,7 +87,7 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   Write("set/solid/skin.JPG", "");
   Write("set/solid/textures/skin.png", "");
   Write("set/solid/b.max", "");
-  const auto source = FolderSource(root_ / "set");
+  const auto source = FolderSource(folder_ / "set");
   ASSERT_TRUE(source.ok()) << source.status().message();
   ASSERT_EQ((*source)->entries().size(), 1u);
   const std::vector<IgnoredFile> ignored = (*source)->ignored();
@@ -104,21 +99,21 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
       {"solid/b.max", "no kind that is read"}};
   ASSERT_EQ(ignored.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_EQ(ignored[i].file, (root_ / "set" / expected[i].first).string());
+    EXPECT_EQ(ignored[i].file, (folder_ / "set" / expected[i].first).string());
     EXPECT_NE(ignored[i].reason.find(expected[i].second), std::string::npos) << ignored[i].reason;
   }
   // Where nothing is left, the error has the first of them.
-  std::filesystem::remove(root_ / "set/solid/a.OBJ");
-  const auto none = FolderSource(root_ / "set");
+  std::filesystem::remove(folder_ / "set/solid/a.OBJ");
+  const auto none = FolderSource(folder_ / "set");
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.status().message().find("deep/inner"), std::string::npos);
 }
 
 TEST_F(SourcesTest, FoldersWithoutModelsAreErrors) {
-  EXPECT_EQ(FolderSource(root_).status().code(), StatusCode::kNotFound);
-  EXPECT_EQ(FolderSource(root_ / "no").status().code(), StatusCode::kNotFound);
-  EXPECT_EQ(ShapeNetSource(root_, {}).status().code(), StatusCode::kNotFound);
-  EXPECT_EQ(NmrSource(root_).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(FolderSource(folder_).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(FolderSource(folder_ / "no").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(ShapeNetSource(folder_, {}).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(NmrSource(folder_).status().code(), StatusCode::kNotFound);
 }
 
 TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
@@ -126,7 +121,7 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
     Write(std::string("net/03001627/") + model + "/models/model_normalized.obj", kTetrahedron);
   }
   Write("net/99999999/z/models/model_normalized.obj", kTetrahedron);
-  const auto all = ShapeNetSource(root_ / "net", {});
+  const auto all = ShapeNetSource(folder_ / "net", {});
   ASSERT_TRUE(all.ok()) << all.status().message();
   ASSERT_EQ((*all)->entries().size(), 3u);
   EXPECT_EQ((*all)->entries()[0].class_name, "chair");
@@ -134,25 +129,25 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
   EXPECT_TRUE((*all)->Load(0).ok());
 
   Write("split.txt", "03001627/a1 test\n\n03001627/c3 val\n");
-  const auto listed = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  const auto listed = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
   ASSERT_TRUE(listed.ok()) << listed.status().message();
   ASSERT_EQ((*listed)->entries().size(), 2u);
   EXPECT_EQ((*listed)->entries()[0].split, Split::kTest);
   EXPECT_EQ((*listed)->entries()[1].split, Split::kValidation);
 
   Write("split.txt", "03001627/a1 test\n03001627/b2 exam\n");
-  const auto wrong = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  const auto wrong = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
   ASSERT_FALSE(wrong.ok());
   EXPECT_NE(wrong.status().message().find("line 2"), std::string::npos);
 
   Write("split.txt", "03001627/d4 test\n");
-  const auto none = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  const auto none = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.status().message().find("split.txt names"), std::string::npos);
 }
 
 TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {
-  const auto source = SweetHome3dSource(root_);
+  const auto source = SweetHome3dSource(folder_);
   ASSERT_FALSE(source.ok());
   EXPECT_EQ(source.status().code(), StatusCode::kNotFound);
   EXPECT_NE(source.status().message().find("apt-get install"), std::string::npos);
@@ -200,14 +195,14 @@ void WriteNmr(const Path& stem, std::size_t models, const std::vector<std::uint8
 TEST_F(SourcesTest, NmrBecomesADataset) {
   std::vector<std::uint8_t> grid(kGrid);
   grid[5] = 1;
-  WriteNmr(root_ / "03001627_train", 2, grid);
-  WriteNmr(root_ / "03001627_test", 1, grid);
-  const auto source = NmrSource(root_);
+  WriteNmr(folder_ / "03001627_train", 2, grid);
+  WriteNmr(folder_ / "03001627_test", 1, grid);
+  const auto source = NmrSource(folder_);
   ASSERT_TRUE(source.ok()) << source.status().message();
   const StopFlag stop = false;
-  const auto summary = BuildDataset(**source, {}, root_ / "out", Workers(2), {}, stop);
+  const auto summary = BuildDataset(**source, {}, folder_ / "out", Workers(2), {}, stop);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
-  const auto dataset = Dataset::Open(root_ / "out");
+  const auto dataset = Dataset::Open(folder_ / "out");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();
   EXPECT_EQ(dataset->info().classes, std::vector<std::string>{"chair"});
   EXPECT_EQ(dataset->Select(Split::kTrain).size(), 2u);
@@ -221,12 +216,12 @@ TEST_F(SourcesTest, NmrBecomesADataset) {
 }
 
 TEST_F(SourcesTest, NmrFilesThatDoNotFitAreErrors) {
-  WriteNmr(root_ / "car_val", 1, std::vector<std::uint8_t>(kGrid));
+  WriteNmr(folder_ / "car_val", 1, std::vector<std::uint8_t>(kGrid));
   const std::vector<std::uint8_t> small(16);
-  ASSERT_TRUE(io::SaveNpz(root_ / "car_val_voxels.npz",
+  ASSERT_TRUE(io::SaveNpz(folder_ / "car_val_voxels.npz",
                           {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}})
                   .ok());
-  const auto source = NmrSource(root_);
+  const auto source = NmrSource(folder_);
   ASSERT_FALSE(source.ok());
   EXPECT_NE(source.status().message().find("car_val_voxels.npz"), std::string::npos);
 }
@@ -258,8 +253,8 @@ TEST_F(SourcesTest, NmrVoxelsMeetTheirImages) {
   const std::array<int, 3> theirs = {3, 20, 11};  // x', y', z'
   std::vector<std::uint8_t> grid(kGrid);
   grid[static_cast<std::size_t>((theirs[1] * 32 + theirs[0]) * 32 + 31 - theirs[2])] = 1;
-  WriteNmr(root_ / "car_train", 1, grid);
-  const auto source = NmrSource(root_);
+  WriteNmr(folder_ / "car_train", 1, grid);
+  const auto source = NmrSource(folder_);
   ASSERT_TRUE(source.ok());
   const auto data = std::get<ModelData>((*source)->Load(0).value().data);
   const auto at = std::find(data.occupancy.begin(), data.occupancy.end(), 1);
