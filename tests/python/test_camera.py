@@ -80,26 +80,6 @@ class Conventions(unittest.TestCase):
         near = Camera.look_at((0, 0, 1 + 1e-9), (0, 0, 1), **SIZE)  # one point to float
         np.testing.assert_array_equal(near.rotation, np.eye(3))
 
-    def test_there_and_back(self):
-        cameras = random_cameras(5)
-        half = {"pixel_centre": "half"}
-        ways = [
-            (lambda c: Camera.from_opencv(**c.to_opencv())),
-            (lambda c: Camera.from_opencv(**c.to_opencv(**half), **half)),
-            (lambda c: Camera.from_colmap(**c.to_colmap())),
-            (lambda c: Camera.from_opengl(**c.to_opengl(**SIZE, far_plane=100), **SIZE)),
-            (lambda c: Camera.from_pytorch3d(**c.to_pytorch3d(**SIZE), **SIZE)),
-            (lambda c: Camera.from_nerf(**c.to_nerf())),
-        ]
-        for way in ways:
-            for one in (cameras, cameras[2]):
-                back = way(one)
-                self.assertEqual(back.numbers.shape, one.numbers.shape)
-                np.testing.assert_allclose(back.numbers, one.numbers, rtol=1e-10, atol=1e-10)
-        middle = cameras.replace(cx=320, cy=240)
-        back = Camera.from_kaolin(**middle.to_kaolin(**SIZE), **SIZE)
-        np.testing.assert_allclose(back.numbers, middle.numbers, rtol=1e-10, atol=1e-10)
-
     def test_resize(self):
         half = EXPECTED.resize(640, 480, 320, 240)
         np.testing.assert_allclose(pixel(half, POINT), (122.5, 101.25), atol=1e-9)

@@ -42,33 +42,6 @@ class Nothing(unittest.TestCase):
                 frame.shared("uv")[:] = 1  # memory of its own
                 self.assertTrue((frame.uv == 1).all())
 
-    def test_each_image_of_scenes_of_few_parts(self):
-        for dtype in (np.float32, np.float64):
-            for changes in ({}, {"colors": None}, {"normals": "flat"}):
-                for name in IMAGES:
-                    self.check(bare(dtype, **changes), (name,))
-
-    def test_no_face_is_background(self):
-        empty = bare(faces=np.zeros((0, 3), np.int32))
-        frame = self.check(empty, IMAGES)
-        self.assertTrue(np.isposinf(frame.depth).all())
-        self.assertFalse(any(getattr(frame, name).any() for name in IMAGES if name != "depth"))
-
-    def test_gradient_of_what_is_not_there_is_zero(self):
-        for dtype in (np.float32, np.float64):
-            renderer, scene = Renderer(threads=1), bare(dtype)
-            frame = renderer.render(scene, outputs=("uv",), **SMALL)
-            found = renderer.backward(frame, uv=np.ones_like(frame.uv), wrt=("positions", "camera"))
-            self.assertFalse(found.positions.any())
-            self.assertFalse(found.camera.numbers.any())
-
-    def test_an_image_that_was_not_rendered_has_no_view(self):
-        frame = Renderer(threads=1).render(bare(), outputs=("color",), **SMALL)
-        with self.assertRaises(AttributeError):
-            frame.shared("uv")
-        with self.assertRaises(RuntimeError):  # below the surface: no view of memory that is not
-            frame._frame.view("uv")
-
 
 class NoImages(unittest.TestCase):
     WRT = ("positions", "camera", "colors", "uvs", "textures", "surfaces", "attributes")
@@ -139,13 +112,6 @@ class InTorch(unittest.TestCase):
         images = tilegrad.torch.render(positions, patch().faces, camera, width=200, height=150,
                                        **arguments)
         return positions, images
-
-    def test_uv_of_a_scene_without(self):
-        for outputs in (("uv",), ("uv", "alpha"), ("depth", "uv")):
-            positions, images = self.render(patch().camera, outputs=outputs)
-            self.assertFalse(images.uv.any())
-            images.uv.sum().backward()
-            self.assertFalse(positions.grad.any())
 
     def test_no_images(self):
         positions, images = self.render(Camera(translation=np.zeros((0, 3))),

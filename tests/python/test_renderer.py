@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 
-from scenes import ALL, IMAGE, LIGHTINGS, patch
+from scenes import ALL, IMAGE, patch
 from tilegrad import Camera, Light, Renderer, Scene, Surface, Texture, files
 
 H, W = IMAGE["height"], IMAGE["width"]
@@ -37,16 +37,6 @@ class Images(unittest.TestCase):
             self.assertTrue(np.array_equal(seen, frame.alpha == 1))
             self.assertLessEqual(frame.alpha_error_bound, 1e-6)
             self.assertEqual(frame.dtype, dtype)
-
-    # Colours, alpha and attributes are below 2, depth is about 2: 1e-4 is 400 roundings of them.
-    def test_float_and_double_agree(self):
-        for lighting in LIGHTINGS:
-            single = Renderer().render(patch(np.float32, lighting), outputs=ALL, **IMAGE)
-            double = Renderer().render(patch(np.float64, lighting), outputs=ALL, **IMAGE)
-            self.assertTrue(np.array_equal(single.face_ids, double.face_ids))
-            for name in ALL:
-                np.testing.assert_allclose(getattr(single, name), getattr(double, name), rtol=0,
-                                           atol=1e-4, err_msg=name)
 
     def test_only_what_is_asked_for_is_there(self):
         scene = patch()

@@ -298,15 +298,6 @@ class Graphs(unittest.TestCase):
         self.assertTrue(torch.equal(functional.jacobian(loss, start),
                                     self.gradient(loss(self.positions))))
 
-    def test_same_bits_for_any_number_of_threads(self):
-        def bits(threads):
-            images = rendered(self.given, width=150, height=140, threads=threads)
-            return images.color, self.gradient(images.color.sum() + images.alpha.sum())
-
-        for threads in (2, 7):
-            for a, b in zip(bits(threads), bits(1)):
-                self.assertTrue(torch.equal(a, b))
-
     def test_mesh_from_a_file(self):
         from file_samples import textured_mesh
         mesh = textured_mesh()

@@ -159,17 +159,6 @@ TEST(N3mrColors, DoubleGivesTheNumbersOfThePublishedKernels) {
   EXPECT_EQ(cases, 24);
 }
 
-// The file names 2.4e-6 for colours in float and 3e-4 of the largest entry for gradients.
-TEST(N3mrColors, FloatGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("16_n3mr.json");
-  if (!file) GTEST_SKIP() << "vectors/16_n3mr.json is not there";
-  ForSharedImages(*file, [&](const Json& of, const Json& inputs, const Json& gradient,
-                             std::size_t n) {
-    const SharedScene<float> at(*file, of, inputs, n, gradient["eps"]);
-    ExpectShared(of, gradient, n, Fast(at.scene, at.d, AskedOf(gradient["outputs"])), 1e-5, 4e-4);
-  });
-}
-
 // A cube of 2 at its face's middle, depths equal: u = 1/3 each, so corner (0,0,0) of the cube
 // weighs (2/3)^3 and (1,1,1) (1/3)^3.
 TEST(N3mrColors, ACubeAtTheMiddleOfItsFace) {

@@ -108,21 +108,6 @@ TEST(N3mr, DoubleGivesTheNumbersOfThePublishedKernels) {
   EXPECT_EQ(cases, 16);
 }
 
-// The tolerance that the file names for float gradients is 3e-4 of the largest entry.
-TEST(N3mr, FloatGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("16_n3mr.json");
-  if (!file) GTEST_SKIP() << "vectors/16_n3mr.json is not there";
-  ForSharedImages(*file, [&](const Json& scene, const Json& inputs, const Json& gradient,
-                             std::size_t n) {
-    const auto got =
-        Fast(Numbers<float>(inputs["face_vertices"][n]), scene["image_size"],
-             OptionsOf(scene, gradient["eps"]), Numbers<float>(UpstreamAlpha(inputs, n)));
-    const auto want = Numbers(gradient["grad_face_vertices"][n]);
-    EXPECT_LT(Difference(got.alpha, Numbers(scene["alpha"][n])), 1e-4);
-    EXPECT_LT(Difference(PlaneParts(got.d_corners), want), 4e-4 * std::max(1e-3, Largest(want)));
-  });
-}
-
 const N3mrOptions kPlain{.reduction = N3mrReduction::kNone, .fill_back = false};
 
 // A face over the left half of 4 x 4 pixels: its edge at x = -0.1 lies between the

@@ -83,24 +83,6 @@ TEST(SoftRas, ReferenceGivesTheNumbersOfThePublishedKernels) {
   EXPECT_EQ(cases, 40);
 }
 
-// The tolerances that the file names for float.
-TEST(SoftRas, FloatGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("15_softras.json");
-  if (!file) GTEST_SKIP() << "vectors/15_softras.json is not there";
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
-    SCOPED_TRACE(target);
-    ForSharedCases(*file, [&](const Json& scene, const SoftRasOptions& options, std::size_t n,
-                              const Json& one) {
-      const Result got = Fast(Numbers<float>(scene["face_vertices"][n]), scene["image_size"],
-                              options, Numbers<float>(scene["upstream_alpha"][n]));
-      const auto want = Numbers(one["grad_face_vertices_xy"][n]);
-      EXPECT_LT(Difference(got.alpha, Numbers(one["alpha"][n])), 1e-4);
-      EXPECT_LT(Difference(PlaneParts(got.d_corners), want), 1e-3 * std::max(1e-3, Largest(want)));
-    });
-  }
-}
-
 // One face, x + y <= 0 in the square of side 2; one pixel, in the middle of its long edge: D = 1/2.
 TEST(SoftRas, AnEdgeThroughAPixelIsOneHalf) {
   const std::vector<double> corners = {-1, -1, 2, 1, -1, 2, -1, 1, 2};

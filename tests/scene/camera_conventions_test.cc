@@ -238,30 +238,6 @@ TEST(CameraConventions, RotationVectorTurnsByItsLength) {
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(r[i], expected[i], 1e-15);
 }
 
-// The numbers of docs/cameras.md: one camera (640 x 480, f = 500, at (1, 0, 4), looking along -z),
-// one point (0.4, 0.3, 0).
-TEST(CameraConventions, NumbersOfTheManual) {
-  Camera64 camera;
-  camera.translation[0] = -1, camera.translation[2] = -4;
-  camera.fx = camera.fy = 500, camera.cx = 320, camera.cy = 240;
-  const ImageSize size{640, 480};
-  const Pixel here = Project(camera, {0.4, 0.3, 0});
-  EXPECT_NEAR(here.x, 245, 1e-12);
-  EXPECT_NEAR(here.y, 202.5, 1e-12);
-  const OpenCvCamera cv = ToOpenCv(camera);
-  EXPECT_EQ(cv.k, (Mat3Array{500, 0, 319.5, 0, 500, 239.5, 0, 0, 1}));
-  EXPECT_EQ(cv.rotation, (Mat3Array{1, 0, 0, 0, -1, 0, 0, 0, -1}));
-  EXPECT_EQ(cv.translation, (Vec3Array{-1, 0, 4}));
-  EXPECT_EQ(ToColmap(camera).quaternion, (std::array<double, 4>{0, 1, 0, 0}));
-  const auto kaolin = ToKaolin(camera, size).value();
-  EXPECT_NEAR(kaolin.projection[0], 1.5625, 1e-15);
-  EXPECT_NEAR(kaolin.projection[1], 2.0833333333333335, 1e-15);
-  const auto torch = ToPyTorch3d(camera, size).value();
-  EXPECT_NEAR(torch.focal_length[0], 2.0833333333333335, 1e-15);
-  EXPECT_EQ(torch.r, (Mat3Array{-1, 0, 0, 0, 1, 0, 0, 0, -1}));
-  EXPECT_EQ(torch.t, (Vec3Array{1, 0, 4}));
-}
-
 void ExpectRefused(const Result<Camera64>& camera, const std::string& part) {
   ASSERT_FALSE(camera.ok()) << part;
   ExpectMessage(camera.status(), part);
