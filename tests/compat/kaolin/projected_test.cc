@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images of projected faces: gradients against float64 differences, float against double, the same
-// bits for any number of workers, the stated bound, golden numbers, errors.
+// bits for any number of workers. The stated bound, golden numbers, errors: test_kaolin.py.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <limits>
-#include <nlohmann/json.hpp>
 
 #include "base/simd_target.h"
 #include "compat/kaolin/projected_raster.h"
 #include "compat/kaolin/projected_soft_mask.h"
 #include "compat/projected_scenes.h"
-#include "support/shared_data.h"
 
 namespace tilegrad::compat::kaolin::projected_test {
 
-using Json = nlohmann::json;
 using test::Cast;
 using test::ProjectedFacesOwner;
 using test::RandomFaces;
@@ -215,52 +210,6 @@ TEST(Projected, FloatIsDouble) {
   ASSERT_TRUE(ForceTarget("").ok());
 }
 
-// Equation 6 over all faces, written down once more.
-double Equation6(const ProjectedFacesOwner<double>& faces, std::size_t image, double x, double y,
-                 double sigmainv) {
-  double outside = 1;
-  for (std::size_t f = image * faces.faces; f < (image + 1) * faces.faces; ++f) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double* a = &faces.xy[6 * f + 2 * k];
-      const double* b = &faces.xy[6 * f + 2 * ((k + 1) % 3)];
-      const double ex = b[0] - a[0], ey = b[1] - a[1];
-      const double t =
-          std::clamp(((x - a[0]) * ex + (y - a[1]) * ey) / (ex * ex + ey * ey), 0.0, 1.0);
-      least = std::min(least, std::pow(x - a[0] - t * ex, 2) + std::pow(y - a[1] - t * ey, 2));
-    }
-    outside *= 1 - std::exp(-sigmainv * least);
-  }
-  return 1 - outside;
-}
-
-TEST(Projected, MaskStaysWithinItsBound) {
-  Rng rng(10);
-  const Workers workers(2);
-  for (const double sigmainv : {3.0, 300.0, 7000.0}) {
-    for (const double error : {0.0, 1e-6, 1e-2}) {
-      Case c({33, 20}, sigmainv);
-      c.mask.max_alpha_error = error;
-      const auto faces = RandomFaces(2, 60, 0, 0.1, &rng);
-      const auto truth = Cast<double>(faces);
-      const auto single = Render(faces, c, workers);
-      const auto exact = Render(truth, c, workers);
-      EXPECT_LE(single.bound, error + 1e-28);
-      EXPECT_LE(exact.bound, error);
-      for (std::size_t p = 0; p < single.ids.size(); ++p) {
-        const std::size_t pixel = p % 660;
-        const double x = (2.0 * double(pixel % 33) - 32) / 33,
-                     y = (19 - 2.0 * double(pixel / 33)) / 20;
-        const double alpha = Equation6(truth, p / 660, x, y, sigmainv);
-        // 1e-5: rounding of float's coordinates and sums; numerics.md has the exact account.
-        const bool background = exact.ids[p] < 0;
-        EXPECT_NEAR(exact.mask[p], background ? alpha : 1, exact.bound + 1e-13);
-        EXPECT_NEAR(single.mask[p], single.ids[p] < 0 ? alpha : 1, single.bound + 1e-5);
-      }
-    }
-  }
-}
-
 TEST(Projected, SameBitsForAnyNumberOfWorkers) {
   Rng rng(11);
   const auto faces = RandomFaces(3, 700, 4, 0.15, &rng);
@@ -284,102 +233,6 @@ TEST(Projected, SameBitsForAnyNumberOfWorkers) {
       EXPECT_EQ(e.mask_xy, d.mask_xy);
     }
   }
-}
-
-template <class T>
-ProjectedFacesOwner<T> FacesOf(const Json& vectors) {
-  ProjectedFacesOwner<T> out;
-  out.images = vectors["face_vertices_image"].size();
-  out.faces = vectors["face_vertices_image"][0].size();
-  for (std::size_t i = 0; i < out.images * out.faces * 3; ++i) {
-    const std::size_t n = i / (3 * out.faces), f = i / 3 % out.faces, k = i % 3;
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      out.xy.push_back(T(vectors["face_vertices_image"][n][f][k][axis].get<double>()));
-    }
-    out.z.push_back(T(vectors["face_vertices_z"][n][f][k].get<double>()));
-  }
-  return out;
-}
-
-std::vector<double> Flat(const Json& array) {
-  if (!array.is_array()) return {array.get<double>()};
-  std::vector<double> out;
-  for (const Json& row : array) {
-    for (const double v : Flat(row)) out.push_back(v);
-  }
-  return out;
-}
-
-template <class T>
-void CheckGolden(const Json& vectors, double mask_tolerance) {
-  const Workers workers(2);
-  const auto faces = FacesOf<T>(vectors);
-  for (const Json& golden : vectors["cases"]) {
-    Case c({vectors["width"], vectors["height"]}, golden["sigmainv"]);
-    c.mask.rule = AlphaRule::kPaper, c.mask.paper_box = golden["boxlen"],
-    c.mask.paper_faces = vectors["knum"];
-    const auto images = Render(faces, c, workers);
-    EXPECT_EQ(std::vector<double>(images.ids.begin(), images.ids.end()),
-              Flat(vectors["selected_face_idx"]));
-    const auto mask = Flat(golden["soft_mask_golden"]);
-    for (std::size_t p = 0; p < mask.size(); ++p) {
-      EXPECT_NEAR(images.mask[p], mask[p], mask_tolerance);
-    }
-  }
-}
-
-TEST(Projected, GoldenNumbers) {
-  const auto path = SharedFile("vectors/01_dibr_soft_mask_simple.json");
-  if (!path) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
-  std::ifstream file(*path);
-  const Json vectors = Json::parse(file);
-  CheckGolden<double>(vectors, 1e-10);
-  CheckGolden<float>(vectors, 1e-5);
-}
-
-TEST(Projected, Errors) {
-  Rng rng(12);
-  const Workers workers(1);
-  auto faces = RandomFaces(1, 4, 2, 0.3, &rng);
-  std::vector<std::int32_t> ids(37 * 41, -1);
-  std::vector<float> image(2 * ids.size()), mask(ids.size());
-  Case c;
-  const auto rasterize = [&] {
-    return RasterizeProjected<float>(faces.View(), c.raster, faces.features, 2, workers, ids, image)
-        .message();
-  };
-  const auto soften = [&] {
-    return ProjectedSoftMask<float>(faces.View(), c.mask, ids, workers, mask).status().message();
-  };
-  EXPECT_EQ(rasterize(), "");
-  faces.xy[5] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(rasterize(), "face_vertices_image[5] is nan");
-  EXPECT_EQ(soften(), "face_vertices_image[5] is nan");
-  faces.xy[5] = 0, faces.z[3] = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(rasterize(), "face_vertices_z[3] is inf");
-  faces.z[3] = 0, faces.features[1] = -std::numeric_limits<float>::infinity();
-  EXPECT_EQ(rasterize(), "face_features[1] is -inf");
-  faces.features[1] = 0, c.raster.eps = -1;
-  EXPECT_EQ(rasterize(), "eps is -1, must be finite and >= 0");
-  c.raster.eps = 0, c.raster.size.width = 0;
-  EXPECT_EQ(rasterize(), "options.width is 0, must be in 1..16384 pixels");
-  ids[7] = 4;
-  EXPECT_EQ(soften(), "face_idx[7] is 4, outside of [-1, 4)");
-  ids[7] = 3, c.mask.delta = 0;
-  EXPECT_EQ(soften(), "delta is 0, must be finite and > 0");
-  c.mask.delta = 1, c.mask.max_alpha_error = 2;
-  EXPECT_EQ(soften(), "max_alpha_error is 2, must be in [0, 1]");
-  c.mask.max_alpha_error = 0, c.mask.paper_faces = -1;
-  EXPECT_EQ(soften(), "knum is -1, must be >= 0");
-}
-
-TEST(Projected, NothingToDraw) {
-  const Workers workers(2);
-  ProjectedFacesOwner<float> faces;
-  faces.images = 2, faces.channels = 1;
-  const auto images = Render(faces, Case(), workers);
-  EXPECT_EQ(images.ids, std::vector<std::int32_t>(2 * 37 * 41, -1));
-  EXPECT_EQ(images.mask, std::vector<float>(2 * 37 * 41, 0.0f));
 }
 
 }  // namespace tilegrad::compat::kaolin::projected_test

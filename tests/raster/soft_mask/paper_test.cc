@@ -5,31 +5,16 @@
 
 #include <cmath>
 #include <complex>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "base/rng.h"
 #include "raster/soft_mask/paper_ref.h"
-#include "support/source_dir.h"
+#include "support/shared_data.h"
 
 namespace tilegrad::raster::paper_test {
 
 using Json = nlohmann::json;
-
-std::optional<Json> SharedVectors(const char* name) {
-  namespace fs = std::filesystem;
-  const fs::path source(TILEGRAD_SOURCE_DIR);
-  std::vector<fs::path> roots{source / "../shared", source / "../../shared"};
-  if (const char* set = std::getenv("TILEGRAD_SHARED")) roots.insert(roots.begin(), set);
-  for (const fs::path& root : roots) {
-    std::ifstream file(root / "vectors" / name);
-    if (file) return Json::parse(file);
-  }
-  return std::nullopt;
-}
 
 // One image of the vectors: faces, ids and pixel centres in NDC.
 template <class T>
@@ -107,13 +92,14 @@ void CheckCase(const Json& v, const Json& c, double mask_tolerance, double gradi
 }
 
 TEST(SoftMaskPaper, GoldenNumbers) {
-  const auto vectors = SharedVectors("01_dibr_soft_mask_simple.json");
-  if (!vectors) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
-  ASSERT_EQ((*vectors)["cases"].size(), 4u);
-  for (const Json& c : (*vectors)["cases"]) {
+  const auto path = SharedFile("vectors/01_dibr_soft_mask_simple.json");
+  if (!path) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
+  const Json vectors = Json::parse(std::ifstream(*path));
+  ASSERT_EQ(vectors["cases"].size(), 4u);
+  for (const Json& c : vectors["cases"]) {
     SCOPED_TRACE("sigmainv " + c["sigmainv"].dump() + " boxlen " + c["boxlen"].dump());
-    CheckCase<double>(*vectors, c, 1e-10, 1e-8);
-    CheckCase<float>(*vectors, c, 1e-5, 1e-3);
+    CheckCase<double>(vectors, c, 1e-10, 1e-8);
+    CheckCase<float>(vectors, c, 1e-5, 1e-3);
   }
 }
 

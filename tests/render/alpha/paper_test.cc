@@ -1,120 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// AlphaRule::kPaper through the Renderer: published golden numbers, the reference in double, and
-// that it is what it says it is (cut off, and dependent on the order of the faces).
+// AlphaRule::kPaper through the Renderer: the reference in double, and that it is what it says it
+// is (cut off, and dependent on the order of the faces). Golden numbers:
+// raster/soft_mask/paper_test.cc.
 #include "render/alpha/paper.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
-#include <numbers>
 
-#include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 #include "render/pipeline/test_scenes.h"
-#include "support/shared_data.h"
 
 namespace tilegrad::paper_test {
 
-using Json = nlohmann::json;
 using test::TestScene;
-
-// One image of the vectors as a scene whose camera leaves NDC as they are, at depth 1.
-template <class T>
-TestScene<T> SceneOf(const Json& vectors, std::size_t image) {
-  TestScene<T> out;
-  out.channels = 0;
-  const double width = vectors["width"], height = vectors["height"];
-  out.camera.fx = out.camera.cx = T(width / 2), out.camera.fy = out.camera.cy = T(height / 2);
-  for (const Json& face : vectors["face_vertices_image"][image]) {
-    for (const Json& corner : face) {
-      out.faces.push_back(static_cast<std::int32_t>(out.faces.size()));
-      for (const T v : {T(corner[0].get<double>()), T(corner[1].get<double>()), T(-1)}) {
-        out.positions.push_back(v);
-      }
-    }
-  }
-  return out;
-}
-
-RenderOptions OptionsOf(const Json& vectors, const Json& c) {
-  RenderOptions options;
-  options.width = vectors["width"], options.height = vectors["height"];
-  options.delta = 1 / c["sigmainv"].get<double>();
-  options.alpha_rule = AlphaRule::kPaper;
-  options.paper_box = c["boxlen"], options.paper_faces = vectors["knum"];
-  return options;
-}
-
-// The vectors' own visibility, so that their depth order need not be rebuilt.
-std::vector<std::int32_t> FaceIds(const Json& vectors, std::size_t image) {
-  std::vector<std::int32_t> out;
-  for (const Json& row : vectors["selected_face_idx"][image]) {
-    for (const Json& id : row) out.push_back(id);
-  }
-  return out;
-}
-
-void CheckMask(std::span<const double> alpha, const Json& golden, double tolerance) {
-  std::size_t i = 0;
-  for (const Json& row : golden) {
-    for (const Json& value : row) EXPECT_NEAR(alpha[i++], value.get<double>(), tolerance);
-  }
-  EXPECT_EQ(i, alpha.size());
-}
-
-// The rule as a stage, with visibility given.
-std::vector<float> AlphaOf(const PipelineScene& scene, const RenderOptions& options,
-                           std::span<const std::int32_t> face_ids) {
-  ImageScratch image;
-  raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image.buffers);
-  image.mesh = image.buffers.View();
-  PaperAlpha rule;
-  rule.Begin(options, 1);
-  rule.Prepare(0, image);
-  std::vector<float> out(face_ids.size());
-  const raster::SquareGrid bins = raster::BinGrid(options.width, options.height);
-  for (std::size_t bin = 0; bin < bins.cells(); ++bin) {
-    EXPECT_EQ(rule.Forward({image, {0, bin, bins.rect(bin)}, 0}, {face_ids, out, {}}), 0);
-  }
-  return out;
-}
-
-// Of alpha in float. Coordinates are below 1, and a distance is the difference of two of them, each
-// rounded and projected: d is off by 4 half units of 1, and exp(-s d^2) by at most
-// max_z 2 sqrt(z) exp(-z) sqrt(s) = sqrt(2 s / e) of that. Sums and the exponential add 1e-6.
-double FloatTolerance(double sharpness) {
-  const double distance = 4 * std::ldexp(1.0, -24);
-  return std::sqrt(2 * sharpness / std::numbers::e) * distance + 1e-6;
-}
-
-TEST(PaperAlpha, GoldenNumbers) {
-  const auto path = SharedFile("vectors/01_dibr_soft_mask_simple.json");
-  if (!path) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
-  std::ifstream file(*path);
-  const Json vectors = Json::parse(file);
-  for (const Json& c : vectors["cases"]) {
-    const RenderOptions options = OptionsOf(vectors, c);
-    for (std::size_t image = 0; image < vectors["face_vertices_image"].size(); ++image) {
-      SCOPED_TRACE("sigmainv " + c["sigmainv"].dump() + " boxlen " + c["boxlen"].dump());
-      const auto ids = FaceIds(vectors, image);
-      const auto truth = SceneOf<double>(vectors, image);
-      PipelineFrameT<double> exact;
-      RenderRefWithFaces<double>(truth.View(), options, {.attributes = false}, ids,
-                                 {0, options.height}, &exact);
-      CheckMask(exact.alpha, c["soft_mask_golden"][image], 1e-10);
-
-      const auto scene = SceneOf<float>(vectors, image);
-      const std::vector<float> alpha = AlphaOf(scene.View(), options, ids);
-      CheckMask(std::vector<double>(alpha.begin(), alpha.end()), c["soft_mask_golden"][image],
-                FloatTolerance(c["sigmainv"].get<double>()));
-    }
-  }
-}
 
 RenderOptions PaperOptions() {
   RenderOptions options;
