@@ -52,13 +52,6 @@ TEST(BenchReport, CountersWithoutVariationAreRead) {
   EXPECT_EQ(all[0].repetitions, 1);
 }
 
-TEST(BenchReport, OrderIsThatOfRegistration) {
-  const auto all = Parse(Sample("S2/forward/both/1", 1, 1, R"(,"family_index":5)") + "," +
-                         Sample("S1/forward/both/1", 1, 1, R"(,"family_index":2)"));
-  ASSERT_EQ(all.size(), 2u);
-  EXPECT_EQ(all[0].scene, "S1");
-}
-
 TEST(BenchReport, SpeedTableHasRatiosAndLimits) {
   const std::string table = SpeedTable(Parse(kSamples));
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);  // head, line, one row
@@ -79,27 +72,6 @@ TEST(BenchReport, RequestTableHasRatiosToTheSilhouette) {
             std::string::npos)
       << table;
   EXPECT_TRUE(RequestTable(Parse(kSamples)).empty());
-}
-
-TEST(BenchReport, RequestTableLeavesCellsEmptyThatWereNotMeasured) {
-  EXPECT_NE(RequestTable(Parse(Sample("S2/forward/color/shaded", 4, 4, "")))
-                .find("| S2 | color | 4.00 |  |  |  |\n"),
-            std::string::npos);
-  EXPECT_NE(RequestTable(Parse(Sample("S2/backward/silhouette/shaded", 4, 4, "")))
-                .find("| S2 | silhouette |  |  | 4.00 | 1.00 |\n"),
-            std::string::npos);
-}
-
-TEST(BenchReport, CsvHasAllMeasurements) {
-  const std::string csv = MeasurementsCsv(Parse(kSamples));
-  EXPECT_EQ(csv.rfind("scene,direction,what,who,repetitions,cpu_ms,wall_ms,share,images,pixels,"
-                      "faces,pairs,exps,bytes,limit_ms,limit_high_ms,evaluated_pairs,"
-                      "evaluated_exps\n",
-                      0),
-            0u);
-  EXPECT_NE(csv.find("\nS1,forward,both,naive,1,1500,1600,0.01,"), std::string::npos) << csv;
-  EXPECT_NE(csv.find("S1,forward,both,1,3,3,4,1,0,0,7,0,0,0,0.5,1,0,0\n"), std::string::npos)
-      << csv;
 }
 
 TEST(BenchReport, GrowthAsCurvesAndTable) {

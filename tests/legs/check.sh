@@ -10,7 +10,7 @@ cd "$(dirname "$0")/../.."
 source cmake/packages.sh
 export PYTHONDONTWRITEBYTECODE=1  # as ./run
 
-readonly LEGS=(format headers docs install wheel targets avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
+readonly LEGS=(format headers docs install wheel targets memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|api_renderer|render_topologies|nn_tape)'
 # Tests that hold kernels to their references.
@@ -107,12 +107,6 @@ leg_targets() {
   kernel_tests
   only EMU128
   ! grep -q -m 1 avx2 /proc/cpuinfo || only AVX2
-}
-# On a processor with AVX-512 that Bochs emulates; one that has it runs these tests in `targets`.
-leg_avx512() {
-  ! grep -q -m 1 avx512dq /proc/cpuinfo || return 0
-  require bochs bochs-term vgabios isolinux syslinux-common xorriso busybox-static cpio
-  tests/cross/avx512.sh
 }
 # Values that nobody set, in kernels: valgrind runs them as far as AVX2. Tests of how long something takes are left out.
 memcheck() {  # NAME PROGRAM FILTER

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -14,27 +13,14 @@
 #include "base/rng.h"
 #include "base/simd_target.h"
 #include "raster/project_ref.h"
-#include "support/source_dir.h"
+#include "support/shared_data.h"
 
 namespace tilegrad::raster::project_test {
 
-// shared/vectors/08_cameras.json, where the data that travels beside the repository is present.
-Path SharedVectors() {
-  const Path root = TILEGRAD_SOURCE_DIR;
-  std::vector<Path> places = {root / "../shared", root / "../../shared"};
-  if (const char* set = std::getenv("TILEGRAD_SHARED")) places.insert(places.begin(), set);
-  for (const Path& place : places) {
-    if (std::filesystem::exists(place / "vectors/08_cameras.json")) {
-      return place / "vectors/08_cameras.json";
-    }
-  }
-  return {};
-}
-
 TEST(Project, AgreesWithTheCamerasOfDibR) {
-  const Path path = SharedVectors();
-  if (path.empty()) GTEST_SKIP() << "shared/vectors/08_cameras.json is not here";
-  const auto json = nlohmann::json::parse(ReadText(path).value());
+  const auto path = SharedFile("vectors/08_cameras.json");
+  if (!path) GTEST_SKIP() << "shared/vectors/08_cameras.json is not here";
+  const auto json = nlohmann::json::parse(ReadText(*path).value());
   std::vector<float> positions;
   for (const auto& p : json["points"]) {
     for (const auto& x : p) positions.push_back(x.get<float>());

@@ -273,14 +273,4 @@ TEST(AntialiasBackward, SharedPositionsSumOverImages) {
   for (std::size_t i = 0; i < single.size(); ++i) EXPECT_NEAR(both[i], 2 * single[i], 1e-12);
 }
 
-TEST(Antialias, RingsOfOtherFacesAreRefused) {
-  const Scene<float> scene = AsScene<float>(WavyGrid(1, 1, 4, 4));
-  const auto rast = Rasterize(scene).rast;
-  const Numbers<float> color(16);
-  Numbers<float> out(16);
-  const EdgeRings rings = BuildEdgeRings(std::vector<std::int32_t>{0, 1, 2});
-  const Status status = Antialias<float>(InputOf(scene, rings, rast, color, 1), Workers(1), out);
-  EXPECT_NE(status.message().find("of 1 triangles, but tri has 2"), std::string::npos);
-}
-
 }  // namespace tilegrad::compat::nvdiffrast::antialias_test

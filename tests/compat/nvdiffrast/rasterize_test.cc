@@ -148,13 +148,6 @@ TEST(Rasterize, ClippedQuadHasNoSeam) {
   }
 }
 
-TEST(Rasterize, OfCoincidingFacesTheFirstIsSeen) {
-  Scene<float> scene = HalfImage();
-  scene.faces = {0, 1, 2, 1, 2, 0, 2, 1, 0};
-  const auto out = Rasterize(scene);
-  EXPECT_EQ(out.rast[3], 1);
-}
-
 // Also of faces that are cut, by any of the planes, wherever they start and however they are wound;
 // and then there is nothing to peel.
 TEST(Rasterize, OfCoincidingFacesThatAreCutTheFirstIsSeen) {
@@ -204,26 +197,6 @@ TEST(Rasterize, OfFacesAtOneDepthTheFirstIsSeen) {
   EXPECT_GT(behind, 1000u);
 }
 
-TEST(Rasterize, RangesChooseFacesAndKeepTheirNumbers) {
-  Scene<double> all = WavyGrid(4, 1, 20, 24);
-  Scene<double> ranged = all;
-  ranged.shared = true, ranged.images = 3;
-  ranged.ranges = {10, 7, 0, 0, 0, 32};
-  const auto out = Rasterize(ranged);
-  for (std::size_t n = 0; n < 3; ++n) {
-    Scene<double> one = all;
-    const std::int32_t first = ranged.ranges[2 * n], count = ranged.ranges[2 * n + 1];
-    one.faces.assign(all.faces.begin() + 3 * first, all.faces.begin() + 3 * (first + count));
-    const auto expected = Rasterize(one);
-    for (std::size_t p = 0; p < one.grid().pixels(); ++p) {
-      const double* a = &out.rast[4 * (n * one.grid().pixels() + p)];
-      const double* b = &expected.rast[4 * p];
-      EXPECT_EQ(a[0], b[0]);
-      EXPECT_EQ(a[3], b[3] == 0 ? 0 : b[3] + first) << "image " << n << " pixel " << p;
-    }
-  }
-}
-
 TEST(Rasterize, LayersPeelFromFrontToBack) {
   Scene<float> scene;
   scene.height = scene.width = 70;  // more than one bin, and a face that covers all of a bin
@@ -241,25 +214,6 @@ TEST(Rasterize, LayersPeelFromFrontToBack) {
       ASSERT_EQ(out.rast[4 * p + 3], expected) << p;
     }
   }
-}
-
-TEST(Rasterize, BadInputIsNamed) {
-  const auto message = [](const Scene<float>& scene) {
-    Numbers<float> rast(4 * scene.grid().pixels());
-    return Rasterizer().Run(scene.input(), Workers(1), {rast, {}, {}}).message();
-  };
-  Scene<float> scene = HalfImage();
-  scene.faces = {0, 1, 3};
-  EXPECT_NE(message(scene).find("face 0 has vertex 3, but there are 3"), std::string::npos);
-  scene = HalfImage();
-  scene.positions[5] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(message(scene).find("position 1 of vertex 1 is nan"), std::string::npos);
-  scene = HalfImage();
-  scene.ranges = {0, 2};
-  EXPECT_NE(message(scene).find("range 0"), std::string::npos);
-  scene = HalfImage();
-  scene.width = 0;
-  EXPECT_NE(message(scene).find("4 x 0"), std::string::npos);
 }
 
 TEST(Rasterize, FloatAgreesWithDouble) {
