@@ -146,6 +146,8 @@ class Interface(unittest.TestCase):
                                1 / math.tan(math.radians(49.13434207744484) / 2), places=5)
         forward = rotation @ (position / position.norm(dim=1, keepdim=True)).unsqueeze(-1)
         self.assertLess(float((forward[..., 0] - torch.tensor([0., 0, 1])).abs().max()), 1e-6)
+        with self.assertRaisesRegex(ValueError, "camera 0: up is 0 or along the view"):
+            renderer.set_look_at_parameters([0], [90], [2])
         view, shift = lookatnp(*(np.reshape(v, (3, 1)) for v in ([1., 2, 3], [0, 0, 0], [0, 1, 0])))
         self.assertTrue(np.allclose(view @ view.T, np.eye(3), atol=1e-6))
         self.assertTrue(np.allclose(view @ np.zeros((3, 1)) + shift, [[0], [0], [-14**0.5]],

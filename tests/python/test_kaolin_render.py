@@ -94,6 +94,25 @@ class Constructors(CameraTest):
         with self.assertRaisesRegex(ValueError, "extrinsics of 2 cameras, intrinsics of 1"):
             camera(eye=double([[0., 0, 4], [3, 0, 0]]), num_cameras=1)
 
+    def test_an_up_along_the_view_is_an_error(self):
+        """Such cameras have no rotation: they would show nothing, in silence."""
+        older = kaolin.render.camera
+        eye = double([[0., 0, 4], [0, -3, 0]])
+        for up, where in (([0., 1, 0], 1), ([0., 0, -2], 0), ([0., 0, 0], 0)):
+            place = eye, torch.zeros(2, 3).double(), double([up])
+            for name, make in (
+                    ("from_lookat", lambda: camera(eye=eye, up=up)),
+                    ("generate_rotate_translate_matrices",
+                     lambda: older.generate_rotate_translate_matrices(*place)),
+                    ("generate_transformation_matrix",
+                     lambda: older.generate_transformation_matrix(*place))):
+                with self.assertRaisesRegex(ValueError, f"{name}: camera {where}: up is 0 or along"):
+                    make()
+        with self.assertRaisesRegex(ValueError, "along the view"):
+            camera(eye=[1., 2, 3], at=[1., 2, 3])
+        almost = camera(eye=[0., 4, 1e-4])
+        self.assert_near(almost.R @ almost.R.transpose(1, 2), torch.eye(3)[None].tolist())
+
 
 class Transforms(CameraTest):
     def test_principal_point_and_rays_agree_with_the_projection(self):

@@ -45,6 +45,16 @@ def check_not_empty(function: str, argument: str, tensor: torch.Tensor, things: 
         raise ValueError(f"{function}: {argument} has no {things}")
 
 
+def check_up(function: str, up: torch.Tensor, backward: torch.Tensor) -> None:
+    """ValueError where `up` [C,3] tells no direction across the view, whose unit vectors are
+    `backward` [C,3]: such a camera would show nothing."""
+    across = torch.cross(up.detach(), backward.detach(), dim=-1).norm(dim=-1)
+    lost = (across <= 1e-6 * up.detach().norm(dim=-1)).nonzero()
+    if len(lost):
+        raise ValueError(f"{function}: camera {int(lost[0])}: up is 0 or along the view, or the "
+                         "camera is where it looks; give another up")
+
+
 def to_numpy(tensor: torch.Tensor) -> np.ndarray:
     """The tensor's memory as an array; of a copy if it is not contiguous."""
     return tensor.detach().resolve_neg().contiguous().numpy()

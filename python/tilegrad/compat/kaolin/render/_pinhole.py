@@ -14,7 +14,7 @@ from typing import Any, Optional, Sequence, Union
 import torch
 
 from tilegrad._dense import full_precision
-from tilegrad.compat._tensors import check_floats
+from tilegrad.compat._tensors import check_floats, check_up
 
 _Values = Union[torch.Tensor, Sequence[float], Any]  # or an array of NumPy
 _Device = Union[torch.device, str, None]
@@ -57,11 +57,13 @@ class CameraExtrinsics:
     def from_lookat(cls, eye: _Values, at: _Values, up: _Values,
                     dtype: torch.dtype = torch.float32,
                     device: _Device = None) -> CameraExtrinsics:
-        """eye, at, up: [3] or [C,3]: where the camera is, what it looks at, what is up there."""
+        """eye, at, up: [3] or [C,3]: where the camera is, what it looks at, what is up there.
+        ValueError: an up along the view."""
         eye, at, up = torch.broadcast_tensors(*(
             torch.as_tensor(v, dtype=dtype, device=device).reshape(-1, 3) for v in (eye, at, up)))
         normalize = torch.nn.functional.normalize
         backward = normalize(eye - at, dim=-1)
+        check_up("from_lookat", up, backward)
         right = normalize(torch.cross(up, backward, dim=-1), dim=-1)
         rotation = torch.stack([right, torch.cross(backward, right, dim=-1), backward], dim=1)
         return cls(_view_matrix(rotation, eye))

@@ -9,6 +9,7 @@ import math
 import torch
 
 from tilegrad._dense import full_precision
+from tilegrad.compat._tensors import check_up
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.render._camera import (
     Camera, generate_centered_pixel_coords, generate_pinhole_rays)
@@ -52,8 +53,9 @@ def generate_rotate_translate_matrices(camera_position: torch.Tensor, look_at: t
                                        camera_up_direction: torch.Tensor
                                        ) -> tuple[torch.Tensor, torch.Tensor]:
     """camera_rot [B,3,3] and camera_trans [B,3] of cameras at camera_position [B,3] that look at
-    look_at [B,3], camera_up_direction [B,3] (or [1,3]) up."""
-    axes = _axes(camera_position - look_at, camera_up_direction)
+    look_at [B,3], camera_up_direction [B,3] (or [1,3]) up. ValueError: an up along the view."""
+    axes = _axes("generate_rotate_translate_matrices", camera_position - look_at,
+                 camera_up_direction)
     return torch.stack(axes, dim=1), camera_position
 
 
@@ -61,14 +63,16 @@ def generate_rotate_translate_matrices(camera_position: torch.Tensor, look_at: t
 def generate_transformation_matrix(camera_position: torch.Tensor, look_at: torch.Tensor,
                                    camera_up_direction: torch.Tensor) -> torch.Tensor:
     """camera_transform [B,4,3] of the same cameras: (p, 1) times it is p in the camera."""
-    rotation = torch.stack(_axes(camera_position - look_at, camera_up_direction), dim=2)
+    rotation = torch.stack(_axes("generate_transformation_matrix", camera_position - look_at,
+                                 camera_up_direction), dim=2)
     return torch.cat([rotation, -camera_position.unsqueeze(1) @ rotation], dim=1)
 
 
-def _axes(backward: torch.Tensor, up: torch.Tensor) -> list[torch.Tensor]:
+def _axes(function: str, backward: torch.Tensor, up: torch.Tensor) -> list[torch.Tensor]:
     """The camera's x, y, z in the world, [B,3] each."""
     z = _unit(backward)
     up, z = torch.broadcast_tensors(up, z)
+    check_up(function, up, z)
     x = _unit(torch.cross(up, z, dim=1))
     return [x, _unit(torch.cross(z, x, dim=1)), z]
 
