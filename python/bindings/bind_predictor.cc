@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 
+#include "bindings/listener.h"
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
 #include "fit/input.h"
@@ -73,15 +74,17 @@ class Model {
     const auto seen = SpanOf<std::uint8_t>(image, "predict", "image", {1, 4, size, size});
     const auto planes = SpanOf<std::uint8_t>(picture, "predict", "picture", {4, kAny, kAny});
     const auto side = static_cast<int>(py::reinterpret_borrow<py::array>(picture).shape(1));
-    const auto refine = [&]() -> Result<train::RefinedMesh> {
+    Listener listening{py::none()};
+    auto refined = listening.Run([&]() -> Result<train::RefinedMesh> {
       const std::scoped_lock lock(mutex_);
       if (const Status status = predictor_.model().CheckRefinable(); !status.ok()) return status;
       auto meshes = predictor_.Predict(seen);
       if (!meshes.ok()) return meshes.status();
       return train::RefineMesh(meshes->front(), train::TargetsOfPlanar(planes, side),
-                               {.steps = steps}, *workers_);
-    };
-    return MeshToDict(ValueOrThrow(WithoutGil(refine)).mesh);
+                               {.steps = steps, .watch = {nullptr, &listening.stop()}}, *workers_);
+    });
+    listening.Settle(refined.status());
+    return MeshToDict(std::move(refined->mesh));
   }
 
  private:

@@ -49,8 +49,8 @@ std::vector<Camera> CamerasOf(const py::object& cameras, std::size_t count, Imag
 }
 
 // views: color [N,3,H,W] straight and alpha [N,H,W], float32; names [N]; cameras [N][17] or None.
-train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& options,
-                              Listener* listening) {
+Result<train::FitInput> InputOfArrays(const py::dict& views, const train::InputOptions& options,
+                                      Listener* listening) {
   const auto names = views["names"].cast<Words>();
   const auto n = static_cast<py::ssize_t>(names.size());
   const auto image = views["color"].cast<py::array>();
@@ -66,10 +66,7 @@ train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& 
   input.posed = !views["cameras"].is_none();
   input.cameras = CamerasOf(views["cameras"], names.size(),
                             {input.images.width, input.images.height}, options.fov);
-  const Status finished =
-      listening->Run([&] { return train::FinishInput(options, &input).Within("fit"); });
-  listening->Settle(finished);
-  ThrowIfError(finished);
+  TILEGRAD_TRY(listening->Run([&] { return train::FinishInput(options, &input).Within("fit"); }));
   return input;
 }
 
@@ -94,18 +91,16 @@ train::InputOptions InputOptionsOf(const py::dict& views) {
 
 // views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out", "background",
 // "fov", "up".
-train::FitInput InputOf(const py::dict& views, Listener* listening) {
+Result<train::FitInput> InputOf(const py::dict& views, Listener* listening) {
   train::InputOptions options = InputOptionsOf(views);
   options.watch = {listening->Sink(), &listening->stop()};
   if (!views.contains("folder")) return InputOfArrays(views, options, listening);
   const auto folder = views["folder"].cast<Path>();
   const auto model = views["model"].cast<std::string>();
-  auto input = listening->Run([&] {
+  return listening->Run([&] {
     return model.empty() ? train::ReadFitFolder(folder, options)
                          : train::ReadFitDataset(folder, model, options.hold_out);
   });
-  listening->Settle(input.status());
-  return ValueOrThrow(std::move(input));
 }
 
 train::ParameterSet ParametersNamed(const Words& names) {
@@ -171,7 +166,10 @@ py::object ScoresToDict(const std::vector<train::ViewScore>& scores) {
 py::dict Fit(const py::dict& views, const py::dict& request, const py::object& listener) {
   train::FitJob job = JobOf(request);
   Listener listening(listener);
-  job.input = InputOf(views, &listening);
+  auto input = InputOf(views, &listening);
+  listening.Settle(input.status());
+  if (!input.ok()) return py::dict(py::arg("finished") = false);
+  job.input = std::move(input).value();
   const Workers workers(request["threads"].cast<int>());
   const train::CameraSearch search = {views["find_cameras"].cast<bool>(),
                                       request["resume"].cast<bool>()};

@@ -143,8 +143,9 @@ def config_names() -> list[str]:
 def _fit(views: dict, request: dict, folder: pathlib.Path, callback: Optional[Callback],
          keep: bool) -> FitResult:
     with _Listener(folder, callback) as listener:
-        listener("preparing", 0, 0)
-        done = _tools.fit(views, {**request, "out": os.fspath(folder)}, listener)
+        stopped = listener("preparing", 0, 0) is True
+        done = {"finished": False} if stopped else _tools.fit(
+            views, {**request, "out": os.fspath(folder)}, listener)
     finished = done["finished"]
     return FitResult(load_mesh(folder / "mesh.glb") if finished else None, finished,
                      done.get("steps", listener.done), done.get("seconds", 0.0),

@@ -4,7 +4,9 @@
 import os
 import pathlib
 import pickle
+import signal
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -57,6 +59,20 @@ class Predict(FolderTest):
         refined = predictor.predict(image, refine=10)  # 80 faces are divided once
         self.assertEqual(len(refined.faces), 4 * len(template.faces))
         self.assertAlmostEqual(float(np.abs(refined.positions).max()), 0.45, places=5)
+
+    def test_a_signal_ends_the_refinement(self) -> None:
+        """As Ctrl-C does: its handler runs within a second, and what it raises comes out."""
+        def stop(*_: object) -> None:
+            raise TimeoutError("the alarm")
+
+        predictor, image = files.Predictor(run()), files.load_image(self.image)
+        before = signal.signal(signal.SIGALRM, stop)
+        self.addCleanup(signal.signal, signal.SIGALRM, before)
+        start = time.monotonic()
+        signal.setitimer(signal.ITIMER_REAL, 0.5)
+        with self.assertRaisesRegex(TimeoutError, "the alarm"):
+            predictor.predict(image, refine=100_000)
+        self.assertLess(time.monotonic() - start, 2.5)
 
     def test_many_at_once_are_each_alone(self) -> None:
         predictor = files.Predictor(run())

@@ -149,6 +149,30 @@ class Fit(unittest.TestCase):
         self.assertEqual([at.step for at in fitting], list(range(1, 61)))
         self.assertIn("loss", fitting[-1].values)
 
+    def test_a_callback_may_stop_before_the_first_step(self):
+        class Until(list):
+            stages = True
+
+            def __init__(self, last):
+                super().__init__()
+                self.last = last
+
+            def __call__(self, at):
+                self.append(at.stage)
+                return at.stage == self.last
+
+        folder = self.out.parent / "pictures"
+        folder.mkdir()
+        for i, image in enumerate(IMAGES):
+            save_image(folder / f"{i}.png", image)
+        for images, cameras, last in (
+                (IMAGES, CAMERAS, "preparing"), (folder, None, "reading images"),
+                (IMAGES[..., :3], CAMERAS, "looking for plain backgrounds")):
+            told = Until(last)
+            result = tilegrad.fit(images, cameras, callback=told, **SMALL)
+            self.assertEqual((result.finished, result.mesh, result.steps), (False, None, 0))
+            self.assertEqual(told[-1], last)
+
     def test_the_work_has_a_thread_callbacks_have_the_callers(self):
         """So a callback may draw, and use what belongs to its thread."""
         threads = []
