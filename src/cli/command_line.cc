@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/command_line.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -33,6 +33,14 @@ struct Declare {
   }
 };
 
+// A check of CLI11's, and what is wrong with a word that it refuses.
+CLI::Validator Saying(const std::string& fault, const CLI::Validator& check) {
+  const auto look = [fault, check](std::string& word) {
+    return check(word).empty() ? std::string() : word + fault;
+  };
+  return {look, check.get_description()};
+}
+
 struct Apply {
   CLI::App* app;
   CLI::Option* option;
@@ -47,10 +55,15 @@ struct Apply {
     option->option_text("FLOAT x " + std::to_string(numbers.count));
   }
   void operator()(Range range) const {
-    if (!whole) option->check(CLI::Range(range.low, range.high));
-    if (whole) option->check(CLI::Range(std::llround(range.low), std::llround(range.high)));
+    const auto check = whole ? CLI::Range(std::llround(range.low), std::llround(range.high))
+                             : CLI::Range(range.low, range.high);
+    option->check(
+        Saying(fmt::format(" is not in {:.10g} to {:.10g}", range.low, range.high), check));
   }
-  void operator()(const OneOf& choice) const { option->check(CLI::IsMember(choice.words)); }
+  void operator()(const OneOf& choice) const {
+    const std::string fault = fmt::format(" is not one of {}", fmt::join(choice.words, ","));
+    option->check(Saying(fault, CLI::IsMember(choice.words)));
+  }
   void operator()(const TypeName& type) const { option->type_name(type.name); }
   void operator()(const ValueMayLack& lacking) const {
     option->expected(0, 1)->default_str(lacking.value)->option_text(lacking.text);
@@ -91,11 +104,32 @@ std::string ExplainExtra(const CLI::App& command) {
   return fmt::format("unknown option {}{}", name, DidYouMean(name, known));
 }
 
-// CLI11's words for --flag=value, without the dashes, in ours.
-std::string ExplainFlag(std::string_view what) {
-  constexpr std::string_view kOverride = " was given a disallowed flag override";
-  if (!what.ends_with(kOverride)) return std::string(what);
-  return fmt::format("--{} takes no value", what.substr(0, what.size() - kOverride.size()));
+// What is printed for a sentence of CLI11's: {0} is what it has between `before` and `mark`, {1}
+// the rest.
+struct Sentence {
+  std::string_view before, mark, ours;
+};
+constexpr Sentence kSentences[] = {
+    {"Could not convert: ", " = ", "{0}: invalid value {1}"},
+    {"A subcommand is required", "", "no command given"},
+    {"", " was given a disallowed flag override", "--{0} takes no value"},
+    {"", ": At Most 1 required but received ", "{0} is given {1} times"},
+    {"", ": At Most ", "{0}: too many values"},
+    {"", ": 1 required ", "{0} needs a value"},
+    {"", " required ", "{0} values are needed"},  // "--eye: 3" of them
+    {"", " excludes ", "{0} and {1} exclude each other"},
+};
+
+std::string InOurWords(const CLI::Error& error) {
+  const std::string theirs = error.what();
+  if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr) return theirs;  // of a check
+  for (const Sentence& s : kSentences) {
+    const std::size_t at = theirs.find(s.mark, s.before.size());
+    if (!theirs.starts_with(s.before) || at == std::string::npos) continue;
+    return fmt::format(fmt::runtime(s.ours), theirs.substr(s.before.size(), at - s.before.size()),
+                       theirs.substr(at + s.mark.size()));
+  }
+  return theirs;
 }
 
 // The command that was chosen, what is wrong, and where its options are listed.
@@ -106,7 +140,7 @@ std::string Explain(const CLI::App* app, const CLI::Error& error) {
   const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
                      !command.remaining().empty();
   return fmt::format("tilegrad: {}{}; see tilegrad {}--help\n", name.empty() ? "" : name + ": ",
-                     extra ? ExplainExtra(command) : ExplainFlag(error.what()),
+                     extra ? ExplainExtra(command) : InOurWords(error),
                      name.empty() ? "" : name + " ");
 }
 

@@ -54,10 +54,10 @@ TEST_F(OptionWords, ThatAreTooFewAreSaidOfTheirOption) {
   const std::string mesh = In("a.glb");
   ExpectRefused("render " + mesh + " --eye 0 0", 2, "--eye");
   ExpectRefused("render --eye 0 0 " + mesh, 2, "--eye");
-  ExpectRefused("render " + mesh + " --eye 0 0 --size 8", 2, "--eye");
+  ExpectRefused("render " + mesh + " --eye 0 0 --size 8", 2, "--eye: invalid value 0,0,--size");
   ExpectRefused("render --out " + In("out") + " " + mesh + " --eye 0 0 4 5", 3,
                 "5: no such file");  // another mesh
-  ExpectRefused("render " + mesh + " --eye 0 0 4 --eye 0 0 5", 2, "--eye");
+  ExpectRefused("render " + mesh + " --eye 0 0 4 --eye 0 0 5", 2, "--eye: too many values");
   ExpectRefused("render " + mesh + " --light 1 0 0", 2, "--light");
   ExpectRefused("render " + mesh + " --sh 1 2 3", 2, "--sh");
   ExpectRefused("render " + mesh + " --background red", 2, "--background");
@@ -84,7 +84,14 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {render + "--fvo=30", "did you mean --fov?"},
            {render + "--shading fancy", "fancy is not one of lambert,none,phong,sh"},
            {"views " + In("a.glb") + " --up w --out " + In("v"), "w is not one of x,y,z"},
-           {render + "--size", "; see tilegrad render --help"}}) {
+           {render + "--size", "render: --size needs a value; see tilegrad render --help"},
+           {render + "--force=1", "render: --force takes no value"},
+           {render + "--eye 0,0,x", "render: --eye: invalid value 0,0,x"},
+           {render + "--supersample 99", "--supersample: 99 is not in 1 to 16"},
+           {"fit f --steps 1 --steps 2", "fit: --steps is given 2 times"},
+           {"fit f --steps 1 --quality fast", "--steps and --quality exclude each other"},
+           {"fit f --quality good", "--quality: good is not one of fast,normal,best"},
+           {"", "no command given; see tilegrad --help"}}) {
     ExpectRefused(line, 2, part);
   }
   for (const std::string& line : {std::string("info"), render}) {

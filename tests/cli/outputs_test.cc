@@ -115,7 +115,8 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
   ExpectKept("f/mesh.glb", fit + "2 --out f", "f: already holds a run; --resume goes on with it");
   // The images are not even looked at.
   ExpectKept("f/mesh.glb", "fit nowhere --out f", "already holds a run");
-  ExpectKept("f/mesh.glb", fit + "2 --out f --force --resume", "--force excludes --resume");
+  ExpectKept("f/mesh.glb", fit + "2 --out f --force --resume",
+             "--force and --resume exclude each other");
   ExpectDone(fit + "1 --out f --force");
   EXPECT_TRUE(Exists("f/checkpoints/step_00000001.safetensors"));
   EXPECT_FALSE(Exists("f/checkpoints/step_00000002.safetensors"));

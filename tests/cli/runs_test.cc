@@ -90,7 +90,8 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train", 2, "tilegrad: train: --config is required; see tilegrad train --help");
   ExpectRefused("train --config quick --data x", 2, "train: --out is required");
   ExpectRefused("train --resume", 2, "--config is required");
-  ExpectRefused("train --config quick --data none --out " + In("c") + " --live=9000", 2, "--live");
+  ExpectRefused("train --config quick --data none --out " + In("c") + " --live=9000", 2,
+                "train: --live takes no value");
   Write("run/config.toml", std::string("name = \"a\"\n"));
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
