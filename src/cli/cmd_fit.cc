@@ -69,8 +69,7 @@ Status SetConfig(const FitOptions& options, FitConfig* config) {
     std::copy_n(options.light_direction.begin(), 3, config->light_direction.begin());
   }
   // Vertex colours are what a template gets if they, and no texture, are to be fitted.
-  const train::ParameterSet& set = config->parameters;
-  config->vertex_colors = set[Parameter::kColors];
+  config->vertex_colors = config->parameters[Parameter::kColors];
   return {};
 }
 
@@ -123,10 +122,9 @@ Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, Out
   return job;
 }
 
-// Before anything is read or made.
 Status CheckFolder(const FitOptions& options, const OutputGuard& guard) {
-  if (options.doctor) return {};
-  return CheckRunFolder(options.out, ExistingOf(options.resume, options.force), guard);
+  const auto existing = ExistingOf(options.resume, options.force);
+  return options.doctor ? Status() : CheckRunFolder(options.out, existing, guard);
 }
 
 Status KeepGiven(const FitOptions& options) {
@@ -155,7 +153,6 @@ Status RunDoctor(const FitOptions& options, train::FitJob job, const Workers& wo
   return {};
 }
 
-// A fit whose folder is claimed.
 Status RunClaimed(const FitOptions& options, train::FitJob* job, const Workers& workers,
                   const ProgressSink& progress) {
   const std::size_t warnings = job->input.warnings.size();
