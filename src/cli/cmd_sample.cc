@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -96,7 +97,7 @@ Status Score(const SampleOptions& options, const SampleFiles& files, const Path&
   const std::string text = train::FormatScores(*scores);
   TILEGRAD_TRY(WriteTextAtomic(files.scores, text));
   (*json)["scores"] = train::ScoresJson(*scores);
-  TILEGRAD_TRY(WriteTextAtomic(files.numbers, (*json)["scores"].dump(2) + "\n"));
+  TILEGRAD_TRY(WriteTextAtomic(files.numbers, JsonText((*json)["scores"], 2) + "\n"));
   TILEGRAD_TRY(io::SavePng(files.nearest, scores->nearest));
   Print("{}written to {} and {}; samples beside the nearest training objects: {}\n", text,
         files.scores.string(), files.numbers.string(), files.nearest.string());

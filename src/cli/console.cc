@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "base/json_text.h"
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "io/guarded_process.h"
@@ -96,7 +97,7 @@ void AddSpeechOptions(Command* command) {
 
 void PrintResult(const nlohmann::ordered_json& result) {
   if (!g_json) return;
-  fmt::print("{}\n", result.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", JsonText(result, 2));
 }
 
 void OpenStandardStreams() {

@@ -2,12 +2,21 @@
 // Names of files and classes that try to be more than names, and what killed commands leave.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
+#include "base/text.h"
+#include "io/glb_writer.h"
+#include "scene/shapes.h"
 #include "support/run_program.h"
 #include "support/source_dir.h"
 
 namespace tilegrad::hostile_names_test {
 
 constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n";
+
+constexpr const char* kTiny =
+    " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set network.code=8 "
+    "--set network.hidden1=8 --set network.hidden2=8 --set network.template_level=1";
 
 class HostileNames : public ProgramTest {
  protected:
@@ -76,10 +85,7 @@ TEST_F(HostileNames, AreTextInReportsAndTables) {
     Write(file, text);
   }
   done("train --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml --data " + data + " --out " +
-       run +
-       " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
-       "network.code=8 --set network.hidden1=8 --set network.hidden2=8 --set "
-       "network.template_level=1");
+       run + kTiny);
   done("eval --run " + run + " --views-per-model 1");
   done("report --run " + run + " --models 2");
   for (const char* file : {"run/report.html", "run/eval.md"}) {
@@ -92,6 +98,32 @@ TEST_F(HostileNames, AreTextInReportsAndTables) {
   EXPECT_NE(page.find("&lt;img src=x onerror=alert(1)&gt;"), std::string::npos);
 }
 
+// Names of folders are bytes; JSON is UTF-8. What is written finds its files again.
+TEST_F(HostileNames, OfDatasetsNeedNotBeUtf8) {
+  const auto done = [](const std::string& arguments) {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    return outcome.output;
+  };
+  const std::string data = "caf\xe9 \xee\xbf\xa9", run = Quoted("run\xff");  // the last is U+EFE9
+  const std::string said = done(
+      "dataset --source procedural --per-class 2 --size 16 --views 2 --json --out " + Quoted(data));
+  const auto json = nlohmann::json::parse(said.substr(said.find('{')));
+  EXPECT_EQ(NameFromJson(json.at("folder").get<std::string>()), (folder_ / data).string());
+  done("train --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml --data " + Quoted(data) +
+       " --out " + run + kTiny);
+  EXPECT_TRUE(IsUtf8(ReadText(folder_ / "run\xff/run.json").value()));
+  done("train --resume " + run + " --steps 3");
+  done("eval --run " + run + " --views-per-model 1");
+  done("report --run " + run + " --models 1");
+  EXPECT_TRUE(IsFile(folder_ / "run\xff/report.html"));
+  ASSERT_TRUE(io::SaveGlb(folder_ / "truth.glb", Icosphere(1, 1)).ok());
+  done("views " + Quoted("truth.glb") + " --views 3 --held-out 0 --size 16 --out " +
+       Quoted("v\xfe"));
+  done("fit " + Quoted("v\xfe") + " --steps 1 --out " + Quoted("f\xfd"));
+  done("fit --resume --steps 2 --out " + Quoted("f\xfd"));
+}
+
 // Half-written files of processes that are gone; those of others, and other files, stay.
 TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   const std::string data = Quoted("data"), run = Quoted("run");
@@ -99,14 +131,10 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
       RunProgram("dataset --source procedural --per-class 2 --size 16 --views 3 --out " + data)
           .exit_code,
       0);
-  const std::string tiny =
-      " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
-      "network.code=8 "
-      "--set network.hidden1=8 --set network.hidden2=8 --set network.template_level=1";
   const std::string config = std::string(TILEGRAD_SOURCE_DIR) + "/configs/quick.toml";
-  ASSERT_EQ(
-      RunProgram("train --config " + config + " --data " + data + " --out " + run + tiny).exit_code,
-      0);
+  ASSERT_EQ(RunProgram("train --config " + config + " --data " + data + " --out " + run + kTiny)
+                .exit_code,
+            0);
   const std::string gone = ".4194305.tmp", own = "." + std::to_string(::getpid()) + ".tmp";
   std::vector<Path> left;
   for (const std::string name :
