@@ -19,6 +19,11 @@ namespace {
 
 constexpr std::size_t kMostPixels = std::size_t{1} << 30;  // of all views together
 
+// Masks are those that images came with, if there are any.
+bool TakesMasks(Background background) {
+  return background == Background::kAuto || background == Background::kMask;
+}
+
 // Grows an input by one view after the other.
 class InputReader {
  public:
@@ -34,18 +39,10 @@ class InputReader {
 
   // Either all views have a mask or none.
   Status CheckMasks(Background background) const {
-    const bool asked = background == Background::kAuto || background == Background::kMask;
-    if (!asked || masked_.empty() || bare_.empty()) return {};
+    if (!TakesMasks(background) || bare_.empty() || !HasAlpha(input_)) return {};
     return DataLoss(
         "{}: has no mask, though {} has {}: give it one, or --background plain or none for all",
         bare_[0].image, masked_[0].image, masked_[0].mask);
-  }
-
-  // Where others have a border, a mask without one says most likely nothing.
-  void WarnOfFullMasks() {
-    if (!HasAlpha(input_)) return;
-    for (const std::string& name : full_)
-      input_.warnings.push_back(name + ": its mask is full: every pixel counts as the object");
   }
 
  private:
@@ -63,7 +60,6 @@ class InputReader {
     input_.images.color.insert(input_.images.color.end(), view.color.begin(), view.color.end());
     input_.images.alpha.insert(input_.images.alpha.end(), view.alpha.begin(), view.alpha.end());
     (view.mask.empty() ? bare_ : masked_).push_back({frame.image.string(), view.mask});
-    NoteFull(view);
     return {};
   }
 
@@ -82,14 +78,8 @@ class InputReader {
                              frame.image.string(), kMostPixels);
   }
 
-  void NoteFull(const ViewPixels& view) {
-    const bool full = std::ranges::all_of(view.alpha, [](float a) { return a >= 1; });
-    if (full && !view.mask.empty()) full_.push_back(input_.names.back());
-  }
-
   FitInput& input_;
   std::vector<Source> masked_, bare_;
-  std::vector<std::string> full_;
 };
 
 // Every n-th view, from the n-th on, is held out, as are those that are already.
@@ -156,6 +146,18 @@ Status CheckCameras(const FitInput& input) {
   return {};
 }
 
+// Where others have a border, a mask without one says most likely nothing.
+void WarnOfFullMasks(FitInput* input) {
+  const std::size_t plane = input->images.pixels();
+  for (std::size_t n = 0; n < input->names.size(); ++n) {
+    const auto alpha = std::span(input->images.alpha).subspan(n * plane, plane);
+    if (std::ranges::all_of(alpha, [](float a) { return a >= 1; })) {
+      input->warnings.push_back(input->names[n] +
+                                ": its mask is full: every pixel counts as the object");
+    }
+  }
+}
+
 Result<int> FindModel(const Dataset& dataset, const std::string& name) {
   for (std::size_t i = 0; i < dataset.models().size(); ++i) {
     const ModelInfo& model = dataset.models()[i];
@@ -190,6 +192,7 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
 Status FinishInput(const InputOptions& options, FitInput* input) {
   TILEGRAD_TRY(CheckCameras(*input));
   HoldOut(options.hold_out, input);
+  if (TakesMasks(options.background) && HasAlpha(*input)) WarnOfFullMasks(input);
   TILEGRAD_TRY(ApplyBackground(options.background, input, options.watch));
   TILEGRAD_TRY(DropEmptyViews(input));
   if (input->training.empty())
@@ -219,7 +222,6 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   InputReader reader(&input);
   TILEGRAD_TRY(reader.AddAll(read.frames, options.watch));
   TILEGRAD_TRY(reader.CheckMasks(options.background));
-  reader.WarnOfFullMasks();
   TILEGRAD_TRY(FinishInput(options, &input));
   return input;
 }

@@ -22,11 +22,13 @@ class Undistortion {
       : lens_(lens),
         largest_(LargestRadius(lens)),
         camera_(CameraCast<double>(camera)),
-        from_(from) {}
+        from_(from),
+        masked_(std::ranges::any_of(from.alpha, [](float a) { return a < 1; })) {}
 
   // By which the focal length is to shrink, so that all of the object stays in the image.
   double Scale() const {
     double scale = 1;
+    if (!masked_) return scale;
     const auto width = from_.size.width, height = from_.size.height;
     for (int y = 0; y < height; ++y) AddRun({0, y}, {1, 0}, width, &scale);
     for (int x = 0; x < width; ++x) AddRun({x, 0}, {0, 1}, height, &scale);
@@ -99,8 +101,8 @@ class Undistortion {
       }
       out->color[c * out->pixels() + to] = std::clamp(sum, 0.0f, 1.0f);
     }
-    const bool cut = !inside && !from_.mask.empty();
-    out->alpha[to] = cut ? 0.0f : std::clamp(alpha, 0.0f, 1.0f);
+    // Without a mask exactly 1, which sums of weights are not.
+    out->alpha[to] = !masked_ ? 1.0f : inside ? std::clamp(alpha, 0.0f, 1.0f) : 0.0f;
   }
 
   // Bilinear; beyond the border its pixels.
@@ -119,6 +121,7 @@ class Undistortion {
   const double largest_;
   const Camera64 camera_;
   const ViewPixels& from_;
+  const bool masked_;
 };
 
 }  // namespace
@@ -127,7 +130,7 @@ Camera Undistort(const LensDistortion& lens, const Camera& camera, ViewPixels* v
   if (lens.straight()) return camera;
   const ViewPixels from = *view;
   const Undistortion undistortion(lens, camera, from);
-  const double scale = from.mask.empty() ? 1 : undistortion.Scale();
+  const double scale = undistortion.Scale();
   undistortion.Fill(scale, view);
   Camera out = camera;
   out.fx *= static_cast<float>(scale);

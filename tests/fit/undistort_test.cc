@@ -119,6 +119,15 @@ TEST_F(Undistorted, AnObjectThatWouldLeaveThePictureStaysWhole) {
   }
 }
 
+// An alpha channel that is opaque throughout is no mask, and makes none of the borders.
+TEST_F(Undistorted, OpaquePicturesHaveNoMask) {
+  TakePicture(BrownLens({}), kFocal, 10);
+  const FitInput input = Read(R"("k1":-0.3,"k2":0.08,)", kFocal);
+  EXPECT_FALSE(input.masked);
+  EXPECT_EQ(input.cameras[0].fx, 80);
+  EXPECT_TRUE(std::ranges::all_of(input.images.alpha, [](float a) { return a == 1; }));
+}
+
 TEST_F(Undistorted, WildLensesLeaveFinitePictures) {
   TakePicture(BrownLens({}), kFocal, 0.4);
   for (const std::string lens : {R"("k1":1e300,)", R"("k1":-1e300,"k2":1e300,)", R"("p1":-1e200,)",

@@ -100,6 +100,18 @@ class Fit(unittest.TestCase):
         self.assertGreater(of_arrays.training["silhouette_iou"], 0.8)
         np.testing.assert_array_equal(of_folder.mesh.positions, of_arrays.mesh.positions)
 
+    def test_masks_that_say_nothing_are_named(self):
+        images = IMAGES.copy()
+        images[2, ..., 3] = 255
+        images[4, ..., 3] = 0
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            result = tilegrad.fit(images, CAMERAS, **SMALL)
+        said = [str(w.message) for w in caught]
+        self.assertEqual(result.training["views"], 5)
+        for message in ("fit: 2: its mask is full", "fit: 4: its mask is empty"):
+            self.assertTrue(any(text.startswith(message) for text in said), said)
+
     def test_what_a_callback_raises_goes_on(self):
         with self.assertRaises(ZeroDivisionError):
             tilegrad.fit(IMAGES, CAMERAS, callback=lambda at: 1 / 0, **SMALL)
