@@ -1,49 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/bare_frames.h"
 
-#include <algorithm>
-#include <array>
 #include <numbers>
-#include <span>
-#include <string_view>
 
 #include "base/error.h"
-#include "base/text.h"
 #include "fit/colmap_frames.h"
+#include "io/picture_names.h"
 
 namespace tilegrad::train {
 namespace {
 
-constexpr std::array<std::string_view, 4> kRead = {".png", ".jpg", ".jpeg", ".webp"};
-constexpr std::array<std::string_view, 23> kOthers = {
-    ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".tga",
-    ".jp2",  ".jxl",  ".jfif", ".psd", ".exr",  ".hdr", ".ppm", ".pgm",
-    ".dng",  ".cr2",  ".cr3",  ".nef", ".arw",  ".raf", ".orf"};
-
-// Names of files with such an ending, sorted.
-std::vector<Path> FilesIn(const Path& folder, std::span<const std::string_view> endings) {
-  std::vector<Path> out;
-  std::error_code error;
-  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
-       at.increment(error)) {
-    const std::string ending = LowerCase(at->path().extension().string());
-    const bool wanted = std::ranges::find(endings, ending) != endings.end();
-    if (wanted && at->is_regular_file(error)) out.push_back(at->path().filename());
-  }
-  std::ranges::sort(out);
-  return out;
-}
-
-void WarnOfOthers(const Path& folder, std::vector<std::string>* warnings) {
-  constexpr std::size_t kNamed = 5;
-  const std::vector<Path> others = FilesIn(folder, kOthers);
-  if (others.empty()) return;
-  std::string names;
-  for (std::size_t i = 0; i < std::min(others.size(), kNamed); ++i)
-    names += (i == 0 ? "" : ", ") + others[i].string();
-  warnings->push_back(fmt::format("{}: left out {} (not PNG, JPEG or WebP): {}{}", folder.string(),
-                                  Count(others.size(), "picture"), names,
-                                  others.size() > kNamed ? ", ..." : ""));
+// Its pictures; a warning names those that are not read.
+std::vector<Path> TakePictures(const Path& folder, std::vector<std::string>* warnings) {
+  io::PictureNames found = io::PicturesIn(folder);
+  if (!found.others.empty())
+    warnings->push_back(fmt::format("{}: left out {}", folder.string(), found.DescribeOthers()));
+  return std::move(found.read);
 }
 
 }  // namespace
@@ -58,10 +30,13 @@ TransformsFrame BareFrame(double fov) {
 std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
                                             std::vector<std::string>* warnings) {
   Path images = folder / "images";
-  if (FilesIn(images, kRead).empty()) images = folder;
-  WarnOfOthers(images, warnings);
+  std::vector<Path> pictures = TakePictures(images, warnings);
+  if (pictures.empty()) {
+    images = folder;
+    pictures = TakePictures(images, warnings);
+  }
   std::vector<TransformsFrame> frames;
-  for (const Path& name : FilesIn(images, kRead)) {
+  for (const Path& name : pictures) {
     TransformsFrame frame = BareFrame(fov);
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);

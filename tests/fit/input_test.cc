@@ -284,6 +284,9 @@ TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
   std::filesystem::remove(folder_ / "b/0.png");
   std::filesystem::remove(folder_ / "b/1.PNG");
   ExpectMessage(ReadFitFolder(folder_ / "b", 0).status(), "nor pictures", "2.heic");
+  std::filesystem::create_directories(folder_ / "c");
+  std::filesystem::rename(folder_ / "b", folder_ / "c/images");
+  ExpectMessage(ReadFitFolder(folder_ / "c", 0).status(), "nor pictures", "c/images", "2.heic");
 }
 
 // A disk from before UTF-8, in all that names files.

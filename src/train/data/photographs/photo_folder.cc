@@ -9,9 +9,9 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/json_nesting.h"
-#include "base/text.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
+#include "io/picture_names.h"
 #include "train/data/cutout.h"
 #include "train/data/photographs/factorization.h"
 #include "train/data/photographs/photographs.h"
@@ -26,21 +26,6 @@ constexpr const char* kTest = "transforms_test.json";
 constexpr int kTestEvery = 6;  // the last of each six pictures is held out
 constexpr std::size_t kMostNames = 256;
 constexpr double kFarthest = 1 << 20;  // pixels from the picture's corner that a keypoint may be
-
-bool IsPicture(const Path& path) {
-  const std::string ending = LowerCase(path.extension().string());
-  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
-}
-
-std::vector<Path> PicturesIn(const Path& folder) {
-  std::vector<Path> out;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (IsFile(entry.path()) && IsPicture(entry.path())) out.push_back(entry.path());
-  }
-  std::ranges::sort(out);
-  return out;
-}
 
 // masks/<name>.png of a picture without alpha.
 Result<ImageU8> Masked(const Path& folder, const Path& picture) {
@@ -81,14 +66,15 @@ class FolderReader {
  public:
   explicit FolderReader(Path folder) : folder_(std::move(folder)) {}
 
-  Result<PhotographSet> Read(const std::vector<Path>& pictures) {
+  // `names` of pictures in the folder `place`.
+  Result<PhotographSet> Read(const Path& place, const std::vector<Path>& names) {
     set_.folder = folder_, set_.source = "photographs";
     int index = 0;
-    for (const Path& picture : pictures) {
+    for (const Path& name : names) {
       Photograph photo;
-      photo.id = picture.filename().string(), photo.image = picture;
+      photo.id = name.string(), photo.image = place / name;
       photo.split = ++index % kTestEvery == 0 ? Split::kTest : Split::kTrain;
-      TILEGRAD_ASSIGN(const ImageU8 image, Masked(folder_, picture));
+      TILEGRAD_ASSIGN(const ImageU8 image, Masked(folder_, photo.image));
       TILEGRAD_TRY(SetMask(image, &photo));
       set_.photographs.push_back(std::move(photo));
     }
@@ -264,9 +250,13 @@ class FolderReader {
 
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder) {
   const Path images = folder / "images";
-  const std::vector<Path> pictures = PicturesIn(IsFolder(images) ? images : folder);
-  if (pictures.empty()) return std::optional<PhotographSet>();
-  TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(pictures));
+  const Path place = IsFolder(images) ? images : folder;
+  const io::PictureNames pictures = io::PicturesIn(place);
+  if (!pictures.others.empty())
+    return InvalidArgument("{}: {}; convert them, or take them out of the folder", place.string(),
+                           pictures.DescribeOthers());
+  if (pictures.read.empty()) return std::optional<PhotographSet>();
+  TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(place, pictures.read));
   return std::optional(std::move(set));
 }
 

@@ -352,6 +352,13 @@ TEST_F(PhotoFolderTest, BrokenKeypointsAreErrors) {
   ExpectMessage(OpenPhotographs(folder_).status(), "\"hm\" is neither");
 }
 
+TEST_F(PhotoFolderTest, PicturesThatAreNotReadAreNamed) {
+  WritePictures(12);
+  Write("IMG_1.HEIC", std::string("x"));
+  ExpectMessage(OpenPhotographs(folder_).status(), "1 picture not in PNG, JPEG or WebP: IMG_1.HEIC",
+                "convert them");
+}
+
 TEST_F(PhotoFolderTest, PicturesNeedMasks) {
   std::filesystem::create_directories(folder_ / "masks");
   ASSERT_TRUE(io::SavePng(folder_ / "a.png", ImageU8(4, 4, 3, 99)).ok());
