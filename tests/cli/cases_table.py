@@ -5,7 +5,7 @@ programs: what is right for each, and what this program did.
     cases_table.py PROGRAM [FOLDER]
 
 FOLDER: default $TILEGRAD_SHARED/cases, else shared/cases beside or above the source. Skips, and says
-so, where it is absent. Exit code 1 if a file is neither right nor listed as not done.
+so, where it is absent. Exit code 1 if a file is not right.
 """
 
 import json
@@ -19,12 +19,6 @@ import tempfile
 import numpy as np
 
 SIZE, HALF = 128, 4 * np.tan(np.radians(20))  # pixels; what they show at z = 0, seen from 4 away
-
-# Not right yet, and what they need; the table says which of these have become right.
-NOT_DONE: dict = {
-    f"second/fit_{name}": "src/fit"
-    for name in ("cx0", "parallel", "two_models", "some_mask_paths", "one_without_alpha",
-                 "empty_mask", "narrow", "webp", "mixed_kinds")}
 
 
 class Shot:
@@ -330,13 +324,10 @@ def main():
     for name, right, good, shot in rows(program, folder):
         text = getattr(shot, "text", "").splitlines()
         got = "refused" if getattr(shot, "refused", False) else "warned" if text else "drawn"
-        if not good:
-            got = "NOT DONE: " + NOT_DONE[name] if name in NOT_DONE else "WRONG"
-        elif name in NOT_DONE:
-            got = "right, though listed as not done"
-        wrong += got == "WRONG"
+        got = got if good else "WRONG"
+        wrong += not good
         print(f"| {name} | {right} | {got} | {text[0][:110] if text else ''} |")
-    print(f"{wrong} wrong, {len(NOT_DONE)} not done" if wrong or NOT_DONE else "all right")
+    print(f"{wrong} wrong" if wrong else "all right")
     return 1 if wrong else 0
 
 
