@@ -183,7 +183,7 @@ bool IsFile(const Path& path) {
 }
 
 Status MakeFolder(const Path& path) {
-  if (path.empty()) return InvalidArgument("the name of a folder is empty");
+  if (path.empty()) return InvalidArgument("the folder has no name");
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error) return IoError("{}: cannot create the folder: {}", path.string(), error.message());

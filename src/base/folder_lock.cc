@@ -33,7 +33,7 @@ Result<FolderLock> FolderLock::Take(const Path& folder) {
   for (int attempt = 0; ::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
        ++attempt) {
     if (attempt == kAttempts)
-      return InvalidArgument("{}: another process is at work in it", folder.string());
+      return InvalidArgument("{}: in use by another process", folder.string());
     ::usleep(kPauseMicroseconds);
   }
   return lock;

@@ -70,8 +70,9 @@ Status OutputGuard::CheckNotRead(std::span<const Path> files) const {
   for (const Path& file : files) {
     const auto info = Stat(file);
     if (info && S_ISREG(info->st_mode) && inputs_.contains({info->st_dev, info->st_ino})) {
-      return InvalidArgument("{}: is read here, so it is not written; choose another --out",
-                             file.string());
+      return InvalidArgument(
+          "{}: is an input of this command and is not overwritten; choose another --out",
+          file.string());
     }
   }
   return {};
@@ -81,9 +82,8 @@ Status OutputGuard::CheckFolder(const Path& folder) const {
   if (force_) return {};
   const auto file = AnyFile(folder);
   if (!file) return {};
-  return InvalidArgument(
-      "{}: is not empty ({}); choose another folder, or --force to work among what is there",
-      folder.string(), file->string());
+  return InvalidArgument("{}: is not empty ({}); choose another folder, or add to it with --force",
+                         folder.string(), file->string());
 }
 
 }  // namespace tilegrad

@@ -35,7 +35,7 @@ std::string Megabytes(std::size_t bytes) { return fmt::format("{} MB", (bytes >>
 
 Result<std::size_t> ParseByteCount(const std::string& text) {
   if (const std::size_t bytes = ParseBytes(text); bytes > 0) return bytes;
-  return InvalidArgument("\"{}\" must be bytes, as 4294967296, 500M or 16G", text);
+  return InvalidArgument("\"{}\" is not a size; give bytes, such as 4294967296, 500M or 16G", text);
 }
 
 Result<std::size_t> ReadLimit() {
@@ -64,8 +64,9 @@ Status ReadBudget::Take(std::size_t bytes, const std::string& what) {
   Status status = budget->limit_.status();
   if (status.ok() && bytes > *budget->limit_ - budget->taken_) {
     status = ResourceExhausted(
-        "{}: takes {} more, beyond the limit of {} for a file with all that it names; allow more "
-        "(bytes, or 16G) with tilegrad's --read-limit or {} in the environment",
+        "{}: needs {} more, above the memory limit of {} per file, referenced files included; "
+        "raise "
+        "it (bytes, or 16G) with tilegrad's --read-limit or {} in the environment",
         what, Megabytes(bytes), Megabytes(*budget->limit_ - 1), kReadLimitVariable);
   }
   if (status.ok()) budget->taken_ += bytes;

@@ -57,7 +57,7 @@ Status CheckEffects(const DatasetOptions& options) {
     return InvalidArgument("--up: --source {} reads no mesh files", name);
   if (options.build.up != UpAxis::kY && name != "folder" && name != "shapenet" &&
       name != "sweethome3d")
-    return InvalidArgument("--up: --source {} knows how its models stand", name);
+    return InvalidArgument("--up: --source {} has an up axis of its own", name);
   if (options.shares && (name == "nmr" || !options.split_list.empty())) {
     return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
                            name == "nmr" ? "--source nmr" : "--split-list");

@@ -41,8 +41,7 @@ struct TrainedNetwork {
 Result<TrainedNetwork> LoadNetwork(const Path& run, const Workers& workers) {
   TILEGRAD_ASSIGN(train::Predictor predictor, LoadPredictor(run, workers));
   auto pictures = train::TrainingPictures::Read(run);
-  if (!pictures.ok())
-    PrintNote("tilegrad: warning: passed over: {}\n", pictures.status().message());
+  if (!pictures.ok()) PrintNote("tilegrad: warning: skipped: {}\n", pictures.status().message());
   return TrainedNetwork{std::move(predictor), pictures.ok() ? std::move(*pictures) : std::nullopt};
 }
 
@@ -200,7 +199,7 @@ Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>
 
 Status RunPrediction(const PredictOptions& options) {
   if (!options.mask.empty() && options.images.size() > 1)
-    return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
+    return InvalidArgument("--mask works with one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const Workers workers(options.workers);
   ProgressLine line;

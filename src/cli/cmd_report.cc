@@ -40,7 +40,7 @@ Status RunReport(const ReportOptions& options) {
   line.Finish();
   if (!summary.ok()) return summary.status();
   for (const std::string& warning : summary->warnings)
-    PrintNote("tilegrad: warning: passed over: {}\n", warning);
+    PrintNote("tilegrad: warning: skipped: {}\n", warning);
   Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),
         Count(static_cast<std::size_t>(summary->models), "model"),
         static_cast<double>(summary->bytes) / 1e6);

@@ -75,8 +75,8 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
                   DrawInterpolation({codes, options.interpolate, files.strip, files.animation},
                                     model, workers));
   Print(
-      "interpolation: {}, {}; largest step of a row by its mean step: {:.1f} in the mean, {:.1f} "
-      "at most\n",
+      "interpolation: {}, {}; largest step of a row relative to its mean step: {:.1f} on average, "
+      "{:.1f} at most\n",
       files.strip.string(), files.animation.string(), steps.mean, steps.largest);
   (*json)["interpolation"] = {{"strip", files.strip.string()},
                               {"animation", files.animation.string()},
@@ -108,7 +108,7 @@ Status RunSampling(const SampleOptions& options) {
   if (options.interpolate > 0 && options.count < 2)
     return InvalidArgument("--interpolate needs two samples or more: --count 2");
   if (!options.score && !(options.data.empty() && options.judge.empty()))
-    return InvalidArgument("--data and --judge belong to --score");
+    return InvalidArgument("--data and --judge need --score");
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const SampleFiles files(options);
   const OutputGuard guard(options.force);

@@ -39,7 +39,7 @@ Result<std::vector<Path>> MeshFiles(const Path& run) {
   const Path result = run / "mesh.glb";
   if (!files.empty() && PathExists(result)) files.push_back(result);
   if (!files.empty()) return files;
-  return NotFound("{}: no meshes to animate: fits keep them beside each picture of --timelapse",
+  return NotFound("{}: no meshes to animate; fits keep one for each picture of --timelapse",
                   (run / "timelapse").string());
 }
 

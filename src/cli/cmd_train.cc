@@ -39,7 +39,7 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
   Print("{}: {} at step {}, {} of training\n", options.out,
         outcome.finished ? "finished" : "stopped", outcome.last_step,
         FormatDuration(outcome.seconds));
-  if (!outcome.finished) Print("go on with: tilegrad train --resume {}\n", options.out);
+  if (!outcome.finished) Print("resume with: tilegrad train --resume {}\n", options.out);
   if (outcome.finished) Print("scores: tilegrad {} --run {}\n", score_command, options.out);
   Print("curves: tensorboard --logdir {}\n", options.out);
 }
@@ -57,7 +57,7 @@ Status TakeFromRun(TrainOptions* options) {
   const Path run = options->resume;
   std::error_code error;
   if (!options->out.empty() && !std::filesystem::equivalent(run, options->out, error))
-    return InvalidArgument("--resume {}: it goes on there; leave out --out {}", run.string(),
+    return InvalidArgument("--resume {} continues in that folder; leave out --out {}", run.string(),
                            options->out);
   if (!PathExists(run / "config.toml"))
     return NotFound("{}: not a run of tilegrad train: there is no config.toml in it", run.string());

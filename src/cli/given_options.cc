@@ -44,7 +44,7 @@ Status CheckSame(const Continuation& before, const Option& option, const std::st
   const auto then = before.then.find(option.FirstName());
   const std::string was = then != before.then.end() ? then->second : option.initial;
   if (before.may_differ.contains(option.FirstName()) || IsSame(was, now)) return {};
-  return InvalidArgument("{}: was {}, is {}; leave it out to go on, or start anew with --force",
+  return InvalidArgument("{}: was {}, is {}; leave it out to resume, or start anew with --force",
                          option.FirstName(), was.empty() ? "not given" : was, now);
 }
 

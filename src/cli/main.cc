@@ -82,8 +82,8 @@ Status CheckRanks(const Command& command) {
   for (const char* name : {"train", "dataset", "eval"})
     if (command.name == name) return {};
   return InvalidArgument(
-      "started as one of {} processes, but among the commands only train, dataset and eval share "
-      "their work with others: start this one without mpirun",
+      "started as one of {} processes, but only train, dataset and eval run on several; start this "
+      "command without mpirun",
       train::LaunchedRanks());
 }
 
@@ -134,12 +134,11 @@ int main(int argc, char** argv) {
   try {
     return tilegrad::cli::RunProgram(argc, argv);
   } catch (const std::bad_alloc&) {
-    tilegrad::cli::PrintNote(
-        "tilegrad: not enough memory; smaller images, batches or networks take less\n");
+    tilegrad::cli::PrintNote("tilegrad: out of memory; try smaller images, batches or networks\n");
     return 1;
   } catch (const std::system_error& error) {  // what was printed has nowhere to go, for one
     if (std::ferror(stdout) != 0) return tilegrad::cli::OutputLost(error.code().value());
-    tilegrad::cli::PrintNote("tilegrad: the system refuses: {}\n", error.code().message());
+    tilegrad::cli::PrintNote("tilegrad: system error: {}\n", error.code().message());
     return 1;
   } catch (const std::exception& error) {  // a library that throws: still a sentence and a code
     tilegrad::cli::PrintNote("tilegrad: unexpected failure: {}\n", error.what());

@@ -225,7 +225,7 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
     return InvalidArgument("--out {} and --format {} disagree", settings.out, settings.format);
   const std::string format = is_file ? ending : settings.format.empty() ? "png" : settings.format;
   if (format == "exr" && !settings.background.empty()) {
-    return InvalidArgument("--background: pictures in EXR keep their alpha and have none");
+    return InvalidArgument("--background: EXR files keep their alpha and have no background");
   }
   if (is_file) return PictureName{Path(out).replace_extension(), format, out.extension()};
   return PictureName{out / name, format, "." + format};

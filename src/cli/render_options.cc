@@ -134,7 +134,7 @@ Status CheckRenderOptions(const Command& command, const RenderSettings& s) {
   };
   for (const auto& [option, there, what] : effects) {
     if (!command.Given(option) || there) continue;
-    return InvalidArgument("{} would do nothing: it is for {}", option, what);
+    return InvalidArgument("{} has no effect here; it is for {}", option, what);
   }
   for (const auto& [x, y, z, intensity] : s.lights) {
     if (x == 0 && y == 0 && z == 0) {

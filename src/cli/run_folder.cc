@@ -118,14 +118,14 @@ Result<Path> ChooseRun(const std::string& given) {
 
 Status WithCommand(const Status& status, const std::string& command) {
   if (status.code() != StatusCode::kCancelled) return status;
-  return Cancelled("{}; go on with: {}", status.message(), command);
+  return Cancelled("{}; resume with: {}", status.message(), command);
 }
 
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) {
   auto predictor = train::Predictor::Load(run, workers);
   if (!predictor.ok()) return predictor;
   for (const std::string& warning : predictor->warnings())
-    PrintNote("tilegrad: warning: passed over: {}\n", warning);
+    PrintNote("tilegrad: warning: skipped: {}\n", warning);
   return predictor;
 }
 
@@ -156,8 +156,8 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   }
   const Path dataset = json["dataset"].get<std::string>();
   if (const auto found = FindFromRun(dataset, run)) return *found;
-  return NotFound("{}: its dataset {} is neither here nor above the run; name it with --data",
-                  file.string(), dataset.string());
+  return NotFound("{}: cannot find its dataset {}; name it with --data", file.string(),
+                  dataset.string());
 }
 
 }  // namespace tilegrad::cli

@@ -71,17 +71,17 @@ Status FitClock::LoadState(std::span<const nn::NamedTensor> state, std::int64_t 
   if (counts == nullptr) return {};
   if (counts->dtype() != nn::DType::kI64 || counts->elements() != 4 || sums == nullptr ||
       sums->dtype() != nn::DType::kF64 || sums->elements() != 2) {
-    return DataLoss("\"{}\" and \"{}\" are not what this version writes", kCounts, kSums);
+    return DataLoss("\"{}\" and \"{}\" were not written by this version", kCounts, kSums);
   }
   const std::int64_t* c = counts->data<std::int64_t>();
   const double* s = sums->data<double>();
   if (c[1] > steps || c[2] < 0 || c[2] > steps || c[3] < 0 || c[3] >= kWindow ||
       !std::isfinite(s[0]) || !std::isfinite(s[1])) {
-    return DataLoss("the numbers of \"{}\" and \"{}\" cannot be", kCounts, kSums);
+    return DataLoss("the values of \"{}\" and \"{}\" are impossible", kCounts, kSums);
   }
   extended_at_ = c[2];
   if (c[0] > steps_) {
-    return InvalidArgument("the fit was started with {}: go on with as many, or more",
+    return InvalidArgument("the fit was started with {}; give as many or more",
                            Count(c[0], "step"));
   }
   if (c[0] < steps_) {

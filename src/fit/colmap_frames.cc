@@ -19,8 +19,8 @@ Result<Path> FindImages(const Path& model, const std::string& first) {
     }
   }
   return NotFound(
-      "{}: its image {} is neither in a folder \"images\" beside the model or above it, nor there "
-      "itself",
+      "{}: image {} not found, neither beside the model or above it nor in a folder \"images\" "
+      "there",
       model.string(), first);
 }
 

@@ -86,7 +86,7 @@ Status CheckMesh(const FitScene& scene, const FitScene& start) {
                     (scene.colors.empty() ? start.colors.empty()
                                           : scene.colors.size() == scene.positions.size()) &&
                     AllFinite(scene.positions) && AllFinite(scene.uvs);
-  return good ? Status() : DataLoss("the arrays of \"mesh.\" do not fit together");
+  return good ? Status() : DataLoss("the \"mesh.\" arrays do not match");
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ class InputReader {
   Status CheckMasks(Background background) const {
     if (!TakesMasks(background) || bare_.empty() || !HasAlpha(input_)) return {};
     return DataLoss(
-        "{}: has no mask, though {} has {}: give it one, or --background plain or none for all",
+        "{}: has no mask, but {} has one ({}); add one, or use --background plain or none for all",
         bare_[0].image, masked_[0].image, masked_[0].mask);
   }
 
@@ -102,19 +102,20 @@ struct Frames {
 // Why there is nothing to fit in a folder.
 Status NothingIn(const Path& folder, const Frames& bare) {
   if (PathExists(DatasetInfoPath(folder))) {
-    return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
-                           folder.string());
+    return InvalidArgument(
+        "{}: was made by tilegrad dataset; choose one of its models with --model CLASS/ID",
+        folder.string());
   }
   if (IsFile(folder)) {
     return InvalidArgument(
-        "{}: a file; a fit takes the folder of transforms.json and its images, or of COLMAP",
+        "{}: is a file; give the folder that holds transforms.json or a COLMAP model",
         folder.string());
   }
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
   if (!bare.frames.empty()) return {};
   return NotFound(
-      "{}: neither transforms.json nor transforms_train.json nor a COLMAP model nor pictures in it "
-      "(docs/fit.md says what a fit reads){}",
+      "{}: holds no transforms.json, no COLMAP model and no pictures (docs/fit.md lists what a fit "
+      "reads){}",
       folder.string(), bare.warnings.empty() ? "" : "; " + bare.warnings[0]);
 }
 
@@ -196,7 +197,7 @@ Status FinishInput(const InputOptions& options, FitInput* input) {
   TILEGRAD_TRY(ApplyBackground(options.background, input, options.watch));
   TILEGRAD_TRY(DropEmptyViews(input));
   if (input->training.empty())
-    return InvalidArgument("all views are held out: none is left to fit");
+    return InvalidArgument("all views are held out; none is left to fit");
   if (input->posed) TurnInputUpright(options.up, input);
   return {};
 }
@@ -209,7 +210,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   const Path test = folder / "transforms_test.json";
   if (PathExists(test) && options.hold_out > 0) {
     return InvalidArgument(
-        "{}: already says which views are held out: leave out --hold-out, or that file",
+        "{}: already lists the held-out views; leave out --hold-out, or remove that file",
         test.string());
   }
   if (PathExists(test) && input.posed) {

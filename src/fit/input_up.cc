@@ -42,10 +42,10 @@ void TurnInputUpright(std::optional<UpAxis> up, FitInput* input) {
   if (!up) {
     up = GuessUp(input->cameras);
     if (up) {
-      input->warnings.push_back(fmt::format(
-          "the cameras stand upright about the {0} axis, so {0} is taken for up, and the mesh is "
-          "turned to have y up; --up y leaves it as the cameras have it",
-          *up == UpAxis::kZ ? "z" : "x"));
+      input->warnings.push_back(
+          fmt::format("all cameras are upright if {0} points up, so the mesh is turned from {0} up "
+                      "to y up; --up y leaves it as it is",
+                      *up == UpAxis::kZ ? "z" : "x"));
     }
   }
   input->up = up.value_or(UpAxis::kY);

@@ -36,7 +36,7 @@ Status CheckViews(const ViewsOptions& o) {
     return InvalidArgument("fov is {}, must be in (0, 180) degrees", o.fov_y);
   }
   if (!(o.lowest > -90 && o.lowest <= o.highest && o.highest < 90)) {
-    return InvalidArgument("elevations {} to {} must rise and be in (-90, 90) degrees", o.lowest,
+    return InvalidArgument("elevations {} to {} must ascend and be in (-90, 90) degrees", o.lowest,
                            o.highest);
   }
   return {};
@@ -82,7 +82,7 @@ Status ClearEarlierViews(const Path& folder, const OutputGuard& guard) {
   const Path other = folder / "transforms.json";  // what a fit reads first
   if (PathExists(other)) {
     return InvalidArgument(
-        "{}: belongs to other images, and a fit would read it; choose another folder",
+        "{}: describes other images, and a fit would read it; choose another folder",
         other.string());
   }
   TILEGRAD_TRY(guard.CheckFolder(folder));

@@ -169,8 +169,8 @@ class Guess {
       if (!InFrontOfAll(centre_)) centre_ = from;  // they look at each other
     }
     sphere_.doubt = fmt::format(
-        "all views see the object from one direction, so that its distance is not known: it is "
-        "taken to be around ({:.3g}, {:.3g}, {:.3g}), with a radius of {:.3g}",
+        "all views see the object from one direction, so its distance is not known; assuming "
+        "({:.3g}, {:.3g}, {:.3g}) and a radius of {:.3g}",
         centre_.x, centre_.y, centre_.z, Radius());
   }
 
@@ -186,9 +186,9 @@ class Guess {
           first->name, depth, first->camera.near_plane);
     }
     return InvalidArgument(
-        "{}: this camera faces away from the object, as do {} of {}; are the axes OpenCV's, of a "
-        "camera that looks along +z? If not, cameras and masks do not belong together: the rays "
-        "through the masks' middles pass each other by {:.3g}",
+        "{}: this camera faces away from the object, as do {} of {}; are the axes OpenCV's, "
+        "looking along +z? If not, the cameras do not match the masks: the rays through the masks' "
+        "centres miss each other by {:.3g}",
         first->name, std::ranges::count_if(views_, behind), views_.size(), Miss());
   }
 
@@ -208,8 +208,8 @@ class Guess {
       const double step = kFloatStep * size, pixel = v.DepthOf(centre_) / v.focal();
       if (step <= pixel) continue;
       return InvalidArgument(
-          "{}: a pixel of this camera shows {:.3g} at the object, less than the step of {:.3g} "
-          "between numbers that far from the origin: move the cameras by ({:.6g}, {:.6g}, {:.6g})",
+          "{}: a pixel of this camera covers {:.3g} at the object, less than the float spacing of "
+          "{:.3g} that far from the origin; move the cameras by ({:.6g}, {:.6g}, {:.6g})",
           v.name, pixel, step, -centre_.x, -centre_.y, -centre_.z);
     }
     return {};
@@ -222,8 +222,8 @@ class Guess {
     const double spread = ConeOf(lines);
     if (!sphere_.doubt.empty() || spread >= kNarrowCone) return;
     sphere_.doubt = fmt::format(
-        "all views look along directions within {:.0f} degrees, which tell little about the depth "
-        "of the object",
+        "all views look at the object from within {:.0f} degrees, which says little about its "
+        "depth",
         spread);
   }
 

@@ -103,7 +103,7 @@ class Assembly {
     if (!from.image.empty()) material.base_color_texture = Texture(from);
     if (material.base_color_texture >= 0 && !from.not_read.empty()) {
       out_.warnings.push_back(
-          fmt::format("material \"{}\": of its image is not read: {}", from.name, from.not_read));
+          fmt::format("material \"{}\": not read of its image: {}", from.name, from.not_read));
     }
     // With a texture, the diffuse colour is often left black or grey by exporters; the image alone
     // is what people meant.

@@ -64,7 +64,7 @@ Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
   if (!model.bend) {
     return InvalidArgument(
         "{}: camera {} ({}) has lens distortion; undistort the images first (colmap "
-        "image_undistorter) and take the model that this writes",
+        "image_undistorter) and use the model that it writes",
         place, raw.id, model.name);
   }
   if (!IsSize(raw.width, raw.height)) {
@@ -94,7 +94,8 @@ Status AddView(const std::string& place, const Cameras& cameras, std::uint32_t c
                ColmapCamera camera, const std::string& name, std::vector<CameraView>* views) {
   const auto found = cameras.find(camera_id);
   if (found == cameras.end())
-    return DataLoss("{}: image \"{}\" names camera {}, which is not there", place, name, camera_id);
+    return DataLoss("{}: image \"{}\" uses camera {}, which does not exist", place, name,
+                    camera_id);
   if (!found->second.ok()) return found->second.status();
   const ColmapCamera& k = found->second->camera;
   camera.fx = k.fx, camera.fy = k.fy, camera.cx = k.cx, camera.cy = k.cy;
@@ -237,8 +238,8 @@ Result<Cameras> ReadCamerasBinary(const Path& file) {
     if (!in.Read(raw.id, id, raw.width, raw.height)) return CutShort(file);
     const auto model = std::ranges::find(kModels, id, &Model::id);
     if (model == kModels.end()) {
-      return DataLoss("{}: camera {} has model number {}; read are {}", file.string(), raw.id, id,
-                      KnownModels());
+      return DataLoss("{}: camera {} has model number {}; supported are {}", file.string(), raw.id,
+                      id, KnownModels());
     }
     for (std::size_t i = 0; i < model->params; ++i) {
       if (!in.Read(raw.params[i])) return CutShort(file);

@@ -17,7 +17,7 @@ Status CheckForColmap(const CameraView& view, const ColmapCamera& camera) {
   if (width < 1 || height < 1 || width > kMostPixels || height > kMostPixels) {
     return InvalidArgument("\"{}\" has an image of {} x {} pixels", view.name, width, height);
   }
-  if (view.name.empty()) return InvalidArgument("a view without a name is none in COLMAP's text");
+  if (view.name.empty()) return InvalidArgument("a view has no name, which COLMAP's text needs");
   const bool one_line = view.name.find_first_of(std::string_view("\n\r\0", 3)) == std::string::npos;
   if (!one_line || view.name.starts_with(' ') || view.name.starts_with('\t')) {
     return InvalidArgument(

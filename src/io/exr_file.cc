@@ -46,8 +46,9 @@ Status CheckName(const std::string& name) {
   }
   const std::size_t end = name.find('\0');
   if (end == std::string::npos) return {};
-  return InvalidArgument("EXR channel name \"{}\" goes on after a NUL, which ends names in a file",
-                         name.substr(0, end));
+  return InvalidArgument(
+      "EXR channel name \"{}\" continues after a NUL, which ends names in a file",
+      name.substr(0, end));
 }
 
 Status Check(const ExrImage& image) {

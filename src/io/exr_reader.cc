@@ -87,7 +87,7 @@ Status CheckExrHeader(const Imf::Header& header, const GuardLimits& limits) {
       return DataLoss("channel \"{}\" has fewer samples than pixels: not read", c.name());
   }
   if (channels < 1 || channels > kMaxChannels)
-    return DataLoss("{} channels; 1 to {} are read", channels, kMaxChannels);
+    return DataLoss("{} channels; 1 to {} are supported", channels, kMaxChannels);
   const auto bytes = static_cast<std::size_t>(4 * pixels * channels);
   if (bytes > limits.memory_bytes / 2)  // the library needs room too
     return ResourceExhausted("{} pixels of {} channels are too many", pixels, channels);
@@ -187,7 +187,7 @@ Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits
 }  // namespace
 
 Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes) {
-  const Status damaged = DataLoss("the reader returned no whole image");
+  const Status damaged = DataLoss("the reader returned an incomplete image");
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (text.size() > 1 && text[0] == static_cast<char>(kError))
     return DataLoss("{}", text.substr(1));

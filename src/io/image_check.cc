@@ -38,7 +38,8 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
       return DataLoss("{}: corrupt PNG: the checksum of the chunk at byte {} is wrong", name, at);
     if (type == "IEND") return {};
     if (type == "CgBI") {  // blue before red, colours multiplied by alpha: stb_image leaves both so
-      return DataLoss("{}: a PNG of Xcode (CgBI), which is not read; save it as a plain PNG", name);
+      return DataLoss("{}: an Xcode PNG (CgBI), which is not read; save it as a standard PNG",
+                      name);
     }
     at += kFrame + length;
   }

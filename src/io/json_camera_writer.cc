@@ -28,7 +28,7 @@ Status SaveJson(const Path& file, const json& top) {
   const std::string text = JsonText(top, 1) + "\n";
   const auto back = ReadJsonCameras(text, file, {});
   if (!back.ok()) {
-    return InvalidArgument("{}; nothing was written, as it could not be read",
+    return InvalidArgument("{}; nothing was written, because it could not be read back",
                            back.status().message());
   }
   return WriteTextAtomic(file, text);

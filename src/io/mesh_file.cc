@@ -247,8 +247,8 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   const Format* format = FindFormat(name);
   if (format == nullptr && !source.Exists(name)) return NotFound("{}: no such file", place);
   if (format == nullptr) {
-    return InvalidArgument("{}: \"{}\" is not the ending of a mesh format that can be read ({})",
-                           place, MeshEnding(name), MeshFileEndings());
+    return InvalidArgument("{}: \"{}\" is not the extension of a supported mesh format ({})", place,
+                           MeshEnding(name), MeshFileEndings());
   }
   const ShortageWatch watch;
   const ReadBudget budget;

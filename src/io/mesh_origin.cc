@@ -72,10 +72,10 @@ void WarnOfSteps(LoadedMesh& loaded, const ExactBounds& bounds, const glm::dvec3
     step = std::max(step, here);
   }
   if (axes.empty()) return;
-  loaded.warnings.push_back(fmt::format(
-      "the coordinates have no digits left: around {}, {} come in steps of {}, and the mesh is {} "
-      "across; write it near the origin, or with more digits",
-      Point(origin), axes, step, bounds.size()));
+  loaded.warnings.push_back(
+      fmt::format("the coordinates lack precision: around {}, {} come in steps of {}, and the mesh "
+                  "is {} across; move it near the origin, or write more digits",
+                  Point(origin), axes, step, bounds.size()));
 }
 
 // A round point near the middle, so that subtracting it leaves round numbers round.

@@ -229,8 +229,8 @@ Status CheckArrayName(const std::string& name, const Path& path) {
   const bool ends = name.find('\0') != std::string::npos;
   if (!ends && NormalizeName(EntryName(name)) == EntryName(name)) return {};
   return InvalidArgument(
-      "{}: \"{}\" cannot be the name of an array in an .npz: it has a NUL or a backslash, or leads "
-      "elsewhere as a path",
+      "{}: \"{}\" cannot be the name of an array in an .npz: it has a NUL or a backslash, or is a "
+      "path out of it",
       path.string(), name.substr(0, name.find('\0')));
 }
 

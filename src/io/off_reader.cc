@@ -112,7 +112,8 @@ class OffReader {
     AddFaceColors();
     if (odd_lines_ > 0) {
       out_.warnings.push_back(fmt::format(
-          "what ends {} lines of vertices or faces is no colour: left out", odd_lines_));
+          "{} lines of vertices or faces end with something that is no colour: left out",
+          odd_lines_));
     }
     return {};
   }

@@ -102,7 +102,7 @@ Result<LensDistortion> LensOf(const JsonFrame& frame) {
 
 Status CheckStraight(const LensDistortion& lens) {
   if (lens.straight()) return {};
-  return InvalidArgument("the lens bends rays, which only `tilegrad fit` takes out of images: {}",
+  return InvalidArgument("the lens is distorted, and only `tilegrad fit` undistorts images: {}",
                          kAdvice);
 }
 

@@ -17,11 +17,11 @@ bool IsWebp(std::span<const std::uint8_t> bytes) {
 }
 
 Result<ImageU8> DecodeWebp(std::span<const std::uint8_t> bytes, const std::string& name) {
-  const auto broken = [&] { return DataLoss("{}: an image in WebP that is cut or corrupt", name); };
+  const auto broken = [&] { return DataLoss("{}: a truncated or corrupt WebP image", name); };
   WebPBitstreamFeatures header;
   if (WebPGetFeatures(bytes.data(), bytes.size(), &header) != VP8_STATUS_OK) return broken();
   if (header.has_animation != 0)
-    return DataLoss("{}: an animation in WebP; save one of its frames", name);
+    return DataLoss("{}: an animated WebP; save one of its frames", name);
   TILEGRAD_TRY(CheckImageSize(header.width, header.height, name));
   const int channels = header.has_alpha != 0 ? 4 : 3;
   const auto size = static_cast<std::size_t>(header.width) *

@@ -31,8 +31,7 @@ Status CheckRotation(const double* m) {
   }
   if (Determinant(m) > 0) return {};
   return InvalidArgument(
-      "the camera's rotation is a mirror (determinant -1): one axis points the other way than its "
-      "convention says");
+      "the camera's rotation is a mirror (determinant -1): one of its axes is flipped");
 }
 
 }  // namespace

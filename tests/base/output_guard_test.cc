@@ -59,8 +59,8 @@ TEST_F(Guard, InputsAreNeverWrittenUnderAnyName) {
   guard.AddInput(folder_ / "missing.png");
   for (const Path& name : {file, folder_ / "soft.png", folder_ / "hard.png",
                            folder_ / "here/texture.png", folder_ / "x/../texture.png"}) {
-    ExpectMessage(guard.Check(name), name.string(), "is read here");
-    ExpectMessage(guard.CheckNotRead({&name, 1}), name.string(), "is read here");
+    ExpectMessage(guard.Check(name), name.string(), "is an input of this command");
+    ExpectMessage(guard.CheckNotRead({&name, 1}), name.string(), "is an input of this command");
   }
   EXPECT_TRUE(guard.Check(folder_ / "missing.png").ok());
 }
@@ -69,7 +69,7 @@ TEST_F(Guard, FilesOfAnInputFolderAreInputs) {
   Write("model/cameras.txt", std::string("1"));
   OutputGuard guard(true);
   guard.AddInput(folder_ / "model");
-  ExpectMessage(guard.Check(folder_ / "model/cameras.txt"), "is read here");
+  ExpectMessage(guard.Check(folder_ / "model/cameras.txt"), "is an input of this command");
   EXPECT_TRUE(guard.Check(folder_ / "model/images.txt").ok());
 }
 

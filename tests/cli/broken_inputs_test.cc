@@ -247,7 +247,7 @@ TEST_F(BrokenInputs, OptionsThatMeanSomethingElse) {
   ExpectRefused("fit " + Data().string() + " --out " + (folder_ / "fit").string(), "--model");
   ExpectRefused(
       "fit " + (Data() / "dataset.json").string() + " --out " + (folder_ / "fit").string(),
-      "a file; a fit takes the folder");
+      "is a file; give the folder");
 }
 
 TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {

@@ -150,10 +150,10 @@ SECOND = {
     "ply/quality_nan.ply": ("read", drawn, straight()),
     "obj_no_usemtl/mesh.obj": ("warned", said("usemtl"), straight()),
 }
-CAMERAS = {"tf_fisheye.json": refused("the lens bends rays"), "tf_isfisheye.json": refused("the lens bends rays"),
+CAMERAS = {"tf_fisheye.json": refused("the lens is distorted"), "tf_isfisheye.json": refused("the lens bends rays"),
            "tf_ortho.json": refused("EQUIRECTANGULAR"), "tf_k1.json": refused("k1"),
            "tf_blenderscale.json": refused("rotation"), "tf_mirror.json": refused("rotation"),
-           "colmapf": refused("a.png: the lens bends rays")}
+           "colmapf": refused("a.png: the lens is distorted")}
 COUNTS = {"tf_anglexy.json": 1, "tf_perframe.json": 2, "colmap1": 3, "colmap2": 2}
 
 

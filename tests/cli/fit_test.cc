@@ -81,7 +81,7 @@ TEST_F(FitCommand, TurnsWorldsOfOtherAxesUpright) {
     EXPECT_GT(turned.iou, 0.85) << options;
     EXPECT_GT(turned.to_truth, 0.8) << options;
     // It is said where nobody has asked for it.
-    EXPECT_EQ(turned.said.find("z is taken for up") != std::string::npos, *options == '\0')
+    EXPECT_EQ(turned.said.find("upright if z points up") != std::string::npos, *options == '\0')
         << turned.said;
   }
   const Fitted lying = FitBox(" --up y");

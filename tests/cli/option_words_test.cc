@@ -130,8 +130,8 @@ TEST_F(OptionWords, TheLimitOfMemoryIsAnOptionOfEveryReader) {
   const Outcome stronger = RunProgram(render + " --read-limit 20M", "TILEGRAD_READ_LIMIT=1K ");
   EXPECT_EQ(stronger.exit_code, 0) << stronger.output;
   EXPECT_EQ(RunProgram(render, "TILEGRAD_READ_LIMIT=1K ").exit_code, 1);
-  ExpectRefused(render + " --read-limit much", 2, "must be bytes");
-  EXPECT_NE(RunProgram(render, "TILEGRAD_READ_LIMIT=much ").output.find("must be bytes"),
+  ExpectRefused(render + " --read-limit much", 2, "is not a size");
+  EXPECT_NE(RunProgram(render, "TILEGRAD_READ_LIMIT=much ").output.find("is not a size"),
             std::string::npos);
   for (const char* command : {"dataset", "dataset-view", "eval", "fit", "predict", "render",
                               "report", "tradeoff", "train", "views"}) {

@@ -68,10 +68,11 @@ TEST_F(Outputs, InputsAreNotReplacedEvenByForce) {
   std::filesystem::create_hard_link(folder_ / "fuze.png", folder_ / "hard.png");
   for (const std::string name : {"fuze.png", "soft.png", "hard.png", "x/../fuze.png"}) {
     std::filesystem::create_directories(folder_ / "x");
-    ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out " + name, "is read here");
+    ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out " + name,
+               "is an input of this command");
   }
   EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "soft.png"));
-  ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out .", "is read here");
+  ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out .", "is an input of this command");
 }
 
 TEST_F(Outputs, CamerasAreNotReplaced) {
@@ -83,7 +84,7 @@ TEST_F(Outputs, CamerasAreNotReplaced) {
   ExpectKept("transforms.json",
              "render fuze.obj --size 8 --force --out a.png --cameras transforms.json "
              "--write-cameras transforms.json",
-             "is read here");
+             "is an input of this command");
   Write("sparse/images.txt", std::string("# mine\n"));
   ExpectKept("sparse/images.txt", "render fuze.obj --size 8 --out b.png --write-cameras sparse",
              "--force");
@@ -112,7 +113,7 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
   ExpectKept("f/me.jpg", fit + "2 --out f", "--force");
   ExpectDone(fit + "2 --out f --force");
   EXPECT_TRUE(Exists("f/me.jpg"));
-  ExpectKept("f/mesh.glb", fit + "2 --out f", "f: already holds a run; --resume goes on with it");
+  ExpectKept("f/mesh.glb", fit + "2 --out f", "f: already holds a run; --resume continues it");
   // The images are not even looked at.
   ExpectKept("f/mesh.glb", "fit nowhere --out f", "already holds a run");
   ExpectKept("f/mesh.glb", fit + "2 --out f --force --resume",
@@ -131,8 +132,8 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
       << resumed.output;
   EXPECT_FALSE(Exists("nowhere"));
   const std::string from_itself = fit + "3 --out f --mesh f/mesh.glb";
-  ExpectKept("f/mesh.glb", from_itself + " --force", "is read here");
-  ExpectKept("f/mesh.glb", from_itself + " --resume", "leave it out to go on");
+  ExpectKept("f/mesh.glb", from_itself + " --force", "is an input of this command");
+  ExpectKept("f/mesh.glb", from_itself + " --resume", "leave it out to resume");
 }
 
 TEST_F(Outputs, DatasetsAndRuns) {
@@ -141,7 +142,7 @@ TEST_F(Outputs, DatasetsAndRuns) {
   ExpectKept("d/thesis.txt", dataset + "8 --out d", "--force");
   ExpectDone(dataset + "8 --out d --force");
   ExpectDone(dataset + "8 --out d");  // it goes on in its own
-  ExpectKept("d/dataset.json", dataset + "9 --out d", "of other settings");
+  ExpectKept("d/dataset.json", dataset + "9 --out d", "with other settings");
   ExpectDone(dataset + "9 --out d --force");
   EXPECT_TRUE(Exists("d/thesis.txt"));
   Write("view.png", std::string("mine"));
@@ -189,7 +190,8 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
   // A picture that is read here, and has the name of a result.
   std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y.png");
   std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y_turntable.png");
-  ExpectKept("p/y_turntable.png", predict + "--force p/y.png p/y_turntable.png", "is read here");
+  ExpectKept("p/y_turntable.png", predict + "--force p/y.png p/y_turntable.png",
+             "is an input of this command");
   for (const auto& [file, command] : {std::pair("r/eval.md", "eval --run r --views-per-model 1"),
                                       std::pair("r/report.html", "report --run r --models 1"),
                                       std::pair("r/summary.png", "report --run r --models 1")}) {

@@ -198,7 +198,7 @@ TEST_F(Render, MeshesWithAnotherAxisUp) {
   // Cameras are those of the file: its turntable goes around z.
   ExpectRefused("--up 0 0 1", 2, "--up 0,0,1");
   ExpectRefused("--up w", 2, "--up w");
-  ExpectRefused("--gltf-camera 0 --up z", 2, "--up would do nothing");
+  ExpectRefused("--gltf-camera 0 --up z", 2, "--up has no effect here");
   ASSERT_EQ(RunProgram("render " + In("z.glb") + " --up z --size 8 --turntable 4 --elevation 0 " +
                        "--out " + In("t") + " --write-cameras " + In("t.json"))
                 .exit_code,
@@ -364,15 +364,15 @@ TEST_F(Render, EndingsInCapitalsAreTheSameFormats) {
 
 TEST_F(Render, OptionsThatWouldDoNothing) {
   ExpectRefused("--sh 1 0 0 0 0 0 0 0 0", 2, "--shading sh");
-  ExpectRefused("--shading none --light 0 0 1 1", 2, "--light would do nothing");
-  ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient would do nothing");
+  ExpectRefused("--shading none --light 0 0 1 1", 2, "--light has no effect here");
+  ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient has no effect here");
   ExpectRefused("--specular 0.3", 2, "--shading phong");
   ExpectRefused("--shininess 3", 2, "--shading phong");
   ExpectRefused("--light-at-camera", 2, "it is for --light");
   ExpectRefused("--light 0 0 0 1", 2, "towards the light");
   ExpectRefused("--opencv-centre half", 2, "--cameras");
-  ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth would do nothing");
-  ExpectRefused("--gltf-camera 0 --fov 30", 2, "--fov would do nothing");
+  ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth has no effect here");
+  ExpectRefused("--gltf-camera 0 --fov 30", 2, "--fov has no effect here");
   ExpectRefused("--background 1 1 1 --out " + In("a.exr"), 2, "--background");
   ExpectDone("--size 8 --fov 30 --azimuth 9 --elevation 9 --distance 9 --out " + In("a.png"));
   ExpectDone(

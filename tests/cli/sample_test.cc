@@ -124,7 +124,7 @@ TEST_F(Sample, RefusesWhatItCannotDo) {
   ExpectRefused("sample --run " + Run("g") + " --count 1 --interpolate 4 --out " + In("x"),
                 "--interpolate needs two samples or more");
   ExpectRefused("sample --run " + Run("g") + " --judge " + Run("t") + " --out " + In("x"),
-                "belong to --score");
+                "need --score");
   ExpectRefused("sample --run " + Run("g") + " --score --judge " + Run("t") + " --out " + In("x"),
                 "task.kind = \"classify\"");
   Write("y/sheet.png", std::string("mine"));

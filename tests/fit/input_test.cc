@@ -222,7 +222,7 @@ TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
   }
   Write("m/transforms.json", TenFrames(-1, ""));
   ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask",
-                "images/0.png has its alpha channel");
+                "images/0.png has one (its alpha channel)");
   EXPECT_TRUE(ReadFitFolder(folder_ / "m", {.background = Background::kNone}).ok());
   Mask("m/seven.png");
   Write("m/transforms.json", TenFrames(7, R"("mask_path":"seven.png",)"));
@@ -283,10 +283,10 @@ TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
   EXPECT_NE(input->warnings[0].find("2.heic, 3.TIF, 4.bmp"), std::string::npos);
   std::filesystem::remove(folder_ / "b/0.png");
   std::filesystem::remove(folder_ / "b/1.PNG");
-  ExpectMessage(ReadFitFolder(folder_ / "b", 0).status(), "nor pictures", "2.heic");
+  ExpectMessage(ReadFitFolder(folder_ / "b", 0).status(), "no pictures", "2.heic");
   std::filesystem::create_directories(folder_ / "c");
   std::filesystem::rename(folder_ / "b", folder_ / "c/images");
-  ExpectMessage(ReadFitFolder(folder_ / "c", 0).status(), "nor pictures", "c/images", "2.heic");
+  ExpectMessage(ReadFitFolder(folder_ / "c", 0).status(), "no pictures", "c/images", "2.heic");
 }
 
 // A disk from before UTF-8, in all that names files.

@@ -104,7 +104,7 @@ TEST(GuessSphere, ErrorsNameTheCameraAndTheCause) {
   input = InputOfBall(kBall, cameras, kSize);
   input.cameras[3] = LookingFrom({3, 0, 0}, {9, 0, 0});
   input.cameras[4] = LookingFrom({-3, 1, 0}, {-9, 4, 0});
-  ExpectMessage(GuessSphere(input).status(), "view ", "faces away", " of 6", "pass each other by");
+  ExpectMessage(GuessSphere(input).status(), "view ", "faces away", " of 6", "miss each other by");
   input = InputOfBall(kBall, cameras, kSize);
   std::ranges::fill(input.images.alpha, 0.0f);
   ExpectMessage(GuessSphere(input).status(), "all masks are empty");

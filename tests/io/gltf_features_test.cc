@@ -232,7 +232,7 @@ TEST_F(GltfSkins, WrongSkinsAreErrors) {
   for (const auto& [place, value, message] :
        std::vector<std::tuple<const char*, Json, const char*>>{
            {"/nodes/0/skin", 4, "skin 4 does not exist"},
-           {"/skins/0/joints", {1}, "vertex 1 is held by joint 1, but its skin has 1"},
+           {"/skins/0/joints", {1}, "vertex 1 uses joint 1, but its skin has 1"},
            {"/skins/0/joints", {1, 8}, "node 8, a joint, does not exist"},
            {"/skins/0/inverseBindMatrices", 0, "expected 16 numbers"},
            {"/meshes/0/primitives/0/attributes/WEIGHTS_0", 0, "WEIGHTS_0: expected 4 numbers"},

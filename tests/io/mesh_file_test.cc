@@ -232,7 +232,7 @@ TEST_F(MeshFileTest, NonFiniteEmptyAndUnknown) {
   ExpectMessage(LoadStatus(Write("empty.obj", "")), "empty.obj");
   ExpectMessage(LoadStatus(Write("points.obj", "v 0 0 0\nv 1 0 0\n")), "points.obj");
   ExpectMessage(LoadStatus(Write("garbage.ply", std::string(200, '\xff'))), "garbage.ply");
-  ExpectMessage(LoadStatus(Write("a.txt", "hello")), "a.txt", "ending");
+  ExpectMessage(LoadStatus(Write("a.txt", "hello")), "a.txt", "supported mesh format");
   ExpectMessage(LoadStatus(folder_ / "missing.obj"), "missing.obj");
 }
 

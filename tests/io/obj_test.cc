@@ -130,7 +130,8 @@ TEST_F(ObjTest, WhatIsNotReadIsAWarning) {
   ExpectNames(Load(faces + "cstype bezier\ncurv 0 1 1 2\nend\n", 1).warnings[0],
               "\"cstype\", \"curv\", \"end\"");
   ExpectNames(Load(faces + "#MRGB ffff0000ffff0000ffff0000ffff0000\n", 1).warnings[0], "#MRGB");
-  ExpectNames(Load("v 5 5 5 1 1\n" + faces, 1).warnings[0], "1 vertices have 5");
+  ExpectNames(Load("v 5 5 5 1 1\n" + faces, 1).warnings[0],
+              "vertices with 5 or more than 7 numbers, of which 3 or 7 are read: 1");
   Load(faces + "s off\ng x\no y\nvp 0.1\nlod 3\n");
 }
 
@@ -277,7 +278,8 @@ TEST_F(ObjTest, NamesOfMaterials) {
                               "Material\nf 1 2 3\n",
                           1);
   EXPECT_EQ(noted.mesh.materials.at(0).base_color, glm::vec4(1, 0, 0, 1));
-  ExpectNames(noted.warnings[0], "has \"Material\", \"Material #26\": white");
+  ExpectNames(noted.warnings[0],
+              "no material library defines \"Material\", \"Material #26\": white");
   Write("m.mtl", "newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\n");
   const auto twice = Load("mtllib m.mtl\n" + kSquare + "usemtl a\nf 1 2 3\n", 1);
   ExpectNames(twice.warnings[0], "\"a\" is defined more than once");

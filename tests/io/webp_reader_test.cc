@@ -66,11 +66,11 @@ TEST_F(WebpReader, RefusesWhatIsBrokenOrMoves) {
   for (std::size_t n = 12; n < whole.size(); ++n) {
     const Path path =
         Write("cut.webp", Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
-    ExpectMessage(LoadImage(path).status(), "cut.webp", "in WebP");
+    ExpectMessage(LoadImage(path).status(), "cut.webp", "corrupt WebP");
   }
   const ImageU8 frames[] = {ImageU8(8, 8, 3, 10), ImageU8(8, 8, 3, 200)};
   ASSERT_TRUE(SaveWebpAnimation(folder_ / "moves.webp", frames).ok());
-  ExpectMessage(LoadImage(folder_ / "moves.webp").status(), "moves.webp", "animation");
+  ExpectMessage(LoadImage(folder_ / "moves.webp").status(), "moves.webp", "animated");
 }
 
 }  // namespace tilegrad::io::webp_reader_test

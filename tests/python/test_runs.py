@@ -85,7 +85,7 @@ class Fit(unittest.TestCase):
         self.assertGreater(result.held_out["silhouette_iou"], 0.7)
 
     def test_finds_cameras_of_arrays_and_of_pictures_in_a_folder(self):
-        with self.assertRaisesRegex(ValueError, "it takes 6 or more"):
+        with self.assertRaisesRegex(ValueError, "6 or more are needed"):
             tilegrad.fit(IMAGES[:3], fov=40, **SMALL)
         folder = self.out.parent / "pictures"
         folder.mkdir()

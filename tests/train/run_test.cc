@@ -76,13 +76,13 @@ TEST_F(RunTest, KeysOfFormerVersionsArePassedOver) {
   ASSERT_TRUE(old.ok()) << old.status().message();
   EXPECT_EQ(WriteConfig(*old), WriteConfig(ParseConfig(texture, "new").value()));
   ExpectMessage(ParseConfig(texture + "network.wrap = false\n", "c.toml").status(), "c.toml",
-                "line 2", "network.wrap is gone", "true");
+                "line 2", "network.wrap no longer exists", "true");
   const auto set = [](const char* assignment) {
     TrainConfig config = ParseConfig("task.kind = \"textured_image\"\n", "new").value();
     return ApplyOverrides({assignment}, &config);
   };
   EXPECT_TRUE(set("network.wrap=true").ok());
-  ExpectMessage(set("network.wrap=false"), "network.wrap is gone");
+  ExpectMessage(set("network.wrap=false"), "network.wrap no longer exists");
   ExpectMessage(set("network.wrap=maybe"), "unknown key \"network.wrap\"");
 }
 
@@ -93,7 +93,7 @@ TEST_F(RunTest, KeysWithoutAResultMayHaveHadAnyValue) {
 TEST_F(RunTest, NumbersOfFormerVersionsAreCompared) {
   EXPECT_TRUE(ParseConfig("network.stiffness = 0.0\n", "old").ok());
   ExpectMessage(ParseConfig("network.stiffness = 5.0\n", "old").status(), "network.stiffness",
-                "what 0 stood for");
+                "does what 0 meant");
 }
 
 // toml++ frees tables in tables by recursion.
@@ -188,7 +188,7 @@ TEST_F(RunTest, WhatIsWrongWithAnAssignmentIsSaid) {
   ExpectMessage(far_off, "unknown key \"optimizer.lr\"; [optimizer] has ");
   EXPECT_EQ(far_off.message().find("did you mean"), std::string::npos) << far_off.message();
   ExpectMessage(ParseConfig("[schedule]\nsteps = ten\n", "c.toml").status(), "c.toml", "line 2",
-                "texts have quotes");
+                "text needs quotes");
 }
 
 std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {

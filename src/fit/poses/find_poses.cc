@@ -174,7 +174,7 @@ Status CheckPoses(const TargetImages& images, std::span<const Camera> lenses,
                            options.sweeps);
   }
   if (lenses.size() < static_cast<std::size_t>(kLeastPictures)) {
-    return InvalidArgument("{} without cameras are too few to find these: it takes {} or more",
+    return InvalidArgument("{} are too few to find cameras; {} or more are needed",
                            Count(lenses.size(), "image"), kLeastPictures);
   }
   if (images.alpha.size() != lenses.size() * images.pixels()) {

@@ -76,7 +76,7 @@ Status TakePoses(const Path& path, const Json& file, std::span<const Camera> len
                  FoundPoses* out) {
   out->cameras = CamerasOf(file.value("poses", Json()), lenses);
   if (out->cameras.empty() || !file.value("agreement", Json()).is_number()) {
-    return DataLoss("{}: does not hold {} poses of twelve numbers; remove it to look for them anew",
+    return DataLoss("{}: does not hold {} poses of twelve numbers; delete it to search again",
                     path.string(), lenses.size());
   }
   out->agreement = file["agreement"].get<double>();

@@ -49,7 +49,7 @@ Result<glm::dmat4> MatrixOf(const std::vector<Influences>& influences, std::size
   };
   const auto add = [&](double index, double weight) -> Status {
     if (!(index >= 0 && index < static_cast<double>(joints.size()))) {
-      return DataLoss("{}: vertex {} is held by joint {}, but its skin has {}", what, vertex, index,
+      return DataLoss("{}: vertex {} uses joint {}, but its skin has {}", what, vertex, index,
                       joints.size());
     }
     sum += weight * joints[static_cast<std::size_t>(index)];

@@ -108,8 +108,8 @@ class ObjLibraries {
       commented_.try_emplace(bare, material);
     const auto [found, added] = materials_.try_emplace(material.name, material);
     if (added || found->second == material) return;
-    warnings_.push_back(
-        fmt::format("material \"{}\" is defined more than once; the last one holds", found->first));
+    warnings_.push_back(fmt::format(
+        "material \"{}\" is defined more than once; the last one is used", found->first));
     found->second = std::move(material);
   }
 
@@ -242,7 +242,7 @@ class ObjAssembly {
   void AddWarnings() {
     if (!unknown_.empty()) {
       out_.warnings.push_back(
-          fmt::format("no material library has {}: white instead", ShortList(unknown_)));
+          fmt::format("no material library defines {}: white instead", ShortList(unknown_)));
     }
     if (corners_without_uv_) {
       out_.warnings.push_back(

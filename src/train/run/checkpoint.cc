@@ -76,7 +76,7 @@ Status CheckFormat(const std::map<std::string, std::string>& metadata, const Pat
   if (format != metadata.end() && format->second == kCheckpointFormat) return {};
   if (format != metadata.end() && format->second.starts_with(kCheckpointFormatName)) {
     return DataLoss(
-        "{}: of another version of tilegrad, which reads it: its format is \"{}\", not \"{}\"",
+        "{}: was written by another version of tilegrad: its format is \"{}\", not \"{}\"",
         path.string(), format->second, kCheckpointFormat);
   }
   return DataLoss(

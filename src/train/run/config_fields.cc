@@ -73,8 +73,8 @@ Status PassOver(const ConfigFields& fields, const std::string& key, const toml::
   if (gone == std::end(kGone)) return UnknownKey(fields, key);
   const auto value = node.is_boolean() ? node.ref<bool>() : node.value<double>();
   if (!gone->value || value == gone->value) return {};
-  return InvalidArgument("{} is gone, and this version does what {} stood for; leave it out", key,
-                         node.is_boolean() ? "true" : fmt::format("{}", *gone->value));
+  return InvalidArgument("{} no longer exists, and this version does what {} meant; leave it out",
+                         key, node.is_boolean() ? "true" : fmt::format("{}", *gone->value));
 }
 
 Status CheckRange(const ConfigField& field, double value) {
@@ -168,7 +168,7 @@ Status WithToml(std::string_view text, Use use) {
   try {
     return use(toml::parse(text));
   } catch (const toml::parse_error& error) {
-    return InvalidArgument("line {}: not TOML, in which texts have quotes and lists brackets: {}",
+    return InvalidArgument("line {}: not valid TOML (text needs quotes, lists need brackets): {}",
                            error.source().begin.line, error.description());
   }
 }

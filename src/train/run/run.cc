@@ -45,8 +45,8 @@ Status CheckSettings(const RunPlan& plan, const RunWork& work, const std::string
   then = WithoutKey(then, may_differ), now = WithoutKey(now, may_differ);
   if (then == now) return {};
   return InvalidArgument(
-      "{}: was started with another configuration: {}; go on with that, or start anew with --force "
-      "or another --out",
+      "{}: was started with another configuration: {}; resume with that one, or start anew with "
+      "--force or another --out",
       place.string(), FirstDifference(then, now));
 }
 
@@ -109,7 +109,7 @@ Status Session::Restore() {
   if (!found.ok())
     return found.status().code() == StatusCode::kNotFound ? Status() : found.status();
   for (const auto& warning : found->warnings) {
-    if (plan_.warn) plan_.warn("passed over: " + warning);
+    if (plan_.warn) plan_.warn("skipped: " + warning);
   }
   const CheckpointInfo& info = found->checkpoint.info;
   const std::string file = found->file.string();
@@ -227,7 +227,7 @@ Status CheckExistingRun(const Path& folder, ExistingRun existing) {
   TILEGRAD_ASSIGN(const bool holds, HoldsRun(folder));
   if (!holds) return {};
   return InvalidArgument(
-      "{}: already holds a run; --resume goes on with it, --force starts anew, or choose another "
+      "{}: already holds a run; --resume continues it, --force starts anew, or choose another "
       "--out",
       folder.string());
 }

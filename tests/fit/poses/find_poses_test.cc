@@ -191,7 +191,7 @@ TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
 
 TEST_F(Poses, SaysWhatIsMissing) {
   FitInput few = Input(5);
-  EXPECT_NE(Find(Job(), &few).message().find("it takes 6 or more"), std::string::npos);
+  EXPECT_NE(Find(Job(), &few).message().find("6 or more are needed"), std::string::npos);
   FitInput empty = Input(8);
   std::fill_n(empty.images.alpha.begin(), empty.images.pixels(), 0.0f);
   EXPECT_NE(Find(Job(), &empty).message().find("its mask is empty"), std::string::npos);

@@ -396,7 +396,8 @@ TEST_F(Ranks, EvaluateToTheSameBytes) {
 TEST_F(Ranks, OtherCommandsAreRefused) {
   const Ended ended = Do(OnRanks(2, {TILEGRAD_PROGRAM, "configs"}));
   EXPECT_EQ(ended.code, 2);
-  EXPECT_NE(ended.output.find("start this one without mpirun"), std::string::npos) << ended.output;
+  EXPECT_NE(ended.output.find("start this command without mpirun"), std::string::npos)
+      << ended.output;
 }
 
 TEST_F(Ranks, WithoutThePluginSayHowToGetIt) {

@@ -129,9 +129,8 @@ class Builder {
     if (!there.ok()) return there.status();
     if (there->recipe != info_.recipe) {
       return InvalidArgument(
-          "{}: holds a dataset of other settings (source {}, {} pixels, {}); choose another "
-          "folder, "
-          "or --force to make it anew",
+          "{}: holds a dataset with other settings (source {}, {} pixels, {}); choose another "
+          "folder, or replace it with --force",
           folder_.string(), there->source, there->image_size, Count(there->views, "view"));
     }
     // The index that may be there belongs to the classes of then, and stays until the new one.
@@ -200,7 +199,7 @@ class Builder {
     const bool cancelled = failure_.code() == StatusCode::kCancelled;
     if (!failure_.ok() && !cancelled) return failure_;
     if (!cancelled && (!stop_ || done == chosen_.size())) return {};
-    return Cancelled("stopped; what is finished is in {}, the same command goes on from there",
+    return Cancelled("stopped; what is finished is in {}; the same command resumes there",
                      folder_.string());
   }
 

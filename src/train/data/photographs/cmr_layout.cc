@@ -69,7 +69,8 @@ Result<std::vector<Keypoint>> ReadKeypoints(const MatPlace& parts, std::size_t c
     const io::MatNumbers& n = parts.array().numbers;
     out[k] = {n[3 * k] - 0.5, n[3 * k + 1] - 0.5, n[3 * k + 2] > 0};
     if (out[k].visible && !(std::isfinite(out[k].x) && std::isfinite(out[k].y)))
-      return InvalidArgument("{}: keypoint {} is visible, but not a place", parts.where(), k + 1);
+      return InvalidArgument("{}: keypoint {} is visible, but has no position", parts.where(),
+                             k + 1);
   }
   return out;
 }
@@ -167,8 +168,8 @@ class CmrReader {
       const int m = set_.mirror[k];
       if (m < 0 || m >= static_cast<int>(count) ||
           set_.mirror[static_cast<std::size_t>(m)] != static_cast<int>(k))
-        return InvalidArgument("{}: keypoint {} and its mirror image {} do not go together",
-                               perm.where(), k + 1, numbers[k]);
+        return InvalidArgument("{}: keypoint {} and its mirror image {} do not match", perm.where(),
+                               k + 1, numbers[k]);
       set_.keypoint_names.push_back(fmt::format("keypoint {}", k + 1));
     }
     return NameKeypoints(file, count);
@@ -223,7 +224,7 @@ class CmrReader {
     TILEGRAD_ASSIGN(photo.id, path.Text());
     const Path relative = Path(photo.id).lexically_normal();
     if (relative.is_absolute() || *relative.begin() == "..")
-      return InvalidArgument("{}: \"{}\" leads out of the folder of pictures", path.where(),
+      return InvalidArgument("{}: \"{}\" is outside of the folder of pictures", path.where(),
                              photo.id);
     photo.image = layout_.images / relative;
     TILEGRAD_ASSIGN(const MatPlace box, images.Field(i, "bbox"));

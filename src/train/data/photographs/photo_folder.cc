@@ -131,7 +131,7 @@ class FolderReader {
                            ? std::ranges::find(set_.keypoint_names, name.get<std::string>())
                            : set_.keypoint_names.end();
     if (found == set_.keypoint_names.end())
-      return InvalidArgument("{}: {} is none of its \"names\"", file_, name.dump());
+      return InvalidArgument("{}: {} is not one of its \"names\"", file_, name.dump());
     return static_cast<int>(found - set_.keypoint_names.begin());
   }
 
@@ -140,10 +140,10 @@ class FolderReader {
     std::vector<std::pair<int, int>> out;
     const auto found = json.find(key);
     if (found == json.end()) return out;
-    if (!found->is_array()) return InvalidArgument("{}: \"{}\" is no list of pairs", file_, key);
+    if (!found->is_array()) return InvalidArgument("{}: \"{}\" is not a list of pairs", file_, key);
     for (const ParsedJson& pair : *found) {
       if (!pair.is_array() || pair.size() != 2)
-        return InvalidArgument("{}: \"{}\" is no list of pairs of names", file_, key);
+        return InvalidArgument("{}: \"{}\" is not a list of pairs of names", file_, key);
       TILEGRAD_ASSIGN(const int a, IndexOf(pair[0]));
       TILEGRAD_ASSIGN(const int b, IndexOf(pair[1]));
       out.emplace_back(a, b);
@@ -156,7 +156,7 @@ class FolderReader {
     if (names == json.end() || !names->is_array() || names->empty() || names->size() > kMostNames)
       return InvalidArgument("{}: \"names\" has to be a list of 1 to {} names", file_, kMostNames);
     for (const ParsedJson& name : *names) {
-      if (!name.is_string()) return InvalidArgument("{}: {} is no name", file_, name.dump());
+      if (!name.is_string()) return InvalidArgument("{}: {} is not a name", file_, name.dump());
       if (IndexOf(name).ok())
         return InvalidArgument("{}: \"names\" has {} twice", file_, name.dump());
       set_.keypoint_names.push_back(name.get<std::string>());

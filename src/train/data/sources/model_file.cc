@@ -148,7 +148,8 @@ Result<ModelStamp> VerifyModelFile(const Path& path, const DatasetInfo& info) {
   TILEGRAD_ASSIGN(const NpzArrays arrays, io::LoadNpz(path));
   if (auto data = FromArrays(arrays, info); !data.ok()) return data.status().Within(path.string());
   TILEGRAD_ASSIGN(const ModelStamp stamp, StampFromArrays(arrays));
-  if (stamp.recipe != info.recipe) return DataLoss("{}: was made by another recipe", path.string());
+  if (stamp.recipe != info.recipe)
+    return DataLoss("{}: was made with another recipe", path.string());
   return stamp;
 }
 

@@ -120,7 +120,7 @@ TEST_F(PhotographsTest, ErrorsNameFileAndField) {
   WriteMiniature(folder_, "cub");
   const std::vector<double> nothing(45, NAN), shear = {1, 0, 0, 0.5, 1, 0, 0, 0, 1};
   const Change changes[] = {
-      {"rel_path", io::MatArray::Text("../../etc/passwd"), {"images(2).rel_path", "leads out"}},
+      {"rel_path", io::MatArray::Text("../../etc/passwd"), {"images(2).rel_path", "is outside of"}},
       {"rel_path", io::MatArray::Number(1), {"images(2).rel_path", "expected text"}},
       {"parts", io::MatArray::Number(1), {"images(2).parts", "expected 3 x 15"}},
       {"parts", io::MatArray::Numbers({3, 15}, nothing), {}},  // not visible: fine
@@ -336,7 +336,7 @@ TEST_F(PhotoFolderTest, BrokenKeypointsAreErrors) {
   Write("keypoints.json", std::string(kNames) + "\"photographs\": {\"p100.png\": [1]}}");
   ExpectMessage(OpenPhotographs(folder_).status(), "\"p100.png\" needs 8 keypoints");
   Write("keypoints.json", R"({"names": ["a"], "mirror": [["a", "z"]]})");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"z\" is none of");
+  ExpectMessage(OpenPhotographs(folder_).status(), "\"z\" is not one of");
   Write("keypoints.json", R"({"names": ["a", "b", "a"]})");
   ExpectMessage(OpenPhotographs(folder_).status(), "\"names\" has \"a\" twice");
   // No mirror images: their pairs would be a ring.
