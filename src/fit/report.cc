@@ -144,7 +144,7 @@ std::string Settings(const FitJob& job) {
 
 }  // namespace
 
-std::vector<TermLabel> FitLabels() {
+TermLabels FitLabels() {
   return {{"color", "Colour loss (mean difference)"}, {"silhouette", "Silhouette loss"},
           {"laplacian", "Laplacian of the movement"}, {"flatness", "Angles between faces"},
           {"edge_length", "Unequal edges"},           {"area", "Surface area"},

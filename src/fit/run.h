@@ -72,7 +72,7 @@ std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>&
 std::string DescribeJob(const FitJob& job);
 
 // What people read for the names in its log.
-std::vector<TermLabel> FitLabels();
+TermLabels FitLabels();
 // The page. `sheet` is the timelapse in one picture, or empty.
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,
                               const ImageU8& sheet);

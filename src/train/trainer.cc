@@ -27,11 +27,13 @@ class Training : public RunWork {
     // First: a run that is killed from here on is one to resume.
     TILEGRAD_TRY(WriteTextAtomic(job_.run / kTrainSettings, WriteConfig(config_)));
     TILEGRAD_TRY(task_.Begin(job_.run, first_step));
-    RunHeader header = task_.Header();
-    header.name = config_.name;
-    header.dataset = job_.data.string();
-    header.machine = DescribeMachine();
-    TILEGRAD_TRY(WriteHeader(job_.run, header));
+    header_ = task_.Header();
+    header_.name = config_.name;
+    header_.dataset = job_.data.string();
+    header_.machine = DescribeMachine();
+    const auto before = ReadHeader(job_.run);
+    if (first_step > 0 && before.ok()) header_.labels = before->labels;
+    TILEGRAD_TRY(WriteHeader(job_.run, header_));
     if (job_.begun) TILEGRAD_TRY(job_.begun());
     if (job_.crew) ShareState(first_step);
     return {};
@@ -41,7 +43,7 @@ class Training : public RunWork {
     if (job_.crew) job_.crew->Order(step);
     Status status = Updates(step, values);
     if (!status.ok() && job_.crew) job_.crew->Break();
-    return status;
+    return status.ok() ? NoteLabels(values->terms) : status;
   }
 
   // Data, networks and all else; on every rank.
@@ -96,6 +98,14 @@ class Training : public RunWork {
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
  private:
+  // Terms may begin in the middle of a run.
+  Status NoteLabels(std::span<const LossTerm> terms) {
+    const std::size_t known = header_.labels.size();
+    for (const LossTerm& term : terms) {
+      if (*term.label != '\0') header_.labels.emplace(term.name, term.label);
+    }
+    return header_.labels.size() == known ? Status() : WriteHeader(job_.run, header_);
+  }
   Status Updates(std::int64_t step, StepValues* values) {
     for (int update = 0; update < task_.Updates(step); ++update) {
       const UpdateIndex at{step, update};
@@ -123,6 +133,7 @@ class Training : public RunWork {
   const TrainJob& job_;
   TrainConfig& config_;
   Task& task_;
+  RunHeader header_;
   std::unique_ptr<PortionedUpdate> portioned_;  // without: the batch is one portion, as it comes
 };
 

@@ -14,6 +14,7 @@
 #include "scene/topology.h"
 #include "train/models/offset_map.h"
 #include "train/tasks/single_image/step.h"
+#include "train/terms.h"
 
 namespace tilegrad::train::chain_test {
 
@@ -162,8 +163,8 @@ struct SmallProblem {
 };
 
 // A whole step.
-Result<LossValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int64_t number) {
-  LossValues values;
+Result<StepValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int64_t number) {
+  StepValues values;
   TILEGRAD_ASSIGN(const auto gradients, step.Backward(batch, {number}, &values));
   TILEGRAD_TRY(step.weights().Update(gradients, number));
   return values;
@@ -179,11 +180,11 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
   nn::Context context(workers, nn::DType::kF64);
   TrainStep step(context, p.config, p.store.size);
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
-  LossValues values;
+  StepValues values;
   std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
   const auto gradients = nn::Grad(step.Loss(batch, 0, &values), step.weights().adam().parameters());
   ASSERT_TRUE(context.status().ok()) << context.status().message();
-  EXPECT_LT(values.iou, 0.95);  // the scene is not empty: silhouettes overlap
+  EXPECT_LT(TermOf(values, "iou"), 0.95);  // the scene is not empty: silhouettes overlap
   Rng rng(9);
   int checked = 0, off = 0;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -191,13 +192,13 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
     for (int k = 0; k < 3; ++k, ++checked) {
       const std::size_t at = rng.Below(weight.elements());
       const double h = 1e-6, before = weight.data<double>()[at];
-      LossValues up, down;
+      StepValues up, down;
       weight.data<double>()[at] = before + h;
       step.Loss(batch, 0, &up);
       weight.data<double>()[at] = before - h;
       step.Loss(batch, 0, &down);
       weight.data<double>()[at] = before;
-      const double want = (up.total - down.total) / (2 * h),
+      const double want = (up.loss - down.loss) / (2 * h),
                    got = gradients[i].value().data<double>()[at];
       if (std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8) continue;
       ++off;
@@ -250,14 +251,14 @@ TEST(Chain, TheTrainingPathAgreesWithFloat64) {
   nn::Context wide(workers, nn::DType::kF64), narrow(workers);
   TrainStep reference(wide, p.config, p.store.size), fast(narrow, p.config, p.store.size);
   ASSERT_TRUE(nn::LoadState(reference.network().module(), nn::State(fast.network().module())).ok());
-  LossValues want, got;
+  StepValues want, got;
   const auto d_want = nn::Grad(reference.Loss(GatherBatch(wide, p.store, p.samples), 0, &want),
                                reference.weights().adam().parameters());
   const auto d_got = nn::Grad(fast.Loss(GatherBatch(narrow, p.store, p.samples), 0, &got),
                               fast.weights().adam().parameters());
-  EXPECT_NEAR(got.total, want.total, 1e-5);
-  EXPECT_NEAR(got.iou, want.iou, 1e-5);
-  EXPECT_NEAR(got.color, want.color, 1e-5);
+  EXPECT_NEAR(got.loss, want.loss, 1e-5);
+  EXPECT_NEAR(TermOf(got, "iou"), TermOf(want, "iou"), 1e-5);
+  EXPECT_NEAR(TermOf(got, "color"), TermOf(want, "color"), 1e-5);
   double total = 0;
   for (const nn::Var& d : d_want) {
     for (const double g : d.value().span<double>()) total += g * g;
@@ -289,7 +290,7 @@ void ExpectSameBitsAndLearning(const std::string& rule, bool color = false) {
     for (std::int64_t s = 0; s < 60; ++s) {
       const auto values = RunStep(step, GatherBatch(context, p.store, p.samples), s);
       ASSERT_TRUE(values.ok()) << values.status().message();
-      (s == 0 ? first : last) = values->total;
+      (s == 0 ? first : last) = values->loss;
     }
     std::vector<float> weights;
     for (const nn::NamedTensor& t : nn::State(step.network().module())) {
@@ -317,16 +318,14 @@ TEST(Chain, RivalsHaveNoColorLoss) {
     nn::Context context(workers);
     p.config.render.rule = rule;
     TrainStep step(context, p.config, p.store.size);
-    LossValues values;
+    StepValues values;
     const nn::Var loss = step.Loss(GatherBatch(context, p.store, p.samples), 0, &values);
     const LossConfig& w = p.config.loss;
-    EXPECT_NEAR(
-        values.total,
-        w.iou * values.iou + w.smoothness * values.smoothness + w.laplacian * values.laplacian,
-        1e-6);
-    std::vector<LossTerm> terms;
-    step.losses().AddTerms(values, &terms);
-    EXPECT_EQ(terms.size(), 3u);
+    EXPECT_NEAR(values.loss,
+                w.iou * TermOf(values, "iou") + w.smoothness * TermOf(values, "smoothness") +
+                    w.laplacian * TermOf(values, "laplacian"),
+                1e-6);
+    EXPECT_EQ(values.terms.size(), 3u);
     const auto parameters = nn::Parameters(step.network().module());
     const auto gradients = nn::Grad(loss, step.weights().adam().parameters());
     double moving = 0;

@@ -139,12 +139,9 @@ Status LivePage::Write(const Json& now) {
 
 Result<Json> LivePage::State() const {
   std::int64_t steps = source_.steps;
-  std::vector<TermLabel> labels = source_.labels;
   const auto config = ReadConfig(source_.run / kTrainSettings);
-  if (config.ok()) {
-    if (steps == 0) steps = config->schedule.steps;
-    labels = config->task->Labels();
-  }
+  if (config.ok() && steps == 0) steps = config->schedule.steps;
+  const auto header = ReadHeader(source_.run);
   std::vector<LogEntry> log;
   const Path metrics = source_.run / "metrics.jsonl";
   if (PathExists(metrics)) {
@@ -159,7 +156,7 @@ Result<Json> LivePage::State() const {
                {"step", step},
                {"steps", steps},
                {"pictures", PictureList(source_.run)}};
-  json.update(CurveData(log, labels));
+  json.update(CurveData(log, header.ok() ? header->labels : source_.labels));
   return json;
 }
 

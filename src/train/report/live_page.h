@@ -23,10 +23,10 @@
 namespace tilegrad::train {
 
 struct LiveSource {
-  Path run;                            // folder of a run or a fit, which may have done no step yet
-  Path data = {};                      // dataset of a run, for what it predicts; empty: no meshes
-  std::int64_t steps = 0;              // of the whole work; 0: as config.toml says, if there is one
-  std::vector<TermLabel> labels = {};  // of its log, where there is no config.toml
+  Path run;                // folder of a run or a fit, which may have done no step yet
+  Path data = {};          // dataset of a run, for what it predicts; empty: no meshes
+  std::int64_t steps = 0;  // of the whole work; 0: as config.toml says, if there is one
+  TermLabels labels = {};  // of its log, where there is no run.json
 };
 
 class LivePage {

@@ -132,11 +132,9 @@ Json CurvesJson(const std::vector<LogEntry>& log, const std::vector<std::string>
   return curves;
 }
 
-std::string TitleOf(const std::string& name, const std::vector<TermLabel>& labels) {
+std::string TitleOf(const std::string& name, const TermLabels& labels) {
   if (name == "loss") return "Total loss";
-  for (const TermLabel& label : labels) {
-    if (name == label.name) return label.label;
-  }
+  if (const auto known = labels.find(name); known != labels.end()) return known->second;
   std::string words = name;
   std::replace(words.begin(), words.end(), '_', ' ');
   if (!words.empty())
@@ -173,7 +171,7 @@ Result<Json> CentredMeshJson(Mesh mesh) {
   return MeshJson(mesh);
 }
 
-Json CurveData(const std::vector<LogEntry>& log, const std::vector<TermLabel>& labels) {
+Json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels) {
   const std::vector<std::string> names = CurveNames(log);
   Json out = {{"curves", CurvesJson(log, names)}, {"charts", Json::array()}};
   for (const std::string& name : names)
@@ -183,7 +181,7 @@ Json CurveData(const std::vector<LogEntry>& log, const std::vector<TermLabel>& l
 
 Json PageData(const ReportFacts& facts) {
   const Showcase& show = facts.showcase;
-  Json out = CurveData(facts.run.log, facts.run.config.task->Labels());
+  Json out = CurveData(facts.run.log, facts.run.header.labels);
   out["camera"] = {{"fov_y", show.fov_y},
                    {"azimuth", show.azimuth},
                    {"elevation", show.elevation},

@@ -20,8 +20,7 @@ Result<nlohmann::ordered_json> CentredMeshJson(Mesh mesh);
 
 // {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each value
 // of the log but the clock's.
-nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log,
-                                 const std::vector<TermLabel>& labels);
+nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels);
 
 // {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}], "camera": {...},
 // "models": [...]}: a chart for each value of the log but the clock's.

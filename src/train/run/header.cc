@@ -6,6 +6,18 @@
 #include "train/json_fields.h"
 
 namespace tilegrad::train {
+namespace {
+
+std::vector<std::pair<std::string, std::string>> TextsIn(const nlohmann::json& json,
+                                                         const char* key) {
+  std::vector<std::pair<std::string, std::string>> out;
+  if (!json.contains(key)) return out;
+  for (const auto& [name, value] : json[key].items())
+    out.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
+  return out;
+}
+
+}  // namespace
 
 Status WriteHeader(const Path& run, const RunHeader& header) {
   nlohmann::ordered_json json = {{"name", header.name},
@@ -14,6 +26,7 @@ Status WriteHeader(const Path& run, const RunHeader& header) {
                                  {"training_models", header.training_models},
                                  {"parameters", header.parameters}};
   for (const auto& [key, value] : header.machine) json["machine"][key] = value;
+  for (const auto& [name, label] : header.labels) json["labels"][name] = label;
   return WriteTextAtomic(run / "run.json", JsonText(std::move(json), 2) + "\n");
 }
 
@@ -31,9 +44,8 @@ Result<RunHeader> ReadHeader(const Path& run) {
   fields.Read("parameters", 0, most, &parameters);
   if (!fields.status().ok()) return fields.status();
   header.parameters = parameters;
-  if (!json.contains("machine")) return header;
-  for (const auto& [key, value] : json["machine"].items())
-    header.machine.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
+  for (const auto& [key, value] : TextsIn(json, "machine")) header.machine.emplace_back(key, value);
+  for (const auto& [name, label] : TextsIn(json, "labels")) header.labels.emplace(name, label);
   return header;
 }
 

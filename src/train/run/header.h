@@ -2,6 +2,7 @@
 // <run>/run.json: what a run is, for people and for the commands that look at it.
 #pragma once
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,9 @@
 
 namespace tilegrad::train {
 
+// In words, for names of the log that do not explain themselves.
+using TermLabels = std::map<std::string, std::string>;
+
 struct RunHeader {
   std::string name;            // the configuration's
   std::string dataset;         // folder, as training was given it
@@ -17,6 +21,7 @@ struct RunHeader {
   int training_models = 0;
   std::int64_t parameters = 0;                               // numbers that are trained
   std::vector<std::pair<std::string, std::string>> machine;  // as DescribeMachine
+  TermLabels labels;                                         // of what its steps have said so far
 };
 
 Status WriteHeader(const Path& run, const RunHeader& header);

@@ -11,10 +11,11 @@
 namespace tilegrad::train {
 
 struct LossTerm {
-  const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second",
-                     // "seconds", "stream_share", "wait_share", "summed_numbers"
-  double weight;     // in the loss; 0: only watched
-  double value;      // before the weight
+  const char* name;        // its key in metrics.jsonl; not "step", "loss", "images_per_second",
+                           // "seconds", "stream_share", "wait_share", "summed_numbers"
+  double weight;           // in the loss; 0: only watched
+  double value;            // before the weight
+  const char* label = "";  // for people; "": the name says it
 };
 
 // Cleared and filled anew by each step: a steady state keeps the memory.

@@ -35,14 +35,4 @@ Status AdversarialTask::LoadState(const std::vector<nn::NamedTensor>& state, std
   return adversary_->LoadState(state);
 }
 
-std::vector<TermLabel> AdversarialTask::WithCritic(std::vector<TermLabel> labels) {
-  labels.insert(labels.end(),
-                {{"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
-                 {"critic_features", "Features of the critic (L1)"},
-                 {"perceptual", "Features of a trained network (L1)"},
-                 {"critic_distance", "How far the critic tells true from rendered pictures"},
-                 {"critic_penalty", "Gradient penalty of the critic"}});
-  return labels;
-}
-
 }  // namespace tilegrad::train

@@ -21,12 +21,9 @@ class AdversarialTask : public Task {
   virtual nn::Module& network() = 0;
   virtual LearnedWeights& weights() = 0;
 
-  // `labels`, and those of the critic's terms.
-  static std::vector<TermLabel> WithCritic(std::vector<TermLabel> labels);
   // Of the updates after the first.
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const UpdateIndex& at, StepValues* out) {
-    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
-                                       &out->terms);
+    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener}, out);
   }
 
   std::unique_ptr<Adversary> adversary_;  // made when the task starts

@@ -68,32 +68,26 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
   return out;
 }
 
-nn::Var Adversary::GeneratorLoss(const Pictures& pictures, Values* values) {
+void Adversary::AddLosses(const Pictures& pictures, LossSum* sum) {
   const auto& [rendered, truth, portion] = pictures;
-  nn::Var total;
-  const auto add = [&](double weight, const nn::Var& term, double* value) {
-    *value = term.item();
-    total = total.has_context() ? total + weight * term : weight * term;
-  };
   kept_.resize(static_cast<std::size_t>(portion.count));
   kept_[static_cast<std::size_t>(portion.index)] = {rendered.value(), truth};
-  if (config_.weight > 0)
-    add(config_.weight, WganGeneratorLoss(*critic_, rendered), &values->adversarial);
-  if (config_.features > 0)
-    add(config_.features, FeatureL1Loss(FeaturesOf(*critic_), rendered, truth), &values->features);
-  if (config_.perceptual > 0)
-    add(config_.perceptual, FeatureL1Loss(perceptual_, rendered, truth), &values->perceptual);
-  return total;
-}
-
-void Adversary::AddTerms(const Values& v, std::vector<LossTerm>* terms) const {
-  if (config_.weight > 0) terms->push_back({"adversarial", config_.weight, v.adversarial});
-  if (config_.features > 0) terms->push_back({"critic_features", config_.features, v.features});
-  if (config_.perceptual > 0) terms->push_back({"perceptual", config_.perceptual, v.perceptual});
+  if (config_.weight > 0) {
+    sum->Add("adversarial", "Adversarial loss (− mean score of rendered pictures)", config_.weight,
+             WganGeneratorLoss(*critic_, rendered));
+  }
+  if (config_.features > 0) {
+    sum->Add("critic_features", "Features of the critic (L1)", config_.features,
+             FeatureL1Loss(FeaturesOf(*critic_), rendered, truth));
+  }
+  if (config_.perceptual > 0) {
+    sum->Add("perceptual", "Features of a trained network (L1)", config_.perceptual,
+             FeatureL1Loss(perceptual_, rendered, truth));
+  }
 }
 
 Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep& at,
-                                                                std::vector<LossTerm>* terms) {
+                                                                StepValues* values) {
   const Slots draw = SlotsOf(at.step * config_.updates + at.update, at.portion.count, at.portion);
   Rng rng(seed_ ^ kPenaltyStream, static_cast<std::uint64_t>(draw.first));
   const auto& [rendered, truth] = kept_[static_cast<std::size_t>(at.portion.index)];
@@ -109,8 +103,11 @@ Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep
         loss.total.item());
   }
   if (at.update > 0) return gradients;
-  terms->push_back({"critic_distance", 0, loss.wasserstein.item()});
-  if (config_.penalty > 0) terms->push_back({"critic_penalty", 0, loss.penalty.item()});
+  LossSum watched(values);
+  watched.Watch("critic_distance", "How far the critic tells true from rendered pictures",
+                loss.wasserstein.item());
+  if (config_.penalty > 0)
+    watched.Watch("critic_penalty", "Gradient penalty of the critic", loss.penalty.item());
   return gradients;
 }
 

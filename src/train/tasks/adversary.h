@@ -12,10 +12,10 @@
 #include "nn/networks/gan.h"
 #include "nn/optim.h"
 #include "train/losses/feature_l1.h"
+#include "train/losses/loss_sum.h"
 #include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"
 #include "train/run/portion.h"
-#include "train/run/step_values.h"
 
 namespace tilegrad::train {
 
@@ -43,18 +43,14 @@ class Adversary {
   static Result<std::unique_ptr<Adversary>> Make(nn::Context& context,
                                                  const AdversaryConfig& config, std::uint64_t seed);
 
-  struct Values {
-    double adversarial = 0, features = 0, perceptual = 0;  // unweighted
-  };
   struct Pictures {
     nn::Var rendered;      // [n, 3, size, size]
     nn::Tensor truth;      // likewise
     Portion portion = {};  // of the batch that they are
   };
-  // The three terms, weighted; an invalid Var if none counts. Numbers of both pictures are kept for
-  // the critic's updates on this portion, which come after this one.
-  nn::Var GeneratorLoss(const Pictures& pictures, Values* values);
-  void AddTerms(const Values& values, std::vector<LossTerm>* terms) const;
+  // Adds those of the three terms that have a weight. Numbers of both pictures are kept for the
+  // critic's updates on this portion, which come after this one.
+  void AddLosses(const Pictures& pictures, LossSum* sum);
 
   // Updates of the critic in each step; 0 without one.
   int updates() const { return critic_ ? static_cast<int>(config_.updates) : 0; }
@@ -65,8 +61,7 @@ class Adversary {
     nn::GradientListener* listener = nullptr;
   };
   // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
-  Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at,
-                                                       std::vector<LossTerm>* terms);
+  Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at, StepValues* values);
   Status UpdateCritic(std::span<const nn::Gradient> gradients, nn::UpdateShare* share) {
     return adam_->Step(gradients, share);
   }

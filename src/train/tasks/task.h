@@ -119,19 +119,12 @@ struct Showcase {
   double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the view on meshes; degrees
 };
 
-struct TermLabel {
-  const char* name;  // in metrics.jsonl
-  const char* label;
-};
-
 class Task {
  public:
   virtual ~Task() = default;
 
   // Its keys. They point into the task, which is made with their defaults.
   virtual ConfigFields Fields() = 0;
-  // What people read for the names in its log; other names stand for themselves.
-  virtual std::vector<TermLabel> Labels() const = 0;
   // What scores a run of it, as words after "tilegrad" and before "--run".
   virtual const char* ScoreCommand() const { return "eval"; }
 

@@ -9,6 +9,7 @@
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "train/losses/loss_sum.h"
 #include "train/predictor.h"
 
 namespace tilegrad::train {
@@ -103,7 +104,6 @@ class ToyTask : public Task {
             {"box.learning_rate", &config_.learning_rate, 0, 1, "of both optimisers"},
             {"box.decay", &config_.decay, 0, kNoLimit, "weight of the weights' squares"}};
   }
-  std::vector<TermLabel> Labels() const override { return {{"size", "Squared error of sizes"}}; }
 
   Status Start(const TaskStart& start) override {
     context_ = &start.context;
@@ -184,17 +184,17 @@ Result<nn::StepVector<nn::Gradient>> ToyTask::Backward(const UpdateIndex& at, St
   }
   const nn::Tensor boxes = context_->From({config_.batch, 3}, std::span<const float>(colors));
   const nn::Var predicted = model_->layer.Forward(nn::Constant(*context_, boxes), nn::Mode::kTrain);
-  const nn::Var size = nn::Mean(nn::Square(predicted - nn::Constant(*context_, boxes)));
-  const nn::Var decay = nn::Mean(nn::Square(model_->layer.weight));
-  const nn::Var loss = size + config_.decay * decay;
-  auto gradients = nn::Gradients(loss, Moved(at).parameters());
+  StepValues values;
+  LossSum sum(&values);
+  sum.Add("size", "Squared error of sizes", 1,
+          nn::Mean(nn::Square(predicted - nn::Constant(*context_, boxes))));
+  sum.Add("decay", "", config_.decay, nn::Mean(nn::Square(model_->layer.weight)));
+  auto gradients = nn::Gradients(sum.total(), Moved(at).parameters());
   TILEGRAD_TRY(context_->TakeStatus());
-  if (!std::isfinite(loss.item()) || !nn::IsFinite(*context_, gradients))
-    return InternalError("the loss is {}", loss.item());
+  if (!std::isfinite(values.loss) || !nn::IsFinite(*context_, gradients))
+    return InternalError("the loss is {}", values.loss);
   if (at.update > 0) return gradients;
-  out->loss = loss.item();
-  out->terms.push_back({"size", 1, size.item()});
-  out->terms.push_back({"decay", config_.decay, decay.item()});
+  *out = values;
   out->images = config_.batch;
   return gradients;
 }

@@ -8,6 +8,7 @@
 #include "nn/nn.h"
 #include "render/picture/composite.h"
 #include "train/data/trained_models.h"
+#include "train/losses/loss_sum.h"
 #include "train/predictor.h"
 #include "train/tasks/classify/config.h"
 #include "train/tasks/classify/held_out.h"
@@ -44,10 +45,6 @@ ImageU8 Framed(const ImageU8& image, const std::uint8_t (&color)[3]) {
 class ClassifyTask : public Task {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
-  std::vector<TermLabel> Labels() const override {
-    return {{"cross_entropy", "Cross entropy of the classes"},
-            {"right", "Share of the step's pictures that are told right"}};
-  }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.images.size; }
@@ -172,15 +169,16 @@ Result<nn::StepVector<nn::Gradient>> ClassifyTask::Backward(const UpdateIndex& a
   const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
   const LabelledBatch batch = Batch(slots);
   const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kTrain);
-  const nn::Var loss = nn::CrossEntropy(scores, batch.labels);
-  auto gradients = nn::Gradients(loss, adam_->parameters(), at.listener);
+  LossSum sum(out);
+  sum.Add("cross_entropy", "Cross entropy of the classes", 1,
+          nn::CrossEntropy(scores, batch.labels));
+  auto gradients = nn::Gradients(sum.total(), adam_->parameters(), at.listener);
   TILEGRAD_TRY(context_->TakeStatus());
-  if (!std::isfinite(loss.item()) || !nn::IsFinite(*context_, gradients)) {
-    return InternalError("the loss is {}; a smaller optimizer.learning_rate may help", loss.item());
+  if (!std::isfinite(out->loss) || !nn::IsFinite(*context_, gradients)) {
+    return InternalError("the loss is {}; a smaller optimizer.learning_rate may help", out->loss);
   }
-  out->loss = loss.item();
-  out->terms.push_back({"cross_entropy", 1, loss.item()});
-  out->terms.push_back({"right", 0, ShareRight(scores.value(), batch.labels)});
+  sum.Watch("right", "Share of the step's pictures that are told right",
+            ShareRight(scores.value(), batch.labels));
   out->also.emplace_back("epoch",
                          static_cast<double>((at.step + 1) * config_.batch) / train_.images.models);
   out->also.emplace_back("learning_rate", RateAt(at.step));

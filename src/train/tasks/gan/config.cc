@@ -64,10 +64,7 @@ ConfigFields FieldsOf(GanConfig* c) {
   return Joined(
       {FieldsOf(&c->network),
        FieldsOf(&c->critic),
-       ConfigFields{{"loss.smoothness", &c->loss.smoothness, 0, kNoLimit,
-                     "weight of the normal difference of neighbouring faces"},
-                    {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
-                     "weight of the Laplacian of the movement"}},
+       Without(FieldsOf(&c->loss), {"loss.iou", "loss.color"}),
        {{"critic.views", &c->views, 1, kMostViews,
          "that critics see side by side: front, side, back, above, and two between; 4 in the "
          "paper"},

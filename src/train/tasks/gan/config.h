@@ -18,11 +18,6 @@ struct GanCriticConfig {
   double texture_weight = 0.25;  // of D_t beside D_I; 0: no D_t
 };
 
-// Regularisers of generated shapes; nothing of the kind in the paper's section 5.5.
-struct GanShapeLoss {
-  double smoothness = 1e-3, laplacian = 1e-2;
-};
-
 struct GanTextureSource {
   std::string run;            // of task.kind = "textured_image"
   std::int64_t count = 2000;  // pictures that it extracts textures from
@@ -31,7 +26,7 @@ struct GanTextureSource {
 struct GanConfig {
   GeneratorConfig network;
   GanCriticConfig critic;
-  GanShapeLoss loss;
+  LossConfig loss;                  // of it the regularisers; the paper's section 5.5 has none
   std::int64_t shape_steps = 3500;  // of the run; then shapes are frozen, and textures learn
   std::string start;                // a run, or checkpoint, whose shapes this one starts with
   GanTextureSource textures;

@@ -31,26 +31,34 @@ OptimizerConfig OptimizerOf(const GanConfig& config) {
 }  // namespace
 
 CriticRole SilhouetteRole(std::int64_t views) {
-  return {"critic_shape.", "adversarial_shape", "distance_shape",
-          "penalty_shape", "gradient_shape",    views,
-          0x637368};
+  return {.prefix = "critic_shape.",
+          .adversarial = {"adversarial_shape", "Adversarial loss of silhouettes (− mean score)"},
+          .distance = {"distance_shape", "Wasserstein estimate of the critic of silhouettes"},
+          .penalty = {"penalty_shape", "Gradient penalty of the critic of silhouettes"},
+          .gradient = {"gradient_shape", "Norm of the gradient of the critic of silhouettes"},
+          .channels = views,
+          .stream = 0x637368};
 }
 
 CriticRole PictureRole(std::int64_t views) {
-  return {"critic_picture.", "adversarial_picture", "distance_picture",
-          "penalty_picture", "gradient_picture",    3 * views,
-          0x637063};
+  return {.prefix = "critic_picture.",
+          .adversarial = {"adversarial_picture", "Adversarial loss of pictures (− mean score)"},
+          .distance = {"distance_picture", "Wasserstein estimate of the critic of pictures"},
+          .penalty = {"penalty_picture", "Gradient penalty of the critic of pictures"},
+          .gradient = {"gradient_picture", "Norm of the gradient of the critic of pictures"},
+          .channels = 3 * views,
+          .stream = 0x637063};
 }
 
 CriticRole TextureRole(const GeneratorConfig& maps) {
-  return {"critic_texture.",
-          "adversarial_texture",
-          "distance_texture",
-          "penalty_texture",
-          "gradient_texture",
-          3,
-          0x637478,
-          maps.symmetric_texture ? nn::PadMode::kReplicate : nn::PadMode::kCircular};
+  return {.prefix = "critic_texture.",
+          .adversarial = {"adversarial_texture", "Adversarial loss of texture maps (− mean score)"},
+          .distance = {"distance_texture", "Wasserstein estimate of the critic of texture maps"},
+          .penalty = {"penalty_texture", "Gradient penalty of the critic of texture maps"},
+          .gradient = {"gradient_texture", "Norm of the gradient of the critic of texture maps"},
+          .channels = 3,
+          .stream = 0x637478,
+          .padding = maps.symmetric_texture ? nn::PadMode::kReplicate : nn::PadMode::kCircular};
 }
 
 GanCritic::GanCritic(nn::Context& context, const GanConfig& config, const CriticRole& role,
@@ -62,7 +70,10 @@ GanCritic::GanCritic(nn::Context& context, const GanConfig& config, const Critic
       critic_(MakeCritic(context, config, role)),
       weights_(context, critic_, OptimizerOf(config), steps) {}
 
-nn::Var GanCritic::GeneratorLoss(const nn::Var& fake) { return WganGeneratorLoss(critic_, fake); }
+void GanCritic::AddGeneratorLoss(double weight, const nn::Var& fake, LossSum* sum) {
+  const auto& [name, label] = role_.adversarial;
+  sum->Add(name, label, weight, WganGeneratorLoss(critic_, fake));
+}
 
 Result<nn::StepVector<nn::Gradient>> GanCritic::Gradients(const Pair& pair, const Backward& how) {
   Rng rng(seed_, how.number);
@@ -76,12 +87,13 @@ Result<nn::StepVector<nn::Gradient>> GanCritic::Gradients(const Pair& pair, cons
     return InternalError(
         "{}: the critic's loss is {}, its gradient's norm {}; a smaller critic.learning_rate or a "
         "larger critic.penalty may help",
-        role_.distance, loss.total.item(), norm);
+        role_.distance.name, loss.total.item(), norm);
   }
-  if (how.terms == nullptr) return gradients;
-  how.terms->push_back({role_.distance, 0, loss.wasserstein.item()});
-  if (penalty_ > 0) how.terms->push_back({role_.penalty, 0, loss.penalty.item()});
-  how.terms->push_back({role_.gradient, 0, norm});
+  if (how.values == nullptr) return gradients;
+  LossSum watched(how.values);
+  watched.Watch(role_.distance.name, role_.distance.label, loss.wasserstein.item());
+  if (penalty_ > 0) watched.Watch(role_.penalty.name, role_.penalty.label, loss.penalty.item());
+  watched.Watch(role_.gradient.name, role_.gradient.label, norm);
   return gradients;
 }
 

@@ -7,16 +7,20 @@
 #include <vector>
 
 #include "nn/networks/gan.h"
-#include "train/run/step_values.h"
+#include "train/losses/loss_sum.h"
 #include "train/tasks/gan/config.h"
 #include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
 
-// What a critic compares, with the names of what is watched: they live as long as the program.
+// A term of the log, as LossSum::Add takes it.
+struct TermWords {
+  const char *name, *label;
+};
+// What a critic compares, and what is watched of it.
 struct CriticRole {
-  const char* prefix;                                       // of its tensors in checkpoints
-  const char *adversarial, *distance, *penalty, *gradient;  // terms of the log
+  const char* prefix;  // of its tensors in checkpoints
+  TermWords adversarial, distance, penalty, gradient;
   std::int64_t channels;
   std::uint64_t stream;  // of its weights and interpolates
   nn::PadMode padding = nn::PadMode::kZero;
@@ -34,14 +38,14 @@ class GanCritic {
             std::int64_t steps);
 
   // -E[D(fake)]
-  nn::Var GeneratorLoss(const nn::Var& fake);
+  void AddGeneratorLoss(double weight, const nn::Var& fake, LossSum* sum);
   struct Pair {
     nn::Tensor real, fake;
   };
   struct Backward {
     std::uint64_t number = 0;  // of the batch, from which interpolates follow
     nn::GradientListener* listener = nullptr;
-    std::vector<LossTerm>* terms = nullptr;  // what is watched is appended, if it is there
+    StepValues* values = nullptr;  // what is watched is appended, if it is there
   };
   // Of WganCriticLoss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, const Backward& how);

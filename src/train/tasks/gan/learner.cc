@@ -135,15 +135,12 @@ GanCritic::Pair GanLearner::PairOf(const GanCritic& critic, const Portion& porti
   return {real.maps, fake.maps};
 }
 
-nn::Var GanLearner::AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects,
-                                    StepValues* out) {
+void GanLearner::AddAdversarialLoss(GanCritic* critic, const GeneratedObjects& objects,
+                                    LossSum* sum) {
   const bool maps = maps_ && critic == &*maps_;
   const nn::Var& seen =
       critic == &silhouettes_ ? objects.cover : (maps ? objects.maps : objects.colors);
-  const nn::Var loss = critic->GeneratorLoss(seen);
-  const double weight = maps ? config_.critic.texture_weight : 1;
-  out->terms.push_back({critic->role().adversarial, weight, loss.item()});
-  return weight * loss;
+  critic->AddGeneratorLoss(maps ? config_.critic.texture_weight : 1, seen, sum);
 }
 
 Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const UpdateIndex& at,
@@ -151,15 +148,11 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   const GanStage stage = StageOf(at.step);
   TILEGRAD_TRY(DrawReal(at, 0));
   const GeneratedObjects objects = Draw(at, 0);
-  nn::Var loss;
-  for (GanCritic* critic : Critics(stage)) {
-    const nn::Var term = AdversarialLoss(critic, objects, out);
-    loss = loss.has_context() ? loss + term : term;
-  }
-  if (stage == GanStage::kShape) loss = loss + step_.ShapeLoss(objects.shapes, &out->terms);
-  auto gradients = nn::Gradients(loss, Weights(stage).adam().parameters(), at.listener);
+  LossSum sum(out);
+  for (GanCritic* critic : Critics(stage)) AddAdversarialLoss(critic, objects, &sum);
+  if (stage == GanStage::kShape) step_.AddShapeLosses(objects.shapes, &sum);
+  auto gradients = nn::Gradients(sum.total(), Weights(stage).adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
-  out->loss = loss.item();
   const double norm = nn::GlobalNorm(context_, gradients);
   if (!std::isfinite(out->loss) || !std::isfinite(norm)) {
     return InternalError(
@@ -167,8 +160,8 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
         "optimizer.learning_rate may help",
         out->loss, out->DescribeTerms(), norm);
   }
-  out->terms.push_back({"gradient_generator", 0, norm});
-  AddScores(out);
+  sum.Watch("gradient_generator", "Norm of the generator's gradient", norm);
+  AddScores(&sum);
   out->also.emplace_back("learning_rate", Weights(stage).RateAt(StageStep(at.step)));
   out->images = CountOf(at) * config_.views;
   return gradients;
@@ -184,10 +177,9 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::Backward(const UpdateIndex& at,
     TILEGRAD_TRY(DrawFake(at, round));
   }
   GanCritic& critic = *critics[which];
-  return critic.Gradients(PairOf(critic, at.portion),
-                          {.number = NumberOf(at, round),
-                           .listener = at.listener,
-                           .terms = round == 0 ? &out->terms : nullptr});
+  return critic.Gradients(PairOf(critic, at.portion), {.number = NumberOf(at, round),
+                                                       .listener = at.listener,
+                                                       .values = round == 0 ? out : nullptr});
 }
 
 Status GanLearner::Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) {
@@ -250,12 +242,16 @@ Status GanLearner::FreezeShapes() {
   return {};
 }
 
-void GanLearner::AddScores(StepValues* out) const {
+void GanLearner::AddScores(LossSum* sum) const {
   nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
     const T* const scores = scores_.data<T>();
-    out->terms.push_back({"distance", 0, static_cast<double>(scores[kDistance])});
-    out->terms.push_back({"spread_shapes", 0, static_cast<double>(scores[kShapes])});
-    out->terms.push_back({"spread_colors", 0, static_cast<double>(scores[kColors])});
+    const auto watch = [&](const char* name, const char* label, T score) {
+      sum->Watch(name, label, static_cast<double>(score));
+    };
+    watch("distance", "Kernel distance to true pictures, times 1000, by which the best is kept",
+          scores[kDistance]);
+    watch("spread_shapes", "Spread of shapes, as a share of the data's", scores[kShapes]);
+    watch("spread_colors", "Spread of colours, as a share of the data's", scores[kColors]);
   });
 }
 

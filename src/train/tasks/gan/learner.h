@@ -63,12 +63,12 @@ class GanLearner {
   GeneratedObjects Draw(const UpdateIndex& at, int round);
   GanCritic::Pair PairOf(const GanCritic& critic, const Portion& portion) const;
   Result<nn::StepVector<nn::Gradient>> GeneratorGradients(const UpdateIndex& at, StepValues* out);
-  nn::Var AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects, StepValues* out);
+  void AddAdversarialLoss(GanCritic* critic, const GeneratedObjects& objects, LossSum* sum);
   std::uint64_t NumberOf(const UpdateIndex& at, int round) const;
   std::int64_t CountOf(const UpdateIndex& at) const { return config_.batch / at.portion.count; }
   Status Score(std::int64_t steps);
   Status FreezeShapes();
-  void AddScores(StepValues* out) const;
+  void AddScores(LossSum* sum) const;
 
   nn::Context& context_;
   GanConfig config_;

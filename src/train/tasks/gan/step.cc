@@ -7,8 +7,6 @@
 #include "scene/camera_conventions.h"
 #include "scene/shapes.h"
 #include "scene/sphere_uv.h"
-#include "train/losses/laplacian.h"
-#include "train/losses/smoothness.h"
 
 namespace tilegrad::train {
 
@@ -92,13 +90,9 @@ ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& no
           Averaged(Render({.positions = positions}).alpha, config_.views).value()};
 }
 
-nn::Var GanStep::ShapeLoss(const ShapeTextureGenerator::Shapes& shapes,
-                           std::vector<LossTerm>* terms) {
-  const nn::Var smoothness = SmoothnessLoss(shapes.positions, template_.faces, topology_);
-  const nn::Var laplacian = LaplacianLoss(shapes.movement, topology_);
-  terms->push_back({"smoothness", config_.loss.smoothness, smoothness.item()});
-  terms->push_back({"laplacian", config_.loss.laplacian, laplacian.item()});
-  return config_.loss.smoothness * smoothness + config_.loss.laplacian * laplacian;
+void GanStep::AddShapeLosses(const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) {
+  AddRegularizers(config_.loss, {shapes.positions, shapes.movement, template_.faces, topology_},
+                  sum);
 }
 
 }  // namespace tilegrad::train

@@ -9,6 +9,7 @@
 
 #include "scene/topology.h"
 #include "train/ops/render_op.h"
+#include "train/tasks/equation14.h"
 #include "train/tasks/gan/critic.h"
 #include "train/tasks/gan/real_pictures.h"
 
@@ -40,8 +41,7 @@ class GanStep {
   ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                    Texture texture = Texture::kOwn);
 
-  // Regularisers of shapes, weighted; appends them.
-  nn::Var ShapeLoss(const ShapeTextureGenerator::Shapes& shapes, std::vector<LossTerm>* terms);
+  void AddShapeLosses(const ShapeTextureGenerator::Shapes& shapes, LossSum* sum);
 
  private:
   RenderedImages Render(const SceneVars& scenes);

@@ -22,7 +22,6 @@ constexpr int kStreamRows = 8, kStreamViews = 6;
 class GanTask : public Task {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
-  std::vector<TermLabel> Labels() const override;
   const char* ScoreCommand() const override { return "sample --score"; }
 
   Status Start(const TaskStart& start) override;
@@ -67,27 +66,6 @@ class GanTask : public Task {
   std::optional<TextureBank> bank_;
   std::unique_ptr<GanLearner> learner_;
 };
-
-std::vector<TermLabel> GanTask::Labels() const {
-  return {{"adversarial_shape", "Adversarial loss of silhouettes (− mean score)"},
-          {"adversarial_picture", "Adversarial loss of pictures (− mean score)"},
-          {"adversarial_texture", "Adversarial loss of texture maps (− mean score)"},
-          {"smoothness", "Smoothness (normals of neighbouring faces)"},
-          {"laplacian", "Laplacian of the movement"},
-          {"gradient_generator", "Norm of the generator's gradient"},
-          {"distance_shape", "Wasserstein estimate of the critic of silhouettes"},
-          {"distance_picture", "Wasserstein estimate of the critic of pictures"},
-          {"distance_texture", "Wasserstein estimate of the critic of texture maps"},
-          {"penalty_shape", "Gradient penalty of the critic of silhouettes"},
-          {"penalty_picture", "Gradient penalty of the critic of pictures"},
-          {"penalty_texture", "Gradient penalty of the critic of texture maps"},
-          {"gradient_shape", "Norm of the gradient of the critic of silhouettes"},
-          {"gradient_picture", "Norm of the gradient of the critic of pictures"},
-          {"gradient_texture", "Norm of the gradient of the critic of texture maps"},
-          {"distance", "Kernel distance to true pictures, times 1000, by which the best is kept"},
-          {"spread_shapes", "Spread of shapes, as a share of the data's"},
-          {"spread_colors", "Spread of colours, as a share of the data's"}};
-}
 
 Status GanTask::ExtractTextures(const TaskStart& start) {
   if (config_.schedule.steps <= config_.shape_steps) return {};

@@ -7,8 +7,8 @@
 #include "nn/nn.h"
 #include "nn/ops/sample_pictures.h"
 #include "train/losses/color_l1.h"
-#include "train/losses/iou.h"
 #include "train/ops/weak_cameras.h"
+#include "train/tasks/equation14.h"
 
 namespace tilegrad::train {
 
@@ -79,16 +79,6 @@ nn::Var PhotographStep::Masked(const nn::Var& colors, const PhotographBatch& bat
   return mask * colors;
 }
 
-// The terms of section 5.3, where the object is: outlines are equation 12's.
-nn::Var PhotographStep::AdversaryLoss(const nn::Var& colors, const PhotographBatch& batch,
-                                      std::vector<LossTerm>* terms) const {
-  Adversary::Values values;
-  nn::Var loss =
-      adversary_->GeneratorLoss({Masked(colors, batch), batch.colors, batch.portion}, &values);
-  adversary_->AddTerms(values, terms);
-  return loss;
-}
-
 nn::Var PhotographStep::FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const {
   return nn::Mean(nn::SamplePictures(batch.barrier, flow));
 }
@@ -114,43 +104,46 @@ nn::Var PhotographStep::Entropy() const {
   return -nn::Mean(nn::Sum(weights * nn::Log(weights + 1e-12), {1}));
 }
 
-nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step,
-                             std::vector<LossTerm>* terms) {
+nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, StepValues* values) {
   const PredictedPhotographs predicted =
       network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
   if (!predicted.positions.valid()) return predicted.positions;
   const RenderedImages images = Draw(predicted, batch, step);
-  nn::Var total = nn::Constant(context_, 0.0);
-  const auto add = [&](const char* name, double weight, const nn::Var& term) {
-    total = total + weight * term;
-    terms->push_back({name, weight, term.item()});
-  };
   const PhotographLosses& w = config_.loss;
+  LossSum sum(values);
   if (predicted.keypoints.valid()) {
-    add("keypoint", w.keypoint, KeypointLoss(predicted, batch));
-    add("entropy", w.entropy, Entropy());
+    sum.Add("keypoint", "Keypoints (mean square in the crop)", w.keypoint,
+            KeypointLoss(predicted, batch));
+    sum.Add("entropy", "Entropy of the keypoints' weights", w.entropy, Entropy());
   }
-  add("mask", w.mask, nn::Mean(nn::Square(images.alpha - nn::Constant(context_, batch.mask))));
-  add("iou", w.iou, IouLoss(images.alpha, batch.mask));
-  add("color", w.color, ColorL1Loss(Masked(images.colors, batch), batch.colors));
-  if (predicted.flow.valid())
-    add("flow_distance", w.flow_distance, FlowLoss(predicted.flow, batch));
-  if (config_.camera == "given") add("camera", w.camera, CameraLoss(predicted.cameras, batch));
-  add("deformation", w.deformation,
-      nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
-  add("laplacian", w.laplacian, CotangentLaplacianLoss(predicted.positions, edges_));
-  if (adversary_ == nullptr) return total;
-  const nn::Var more = AdversaryLoss(images.colors, batch, terms);
-  return more.has_context() ? total + more : total;
+  sum.Add("mask", "Silhouette (mean square)", w.mask,
+          nn::Mean(nn::Square(images.alpha - nn::Constant(context_, batch.mask))));
+  AddIou(w.iou, images.alpha, batch.mask, &sum);
+  AddColor(w.color, ColorL1Loss(Masked(images.colors, batch), batch.colors), &sum);
+  if (predicted.flow.valid()) {
+    sum.Add("flow_distance", "Distance of the texture flow from the object", w.flow_distance,
+            FlowLoss(predicted.flow, batch));
+  }
+  if (config_.camera == "given") {
+    sum.Add("camera", "Camera (rotation, scale and shift)", w.camera,
+            CameraLoss(predicted.cameras, batch));
+  }
+  sum.Add("deformation", "Mean length of movements", w.deformation,
+          nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
+  sum.Add("laplacian", "Cotangent Laplacian", w.laplacian,
+          CotangentLaplacianLoss(predicted.positions, edges_));
+  // Where the object is: outlines are equation 12's.
+  if (adversary_ != nullptr)
+    adversary_->AddLosses({Masked(images.colors, batch), batch.colors, batch.portion}, &sum);
+  return sum.total();
 }
 
 Result<nn::StepVector<nn::Gradient>> PhotographStep::Backward(const PhotographBatch& batch,
                                                               const UpdateIndex& at,
                                                               StepValues* values) {
-  const nn::Var loss = Loss(batch, at.step, &values->terms);
+  const nn::Var loss = Loss(batch, at.step, values);
   auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
-  values->loss = loss.item();
   if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",

@@ -18,8 +18,8 @@ class PhotographStep {
   PhotographStep(nn::Context& context, const PhotographsConfig& config,
                  const PhotographStart& start);
 
-  // The total; appends each part, unweighted, with its weight to `terms`.
-  nn::Var Loss(const PhotographBatch& batch, std::int64_t step, std::vector<LossTerm>* terms);
+  // On the tape; `values` gets the sum and its terms.
+  nn::Var Loss(const PhotographBatch& batch, std::int64_t step, StepValues* values);
   // A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, const UpdateIndex& at,
                                                 StepValues* values);
@@ -37,8 +37,6 @@ class PhotographStep {
   nn::Var CamerasOf(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
   nn::Var KeypointLoss(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
   nn::Var Masked(const nn::Var& colors, const PhotographBatch& batch) const;
-  nn::Var AdversaryLoss(const nn::Var& colors, const PhotographBatch& batch,
-                        std::vector<LossTerm>* terms) const;
   nn::Var FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const;
   nn::Var CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const;
   nn::Var Entropy() const;

@@ -23,17 +23,6 @@ constexpr int kPhotographRows = 8;
 class PhotographsTask : public AdversarialTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
-  std::vector<TermLabel> Labels() const override {
-    return WithCritic({{"keypoint", "Keypoints (mean square in the crop)"},
-                       {"entropy", "Entropy of the keypoints' weights"},
-                       {"mask", "Silhouette (mean square)"},
-                       {"iou", "IoU loss (1 − soft IoU of silhouettes)"},
-                       {"color", "Colour loss (mean L1)"},
-                       {"flow_distance", "Distance of the texture flow from the object"},
-                       {"camera", "Camera (rotation, scale and shift)"},
-                       {"deformation", "Mean length of movements"},
-                       {"laplacian", "Cotangent Laplacian"}});
-  }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }

@@ -6,9 +6,7 @@
 
 #include "nn/nn.h"
 #include "train/losses/color_l1.h"
-#include "train/losses/iou.h"
-#include "train/losses/laplacian.h"
-#include "train/losses/smoothness.h"
+#include "train/tasks/equation14.h"
 
 namespace tilegrad::train {
 
@@ -55,29 +53,14 @@ RenderedImages ImageLosses::Draw(const PredictedMeshes& meshes, const BatchTenso
 }
 
 nn::Var ImageLosses::Total(const PredictedMeshes& meshes, const BatchTensors& batch,
-                           std::int64_t step, LossValues* values) {
+                           std::int64_t step, StepValues* values) {
   const RenderedImages images = Draw(meshes, batch, step);
-  const nn::Var iou = IouLoss(images.alpha, batch.truth_alpha);
-  const nn::Var smoothness = SmoothnessLoss(meshes.positions, faces_, topology_);
-  const nn::Var laplacian = LaplacianLoss(meshes.movement, topology_);
   const LossConfig& w = config_.loss;
-  nn::Var total = w.iou * iou, color;  // equation 14
-  if (HasColor()) {
-    color = ColorL1Loss(images.colors, batch.truth_colors);
-    total = total + w.color * color;
-  }
-  total = total + w.smoothness * smoothness + w.laplacian * laplacian;
-  *values = {total.item(),      iou.item(),       color.valid() ? color.item() : 0,
-             smoothness.item(), laplacian.item(), HasColor()};
-  return total;
-}
-
-void ImageLosses::AddTerms(const LossValues& v, std::vector<LossTerm>* terms) const {
-  const LossConfig& w = config_.loss;
-  terms->push_back({"iou", w.iou, v.iou});
-  if (v.has_color) terms->push_back({"color", w.color, v.color});
-  terms->push_back({"smoothness", w.smoothness, v.smoothness});
-  terms->push_back({"laplacian", w.laplacian, v.laplacian});
+  LossSum sum(values);
+  AddIou(w.iou, images.alpha, batch.truth_alpha, &sum);
+  if (HasColor()) AddColor(w.color, ColorL1Loss(images.colors, batch.truth_colors), &sum);
+  AddRegularizers(w, {meshes.positions, meshes.movement, faces_, topology_}, &sum);
+  return sum.total();
 }
 
 }  // namespace tilegrad::train

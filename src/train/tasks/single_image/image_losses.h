@@ -14,11 +14,6 @@
 
 namespace tilegrad::train {
 
-struct LossValues {
-  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
-  bool has_color = true;  // false where the rule draws alpha alone
-};
-
 // 1/delta of a step: it follows a schedule of the configuration.
 double SharpnessAt(const SingleImageConfig& config, std::int64_t step);
 
@@ -29,11 +24,9 @@ class ImageLosses {
   ImageLosses(nn::Context& context, const SingleImageConfig& config, const Mesh& sphere,
               int image_size);
 
-  // On the tape; `values` gets the parts.
+  // On the tape; `values` gets the sum and its terms.
   nn::Var Total(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step,
-                LossValues* values);
-  // Appends the same by name and weight.
-  void AddTerms(const LossValues& values, std::vector<LossTerm>* terms) const;
+                StepValues* values);
 
   SceneRenderer& renderer() { return renderer_; }
   RenderOptions OptionsAt(std::int64_t step) const;

@@ -70,13 +70,13 @@ class TemplateFitter {
 Status TemplateFitter::Step(const ImageStore& store, const Unknowns& x, int step,
                             std::span<nn::Adam* const> optimizers) {
   const BatchTensors batch = GatherBatch(context_, store, {{0, ViewsAt(step, store.views)}});
-  LossValues values;
+  StepValues values;
   const nn::Var loss = losses_.Total(MeshesOf(x), batch, step, &values);
   const nn::Var unknowns[] = {x.raw, x.colors};
   const auto gradients = nn::Gradients(loss, unknowns);
   TILEGRAD_TRY(context_.TakeStatus());
-  if (!std::isfinite(values.total) || !nn::IsFinite(context_, gradients))
-    return InternalError("fitting the template: the loss is {}", values.total);
+  if (!std::isfinite(values.loss) || !nn::IsFinite(context_, gradients))
+    return InternalError("fitting the template: the loss is {}", values.loss);
   const nn::CosineSchedule cosine{config_.schedule.steps, kFinalFactor};
   for (std::size_t i = 0; i < optimizers.size(); ++i) {
     optimizers[i]->options().learning_rate =

@@ -20,7 +20,7 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
       losses_(context, config, network_.template_mesh(), image_size) {}
 
-nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues* values) {
+nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, StepValues* values) {
   const PredictedMeshes meshes =
       network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
   return losses_.Total(meshes, batch, step, values);
@@ -28,16 +28,14 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
 
 Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& batch,
                                                          const UpdateIndex& at,
-                                                         LossValues* values) {
+                                                         StepValues* values) {
   const nn::Var loss = Loss(batch, at.step, values);
   auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
-  if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
-  StepValues described;
-  losses_.AddTerms(*values, &described.terms);
+  if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
-      values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
+      values->loss, values->DescribeTerms(), nn::GlobalNorm(context_, gradients));
 }
 
 }  // namespace tilegrad::train

@@ -18,11 +18,11 @@ class TrainStep {
   // The words of config.render and config.rivals are known (RivalOptions).
   TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size);
 
-  // Equation 14 of a batch, on the tape; `values` gets the parts.
-  nn::Var Loss(const BatchTensors& batch, std::int64_t step, LossValues* values);
+  // Equation 14 of a batch, on the tape; `values` gets the sum and its terms.
+  nn::Var Loss(const BatchTensors& batch, std::int64_t step, StepValues* values);
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, const UpdateIndex& at,
-                                                LossValues* values);
+                                                StepValues* values);
 
   MeshNetwork& network() { return network_; }
   LearnedWeights& weights() { return weights_; }

@@ -23,12 +23,6 @@ constexpr std::size_t kSingleImageRows = 8;
 class SingleImageTask : public Task {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
-  std::vector<TermLabel> Labels() const override {
-    return {{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
-            {"color", "Colour loss (mean L1)"},
-            {"smoothness", "Smoothness (normals of neighbouring faces)"},
-            {"laplacian", "Laplacian of the movement"}};
-  }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.size; }
@@ -180,13 +174,10 @@ Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex
                                                                StepValues* out) {
   const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
   const auto batch = order_->Batch(slots, static_cast<int>(config_.views));
-  LossValues values;
   TILEGRAD_ASSIGN(
       const BatchTensors tensors,
       GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, slots.first));
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at, &values));
-  out->loss = values.total;
-  step_->losses().AddTerms(values, &out->terms);
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at, out));
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_.models);
   out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));

@@ -8,10 +8,8 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/losses/color_l1.h"
-#include "train/losses/iou.h"
-#include "train/losses/laplacian.h"
-#include "train/losses/smoothness.h"
 #include "train/ops/light_frames.h"
+#include "train/tasks/equation14.h"
 
 namespace tilegrad::train {
 namespace {
@@ -131,16 +129,6 @@ double TexturedStep::ShareOfRun(std::int64_t step) const {
   return static_cast<double>(step) / static_cast<double>(config_.schedule.steps);
 }
 
-bool TexturedStep::LearnsLights() const {
-  return config_.color.light > 0 && LightingOf(config_.light) != Lighting::kNone;
-}
-
-LossConfig TexturedStep::WeightsAt(std::int64_t step) const {
-  LossConfig weights = config_.loss;
-  if (ShareOfRun(step) < config_.color.from) weights.color = 0;
-  return weights;
-}
-
 // The truth is over black, so cover times colour is what a prediction without an outline of its own
 // would look like.
 nn::Var TexturedStep::Covered(const nn::Var& colors, const TexturedBatch& batch) const {
@@ -152,15 +140,15 @@ nn::Var TexturedStep::Covered(const nn::Var& colors, const TexturedBatch& batch)
 
 // Of the views that textures were not predicted from: there they are most in need of it, and half
 // as many pictures cost half as much.
-nn::Var TexturedStep::AdversaryLoss(const RenderedImages& images, const TexturedBatch& batch,
-                                    Adversary::Values* values) const {
+void TexturedStep::AddAdversary(const RenderedImages& images, const TexturedBatch& batch,
+                                LossSum* sum) const {
   std::vector<std::int32_t> others;
   for (std::size_t n = 1; n < batch.cameras.size(); n += kViewsOfObject)
     others.push_back(static_cast<std::int32_t>(n));
   const nn::Tensor which = context_.Indices(others);
   const nn::Var truth = nn::Gather(nn::Constant(context_, batch.truth_colors), 0, which);
-  return adversary_->GeneratorLoss(
-      {nn::Gather(Covered(images.colors, batch), 0, which), truth.value(), batch.portion}, values);
+  adversary_->AddLosses(
+      {nn::Gather(Covered(images.colors, batch), 0, which), truth.value(), batch.portion}, sum);
 }
 
 nn::Var TexturedStep::ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
@@ -192,75 +180,60 @@ nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) 
 
 nn::Var TexturedStep::LightLoss(const PredictedObjects& objects, const TexturedBatch& batch) {
   nn::Tensor targets = light_targets_.Find(objects, batch, JobAt(batch, config_.schedule.steps));
-  if (targets.empty()) return {};
+  if (targets.empty()) return nn::Invalid({&objects.positions});
   return nn::Mean(nn::Square(SaidOf(objects) - nn::Constant(context_, std::move(targets))));
 }
 
-nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
-                           std::int64_t step, TexturedLossValues* values) {
-  const PredictedObjects& objects = renders.objects;
-  const nn::Var iou = IouLoss(renders.images.alpha, batch.truth_alpha);
-  const nn::Var color = ColorLoss(renders.images, batch, step);
-  const nn::Var smoothness =
-      SmoothnessLoss(objects.positions, network_.template_mesh().faces, topology_);
-  const nn::Var laplacian = LaplacianLoss(objects.movement, topology_);
-  const LossConfig w = WeightsAt(step);
-  nn::Var total =
-      w.iou * iou + w.color * color + w.smoothness * smoothness + w.laplacian * laplacian;
-  *values = {};
-  values->total = total.item(), values->iou = iou.item(), values->color = color.item();
-  values->smoothness = smoothness.item(), values->laplacian = laplacian.item();
-  if (objects.pose.valid()) {
-    const nn::Var pose = PoseLoss(objects.pose, batch);
-    total = total + config_.color.pose * pose;
-    values->pose = pose.item(), values->total = total.item();
-  }
-  if (LearnsLights() && ShareOfRun(step) >= config_.color.from) {
-    nn::Var light = LightLoss(objects, batch);
-    if (!light.valid()) return light;
-    total = total + config_.color.light * light;
-    values->light = light.item(), values->total = total.item();
-  }
-  if (adversary_ != nullptr) {
-    const nn::Var more = AdversaryLoss(renders.images, batch, &values->adversary);
-    if (more.has_context()) total = total + more, values->total = total.item();
-  }
+// Degrees, mean over the inputs.
+double TexturedStep::LightAngle(const PredictedObjects& objects, const TexturedBatch& batch) const {
   const Lighting lighting = LightingOf(config_.light);
-  if (lighting == Lighting::kNone || !objects.positions.valid()) return total;
+  double mean = 0;
   for (std::size_t m = 0; m < batch.views.size(); ++m) {
-    values->light_angle += AngleBetween(DirectionOf(LightOf(objects, m), lighting),
-                                        DirectionOf(batch.views[m].light, lighting)) /
-                           static_cast<double>(batch.views.size());
+    mean += AngleBetween(DirectionOf(LightOf(objects, m), lighting),
+                         DirectionOf(batch.views[m].light, lighting)) /
+            static_cast<double>(batch.views.size());
   }
-  return total;
+  return mean;
 }
 
-void TexturedStep::AddTerms(const TexturedLossValues& v, std::int64_t step,
-                            std::vector<LossTerm>* terms) const {
-  const LossConfig w = WeightsAt(step);
-  terms->push_back({"iou", w.iou, v.iou});
-  terms->push_back({"color", w.color, v.color});
-  terms->push_back({"smoothness", w.smoothness, v.smoothness});
-  terms->push_back({"laplacian", w.laplacian, v.laplacian});
-  if (config_.network.lookup) terms->push_back({"pose", config_.color.pose, v.pose});
-  if (LearnsLights()) terms->push_back({"light", config_.color.light, v.light});
-  if (adversary_ != nullptr) adversary_->AddTerms(v.adversary, terms);
-  if (LightingOf(config_.light) != Lighting::kNone)
-    terms->push_back({"light_angle", 0, v.light_angle});
+nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
+                           std::int64_t step, StepValues* values) {
+  const PredictedObjects& objects = renders.objects;
+  if (!objects.positions.valid()) return objects.positions;
+  const bool colored = ShareOfRun(step) >= config_.color.from;
+  LossSum sum(values);
+  AddIou(config_.loss.iou, renders.images.alpha, batch.truth_alpha, &sum);
+  AddColor(colored ? config_.loss.color : 0, ColorLoss(renders.images, batch, step), &sum);
+  AddRegularizers(config_.loss,
+                  {objects.positions, objects.movement, network_.template_mesh().faces, topology_},
+                  &sum);
+  if (objects.pose.valid()) {
+    sum.Add("pose", "Camera (mean square error of its numbers)", config_.color.pose,
+            PoseLoss(objects.pose, batch));
+  }
+  const bool lit = LightingOf(config_.light) != Lighting::kNone;
+  if (lit && colored && config_.color.light > 0) {
+    sum.Add("light", "Light (mean square distance to the one that explains a picture)",
+            config_.color.light, LightLoss(objects, batch));
+  }
+  if (adversary_ != nullptr) AddAdversary(renders.images, batch, &sum);
+  if (lit) {
+    sum.Watch("light_angle", "Angle of the light (degrees, not learned from)",
+              LightAngle(objects, batch));
+  }
+  return sum.total();
 }
 
 Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch& batch,
                                                             const UpdateIndex& at,
-                                                            TexturedLossValues* values) {
+                                                            StepValues* values) {
   const nn::Var loss = Loss(Draw(batch, at.step), batch, at.step, values);
   auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
-  if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
-  StepValues described;
-  AddTerms(*values, at.step, &described.terms);
+  if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
-      values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
+      values->loss, values->DescribeTerms(), nn::GlobalNorm(context_, gradients));
 }
 
 }  // namespace tilegrad::train

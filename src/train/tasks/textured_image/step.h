@@ -19,13 +19,6 @@
 
 namespace tilegrad::train {
 
-struct TexturedLossValues {
-  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0, pose = 0,
-         light = 0;  // the parts are unweighted
-  Adversary::Values adversary;
-  double light_angle = 0;  // degrees, mean over the inputs; watched, not learned from
-};
-
 // What losses, and critics of the images, look at.
 struct TexturedRenders {
   PredictedObjects objects;  // of the inputs
@@ -38,14 +31,12 @@ class TexturedStep {
 
   // Network and renderer, on the tape. One at a time: images are of one renderer.
   TexturedRenders Draw(const TexturedBatch& batch, std::int64_t step);
-  // Equation 14 with textures and light; `values` gets the parts.
+  // Equation 14 with textures and light; `values` gets the sum and its terms.
   nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch, std::int64_t step,
-               TexturedLossValues* values);
+               StepValues* values);
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, const UpdateIndex& at,
-                                                TexturedLossValues* values);
-  void AddTerms(const TexturedLossValues& values, std::int64_t step,
-                std::vector<LossTerm>* terms) const;
+                                                StepValues* values);
 
   // Its terms join Loss; without one there are none. `adversary` outlives the steps.
   void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
@@ -58,11 +49,9 @@ class TexturedStep {
                           const TexturedBatch& batch);
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
   double ShareOfRun(std::int64_t step) const;
-  bool LearnsLights() const;  // from LightTargets
-  LossConfig WeightsAt(std::int64_t step) const;
   nn::Var Covered(const nn::Var& colors, const TexturedBatch& batch) const;
-  nn::Var AdversaryLoss(const RenderedImages& images, const TexturedBatch& batch,
-                        Adversary::Values* values) const;
+  void AddAdversary(const RenderedImages& images, const TexturedBatch& batch, LossSum* sum) const;
+  double LightAngle(const PredictedObjects& objects, const TexturedBatch& batch) const;
   nn::Var LightLoss(const PredictedObjects& objects, const TexturedBatch& batch);
   nn::Var PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const;
   nn::Var ColorLoss(const RenderedImages& images, const TexturedBatch& batch,

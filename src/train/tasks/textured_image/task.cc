@@ -23,15 +23,6 @@ constexpr int kTexturedRows = 8, kRowViews = 3;
 class TexturedImageTask : public AdversarialTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
-  std::vector<TermLabel> Labels() const override {
-    return WithCritic({{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
-                       {"color", "Colour loss (mean L1)"},
-                       {"smoothness", "Smoothness (normals of neighbouring faces)"},
-                       {"laplacian", "Laplacian of the movement"},
-                       {"pose", "Camera (mean square error of its numbers)"},
-                       {"light", "Light (mean square distance to the one that explains a picture)"},
-                       {"light_angle", "Angle of the light (degrees, not learned from)"}});
-  }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
@@ -127,10 +118,7 @@ Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateInd
   TILEGRAD_ASSIGN(TexturedBatch batch,
                   RenderBatch(*context_, *stream_, image_size(), models, slots.first));
   batch.portion = at.portion;
-  TexturedLossValues values;
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, &values));
-  out->loss = values.total;
-  step_->AddTerms(values, at.step, &out->terms);
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, out));
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / static_cast<double>(meshes_.size()));
   out->also.emplace_back("learning_rate",

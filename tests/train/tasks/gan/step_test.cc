@@ -56,11 +56,17 @@ struct SmallProblem {
     return rule;
   }
   nn::Var Loss(GanStage stage) {
-    std::vector<LossTerm> terms;
+    StepValues values;
+    LossSum sum(&values);
     const GeneratedObjects objects = step.Draw(generator, noise, stage, nn::Mode::kTrain);
-    if (stage == GanStage::kShape)
-      return silhouettes.GeneratorLoss(objects.cover) + step.ShapeLoss(objects.shapes, &terms);
-    return pictures.GeneratorLoss(objects.colors) + maps.GeneratorLoss(objects.maps);
+    if (stage == GanStage::kShape) {
+      silhouettes.AddGeneratorLoss(1, objects.cover, &sum);
+      step.AddShapeLosses(objects.shapes, &sum);
+    } else {
+      pictures.AddGeneratorLoss(1, objects.colors, &sum);
+      maps.AddGeneratorLoss(1, objects.maps, &sum);
+    }
+    return sum.total();
   }
 };
 

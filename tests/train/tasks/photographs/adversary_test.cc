@@ -101,8 +101,8 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
   const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
   std::vector<nn::Var> vars;
   for (const auto& p : nn::Parameters(step.network().module())) vars.push_back(p.value);
-  std::vector<LossTerm> terms;
-  const auto gradients = nn::Grad(step.Loss(batch, 1, &terms), vars);
+  StepValues values;
+  const auto gradients = nn::Grad(step.Loss(batch, 1, &values), vars);
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   double largest = 0;
   for (std::size_t which = 0; which < vars.size(); ++which) {
@@ -111,7 +111,7 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
     const double slope = gradients[which].value().span<double>()[0], before = value[0];
     const auto at = [&](double h) {
       value[0] = before + h;
-      std::vector<LossTerm> ignored;
+      StepValues ignored;
       return step.Loss(batch, 1, &ignored).item();
     };
     const double h = 1e-7, difference = (at(h) - at(-h)) / (2 * h);

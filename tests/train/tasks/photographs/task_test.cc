@@ -211,11 +211,11 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
     nn::Context context(workers_, nn::DType::kF64);
     PhotographStep step(context, config, {set.mean_keypoints, 15});
     const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
-    std::vector<LossTerm> terms;
+    StepValues values;
     auto parameters = nn::Parameters(step.network().module());
     std::vector<nn::Var> vars;
     for (const auto& p : parameters) vars.push_back(p.value);
-    const nn::Var loss = step.Loss(batch, 1, &terms);
+    const nn::Var loss = step.Loss(batch, 1, &values);
     const auto gradients = nn::Grad(loss, vars);
     ASSERT_TRUE(context.status().ok()) << context.status().message();
     for (std::size_t which :
@@ -232,7 +232,7 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
       const auto at = [&](double h) {
         for (std::size_t i = 0; i < before.size(); ++i)
           value.data<double>()[i] = before[i] + h * direction[i];
-        std::vector<LossTerm> ignored;
+        StepValues ignored;
         return step.Loss(batch, 1, &ignored).item();
       };
       // Colours jump where an edge crosses a pixel's centre, so the step is small.

@@ -10,6 +10,7 @@
 
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "train/terms.h"
 
 namespace tilegrad::train::textured_image_step_test {
 
@@ -67,9 +68,9 @@ struct SmallProblem {
     return job;
   }
   double LossNow() {
-    TexturedLossValues values;
+    StepValues values;
     step.Loss(step.Draw(batch, 0), batch, 0, &values);
-    return values.total;
+    return values.loss;
   }
 };
 
@@ -79,12 +80,12 @@ struct SmallProblem {
 void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config,
                                          const std::vector<std::string>& within = {""}) {
   SmallProblem p(config);
-  TexturedLossValues values;
+  StepValues values;
   const TexturedRenders renders = p.step.Draw(p.batch, 0);
   const auto gradients =
       nn::Grad(p.step.Loss(renders, p.batch, 0, &values), p.step.weights().adam().parameters());
   ASSERT_TRUE(p.context.status().ok()) << p.context.status().message();
-  EXPECT_LT(values.iou, 0.95);  // silhouettes overlap
+  EXPECT_LT(TermOf(values, "iou"), 0.95);  // silhouettes overlap
   std::vector<nn::NamedVar> parameters = nn::Parameters(p.step.network().module());
   Rng rng(9);
   int checked = 0, off = 0, moving = 0;
@@ -190,14 +191,13 @@ TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
     config.adversary.place = place, config.adversary.penalty = 4;
     SmallProblem p(config);
     p.LossNow();
-    std::vector<LossTerm> terms;
-    const auto gradients = p.adversary->CriticGradients({2, 0}, &terms);
+    StepValues values;
+    const auto gradients = p.adversary->CriticGradients({2, 0}, &values);
     ASSERT_TRUE(gradients.ok()) << gradients.status().message();
-    ASSERT_EQ(terms.size(), 2u);
     const auto loss = [&] {
-      std::vector<LossTerm> now;
+      StepValues now;
       EXPECT_TRUE(p.adversary->CriticGradients({2, 0}, &now).ok());
-      return 4 * now[1].value - now[0].value;
+      return 4 * TermOf(now, "critic_penalty") - TermOf(now, "critic_distance");
     };
     std::vector<nn::NamedVar> parameters = nn::Parameters(*p.adversary->critic());
     Rng rng(4);
@@ -239,13 +239,11 @@ TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {
   config.schedule.steps = 10, config.color.from = 0.5;
   SmallProblem p(config);
   for (const auto& [step, counts] : {std::pair(4, false), {5, true}}) {
-    TexturedLossValues values;
-    std::vector<LossTerm> terms;
+    StepValues values;
     p.step.Loss(p.step.Draw(p.batch, step), p.batch, step, &values);
-    p.step.AddTerms(values, step, &terms);
-    EXPECT_STREQ(terms[1].name, "color");
-    EXPECT_EQ(terms[1].weight > 0, counts);
-    EXPECT_GT(values.color, 0);
+    EXPECT_STREQ(values.terms[1].name, "color");
+    EXPECT_EQ(values.terms[1].weight > 0, counts);
+    EXPECT_GT(values.terms[1].value, 0);
   }
 }
 
