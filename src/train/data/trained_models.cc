@@ -55,12 +55,12 @@ bool HasContents(const std::string& list) { return list.find("\ncamera ") != std
 
 }  // namespace
 
-Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start) {
+Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step) {
   const Path file = ModelListOf(run);
   const std::string models = TextOf(dataset);
   TILEGRAD_ASSIGN(const std::string contents, ContentsOf(dataset));
   const std::string now = models + contents;
-  if (start == RunStart::kNew) return WriteTextAtomic(file, now);
+  if (first_step == 0) return WriteTextAtomic(file, now);
   const auto read = ReadText(file);
   if (!read.ok() && read.status().code() != StatusCode::kNotFound) return read.status();
   const std::string& then = read.ok() ? *read : models;

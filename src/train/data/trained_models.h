@@ -12,15 +12,10 @@
 
 namespace tilegrad::train {
 
-enum class RunStart {
-  kNew,        // no step is done yet
-  kContinued,  // from a checkpoint
-};
-
-// Writes the list of a new run; compares with that of a run that goes on: InvalidArgument names the
-// first model, camera or file that differs. A run of an earlier version has no list, or none of
-// cameras and files, and gets one.
-Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start);
+// Writes the list of a new run, whose `first_step` is 0; compares with that of a run that goes on:
+// InvalidArgument names the first model, camera or file that differs. A run of an earlier version
+// has no list, or none of cameras and files, and gets one.
+Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step);
 
 // InvalidArgument if the run was trained on models of the dataset's `split`, or on other colours of
 // their meshes. Fine for a run without a list, and for a single checkpoint.

@@ -15,13 +15,13 @@ namespace tilegrad::train {
 using TermLabels = std::map<std::string, std::string>;
 
 struct RunHeader {
-  std::string name;            // the configuration's
-  std::string dataset;         // folder, as training was given it
-  std::string dataset_source;  // where its models are from
+  std::string name = {};            // the configuration's
+  std::string dataset = {};         // folder, as training was given it
+  std::string dataset_source = {};  // where its models are from
   int training_models = 0;
-  std::int64_t parameters = 0;                               // numbers that are trained
-  std::vector<std::pair<std::string, std::string>> machine;  // as DescribeMachine
-  TermLabels labels;                                         // of what its steps have said so far
+  std::int64_t parameters = 0;                                    // numbers that are trained
+  std::vector<std::pair<std::string, std::string>> machine = {};  // as DescribeMachine
+  TermLabels labels = {};  // of what its steps have said so far
 };
 
 Status WriteHeader(const Path& run, const RunHeader& header);

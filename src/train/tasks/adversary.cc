@@ -134,12 +134,11 @@ std::vector<nn::NamedTensor> Adversary::Buffers() {
   return critic_ ? nn::Buffers(*critic_) : std::vector<nn::NamedTensor>();
 }
 
-Result<std::string> WithPerceptualNetwork(nn::Context& context, const AdversaryConfig& config,
-                                          const std::string& fingerprint) {
-  if (config.perceptual == 0) return fingerprint;
+Result<std::string> Adversary::Fingerprint(const std::string& data) const {
+  if (config_.perceptual == 0) return data;
   TILEGRAD_ASSIGN(const Path weights,
-                  PerceptualWeights(context, {config.network, config.network_file}));
-  return WithFile(fingerprint, weights);
+                  PerceptualWeights(context_, {config_.network, config_.network_file}));
+  return WithFile(data, weights);
 }
 
 }  // namespace tilegrad::train

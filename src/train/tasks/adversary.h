@@ -66,6 +66,9 @@ class Adversary {
     return adam_->Step(gradients, share);
   }
 
+  // Of the data with that fingerprint and the perceptual network, if there is one.
+  Result<std::string> Fingerprint(const std::string& data) const;
+
   // Of the critic: weights and moments, as "critic...".
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state);
@@ -87,9 +90,5 @@ class Adversary {
   };
   std::vector<Kept> kept_;  // of the last step, by portion
 };
-
-// What tells runs' data apart, with the perceptual network that they learn from, if there is one.
-Result<std::string> WithPerceptualNetwork(nn::Context& context, const AdversaryConfig& config,
-                                          const std::string& fingerprint);
 
 }  // namespace tilegrad::train

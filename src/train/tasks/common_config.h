@@ -38,6 +38,7 @@ struct OptimizerConfig {
   std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
   double beta1 = 0.9;
   double beta2 = 0.999;
+  double weight_decay = 0;  // AdamW's; a task that has it has the key, too
   double average = 0;  // decay of a moving average of the weights, which is what predicts; 0: none
 };
 

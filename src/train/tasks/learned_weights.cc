@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/learned_weights.h"
 
+#include <cmath>
+
 #include "base/error.h"
 #include "nn/nn.h"
 
@@ -8,13 +10,28 @@ namespace tilegrad::train {
 
 LearnedWeights::LearnedWeights(nn::Context& context, nn::Module& network,
                                const OptimizerConfig& config, std::int64_t steps)
-    : network_(network),
+    : context_(context),
+      network_(network),
       config_(config),
       steps_(steps),
       adam_(context, nn::Parameters(network),
-            {.learning_rate = config.learning_rate, .beta1 = config.beta1, .beta2 = config.beta2}),
+            {.learning_rate = config.learning_rate,
+             .beta1 = config.beta1,
+             .beta2 = config.beta2,
+             .weight_decay = config.weight_decay}),
       average_(context, config.average > 0 ? nn::State(network) : std::vector<nn::NamedTensor>(),
                config.average) {}
+
+Result<nn::StepVector<nn::Gradient>> LearnedWeights::Gradients(const nn::Var& loss,
+                                                               nn::GradientListener* listener,
+                                                               const StepValues& values) {
+  auto gradients = nn::Gradients(loss, adam_.parameters(), listener);
+  TILEGRAD_TRY(context_.TakeStatus());
+  if (std::isfinite(values.loss) && nn::IsFinite(context_, gradients)) return gradients;
+  return InternalError(
+      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
+      values.loss, values.DescribeTerms(), nn::GlobalNorm(context_, gradients));
+}
 
 Status LearnedWeights::Update(std::span<const nn::Gradient> gradients, std::int64_t step,
                               nn::UpdateShare* share) {

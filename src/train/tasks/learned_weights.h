@@ -8,6 +8,7 @@
 
 #include "nn/moving_average.h"
 #include "nn/optim.h"
+#include "train/run/step_values.h"
 #include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
@@ -18,6 +19,11 @@ class LearnedWeights {
   LearnedWeights(nn::Context& context, nn::Module& network, const OptimizerConfig& config,
                  std::int64_t steps);
 
+  // Of `loss`, a LossSum's that `values` has. One that is not finite, or whose gradients are not,
+  // is an error with its terms.
+  Result<nn::StepVector<nn::Gradient>> Gradients(const nn::Var& loss,
+                                                 nn::GradientListener* listener,
+                                                 const StepValues& values);
   // One step of Adam, and of the moving average if there is one. `share`: of Adam::Step.
   Status Update(std::span<const nn::Gradient> gradients, std::int64_t step,
                 nn::UpdateShare* share = nullptr);
@@ -26,11 +32,13 @@ class LearnedWeights {
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
 
+  nn::Module& network() { return network_; }
   nn::Adam& adam() { return adam_; }
   std::int64_t steps() const { return steps_; }  // of the run
   double RateAt(std::int64_t step) const { return LearningRateAt(config_, steps_, step); }
 
  private:
+  nn::Context& context_;
   nn::Module& network_;
   OptimizerConfig config_;
   std::int64_t steps_;

@@ -3,17 +3,14 @@
 #pragma once
 
 #include "train/models/classifier.h"
-#include "train/run/config_fields.h"
-#include "train/run/schedule.h"
+#include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
 
 struct ClassifyConfig {
   ClassifierConfig network;
-  double learning_rate = 2e-3;
-  double final_factor = 0.01;
-  std::int64_t warmup = 20;  // steps
-  double weight_decay = 1e-2;
+  OptimizerConfig optimizer = {
+      .learning_rate = 2e-3, .final_factor = 0.01, .warmup = 20, .weight_decay = 1e-2};
   std::int64_t batch = 64;
   double mirrored = 0.5;   // share of the pictures that are shown mirrored
   std::int64_t shift = 4;  // pixels that a picture is moved by at most, each way, black beyond it

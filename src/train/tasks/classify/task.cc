@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/classify/task.h"
 
-#include <cmath>
 #include <set>
 
 #include "base/error.h"
@@ -15,6 +14,7 @@
 #include "train/tasks/classify/model.h"
 #include "train/tasks/classify/pictures.h"
 #include "train/tasks/held_out.h"
+#include "train/tasks/network_task.h"
 
 namespace tilegrad::train {
 namespace {
@@ -42,23 +42,14 @@ ImageU8 Framed(const ImageU8& image, const std::uint8_t (&color)[3]) {
   return out;
 }
 
-class ClassifyTask : public Task {
+class ClassifyTask : public NetworkTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.images.size; }
-  RunHeader Header() override;
   Status Begin(const Path& run, std::int64_t first_step) override {
-    return RememberTrainedModels(run, *dataset_,
-                                 first_step == 0 ? RunStart::kNew : RunStart::kContinued);
-  }
-
-  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
-  Result<std::vector<nn::NamedTensor>> Statistics() override { return nn::Buffers(*network_); }
-  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    adam_->options().learning_rate = RateAt(at.step);
-    return adam_->Step(gradients, at.share);
+    return RememberTrainedModels(run, *dataset_, first_step);
   }
 
   std::vector<nn::NamedTensor> State() override;
@@ -85,21 +76,18 @@ class ClassifyTask : public Task {
     return static_cast<ClassifierModel&>(predictor.model());
   }
   std::uint64_t seed() const { return static_cast<std::uint64_t>(config_.schedule.seed); }
-  double RateAt(std::int64_t step) const {
-    const nn::CosineSchedule cosine{config_.schedule.steps, config_.final_factor};
-    return nn::WarmedUp(nn::CosineRate(config_.learning_rate, cosine, step), config_.warmup, step);
-  }
+  LearnedWeights& weights() override { return *weights_; }
+  Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
   Status CheckDataset() const;
   Status LoadPictures(const TaskStart& start);
   LabelledBatch Batch(const Slots& slots);
 
   ClassifyConfig config_;
-  nn::Context* context_ = nullptr;
   std::optional<Dataset> dataset_;
   LabelledImages train_, held_out_;
   std::optional<BatchOrder> order_;
   std::optional<ClassifierNetwork> network_;
-  std::optional<nn::Adam> adam_;
+  std::optional<LearnedWeights> weights_;
 };
 
 Status ClassifyTask::CheckDataset() const {
@@ -131,27 +119,18 @@ Status ClassifyTask::LoadPictures(const TaskStart& start) {
 }
 
 Status ClassifyTask::Start(const TaskStart& start) {
-  context_ = &start.context;
   config_.schedule = start.schedule;
+  TILEGRAD_TRY(BeginStart(start, config_.batch));
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
-  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadPictures(start));
+  lesson_.source = dataset_->info().source;
+  lesson_.objects = train_.images.models;
   order_.emplace(train_.images.models, train_.images.views, seed(), config_.mirrored);
   network_.emplace(*context_, config_.network,
                    static_cast<std::int64_t>(dataset_->info().classes.size()), seed());
-  adam_.emplace(*context_, nn::Parameters(*network_),
-                nn::AdamOptions{.learning_rate = config_.learning_rate,
-                                .weight_decay = config_.weight_decay});
+  weights_.emplace(*context_, *network_, config_.optimizer, start.schedule.steps);
   return {};
-}
-
-RunHeader ClassifyTask::Header() {
-  RunHeader header;
-  header.dataset_source = dataset_->info().source;
-  header.training_models = train_.images.models;
-  header.parameters = nn::CountParameters(*network_);
-  return header;
 }
 
 LabelledBatch ClassifyTask::Batch(const Slots& slots) {
@@ -164,45 +143,31 @@ LabelledBatch ClassifyTask::Batch(const Slots& slots) {
   return GatherLabelled(*context_, train_, batch, shifts);
 }
 
-Result<nn::StepVector<nn::Gradient>> ClassifyTask::Backward(const UpdateIndex& at,
-                                                            StepValues* out) {
-  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+Result<nn::Var> ClassifyTask::Loss(const UpdateIndex& /*at*/, const Slots& slots, StepValues* out) {
   const LabelledBatch batch = Batch(slots);
   const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kTrain);
   LossSum sum(out);
   sum.Add("cross_entropy", "Cross entropy of the classes", 1,
           nn::CrossEntropy(scores, batch.labels));
-  auto gradients = nn::Gradients(sum.total(), adam_->parameters(), at.listener);
-  TILEGRAD_TRY(context_->TakeStatus());
-  if (!std::isfinite(out->loss) || !nn::IsFinite(*context_, gradients)) {
-    return InternalError("the loss is {}; a smaller optimizer.learning_rate may help", out->loss);
+  if (scores.valid()) {
+    sum.Watch("right", "Share of the step's pictures that are told right",
+              ShareRight(scores.value(), batch.labels));
   }
-  sum.Watch("right", "Share of the step's pictures that are told right",
-            ShareRight(scores.value(), batch.labels));
-  out->also.emplace_back("epoch",
-                         static_cast<double>((at.step + 1) * config_.batch) / train_.images.models);
-  out->also.emplace_back("learning_rate", RateAt(at.step));
   out->images = slots.count;
-  return gradients;
+  return sum.total();
 }
 
 std::vector<nn::NamedTensor> ClassifyTask::State() {
-  std::vector<nn::NamedTensor> out = nn::State(*network_);
-  const std::vector<nn::NamedTensor> moments = adam_->State();
-  out.insert(out.end(), moments.begin(), moments.end());
+  std::vector<nn::NamedTensor> out = NetworkTask::State();
   out.push_back(ClassNames(*context_, dataset_->info().classes));
   return out;
 }
 
 Status ClassifyTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
   TILEGRAD_ASSIGN(const auto classes, ReadClassNames(state));
-  if (classes != dataset_->info().classes)
-    return InvalidArgument("{}: its classes are not those that the run was started with",
-                           dataset_->folder().string());
-  TILEGRAD_TRY(nn::LoadState(*network_, state));
-  TILEGRAD_TRY(adam_->LoadState(state));
-  if (adam_->steps() == steps) return {};
-  return InvalidArgument("the optimizer has taken {} steps, the run {}", adam_->steps(), steps);
+  if (classes == dataset_->info().classes) return NetworkTask::LoadState(state, steps);
+  return InvalidArgument("{}: its classes are not those that the run was started with",
+                         dataset_->folder().string());
 }
 
 // Held-out models in a frame: blue where the class is told right, orange where not.

@@ -151,16 +151,9 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   LossSum sum(out);
   for (GanCritic* critic : Critics(stage)) AddAdversarialLoss(critic, objects, &sum);
   if (stage == GanStage::kShape) step_.AddShapeLosses(objects.shapes, &sum);
-  auto gradients = nn::Gradients(sum.total(), Weights(stage).adam().parameters(), at.listener);
-  TILEGRAD_TRY(context_.TakeStatus());
-  const double norm = nn::GlobalNorm(context_, gradients);
-  if (!std::isfinite(out->loss) || !std::isfinite(norm)) {
-    return InternalError(
-        "the generator's loss is {} ({}), its gradient's norm {}; a smaller "
-        "optimizer.learning_rate may help",
-        out->loss, out->DescribeTerms(), norm);
-  }
-  sum.Watch("gradient_generator", "Norm of the generator's gradient", norm);
+  TILEGRAD_ASSIGN(auto gradients, Weights(stage).Gradients(sum.total(), at.listener, *out));
+  sum.Watch("gradient_generator", "Norm of the generator's gradient",
+            nn::GlobalNorm(context_, gradients));
   AddScores(&sum);
   out->also.emplace_back("learning_rate", Weights(stage).RateAt(StageStep(at.step)));
   out->images = CountOf(at) * config_.views;

@@ -11,6 +11,7 @@
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/sheet.h"
 #include "train/tasks/held_out.h"
+#include "train/tasks/network_task.h"
 
 namespace tilegrad::train {
 namespace {
@@ -82,12 +83,10 @@ Status GanTask::Start(const TaskStart& start) {
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
   TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
-  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
-  const std::vector<int> train = dataset_->Select(Split::kTrain);
-  if (train.empty())
-    return InvalidArgument("{}: no training models in it", dataset_->folder().string());
-  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes,
-                                              start.context.workers(), start.progress, start.stop));
+  TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
+  TILEGRAD_ASSIGN(
+      meshes_, LoadTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.meshes,
+                                  start.context.workers(), start.progress, start.stop));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   const CameraRule& camera = dataset_->info().camera;
   pictures_.emplace(*context_,
@@ -100,8 +99,7 @@ Status GanTask::Start(const TaskStart& start) {
 }
 
 Status GanTask::Begin(const Path& run, std::int64_t first_step) {
-  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
-                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_, first_step));
   if (first_step > 0) return {};
   if (!config_.start.empty()) {
     TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(*context_, config_.start));
@@ -113,11 +111,9 @@ Status GanTask::Begin(const Path& run, std::int64_t first_step) {
 }
 
 RunHeader GanTask::Header() {
-  RunHeader header;
-  header.dataset_source = dataset_->info().source;
-  header.training_models = static_cast<int>(meshes_.size());
-  header.parameters = learner_->parameters();
-  return header;
+  return {.dataset_source = dataset_->info().source,
+          .training_models = static_cast<int>(meshes_.size()),
+          .parameters = learner_->parameters()};
 }
 
 Result<nn::StepVector<nn::Gradient>> GanTask::Backward(const UpdateIndex& at, StepValues* out) {

@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "base/error.h"
 #include "nn/nn.h"
 #include "nn/ops/sample_pictures.h"
 #include "train/losses/color_l1.h"
@@ -136,18 +135,6 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, St
   if (adversary_ != nullptr)
     adversary_->AddLosses({Masked(images.colors, batch), batch.colors, batch.portion}, &sum);
   return sum.total();
-}
-
-Result<nn::StepVector<nn::Gradient>> PhotographStep::Backward(const PhotographBatch& batch,
-                                                              const UpdateIndex& at,
-                                                              StepValues* values) {
-  const nn::Var loss = Loss(batch, at.step, values);
-  auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
-  TILEGRAD_TRY(context_.TakeStatus());
-  if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
-  return InternalError(
-      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
-      values->loss, values->DescribeTerms(), nn::GlobalNorm(context_, gradients));
 }
 
 }  // namespace tilegrad::train

@@ -20,10 +20,6 @@ class PhotographStep {
 
   // On the tape; `values` gets the sum and its terms.
   nn::Var Loss(const PhotographBatch& batch, std::int64_t step, StepValues* values);
-  // A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, const UpdateIndex& at,
-                                                StepValues* values);
-
   // Its terms join Loss; without one there are none. `adversary` outlives the steps.
   void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
 

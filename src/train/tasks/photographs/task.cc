@@ -5,14 +5,11 @@
 #include "base/text.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
-#include "train/data/fingerprint.h"
 #include "train/predictor.h"
-#include "train/tasks/adversarial_task.h"
-#include "train/tasks/example_sheet.h"
+#include "train/tasks/network_task.h"
 #include "train/tasks/photographs/evaluate.h"
 #include "train/tasks/photographs/pictures.h"
 #include "train/tasks/photographs/step.h"
-#include "train/tasks/start_as.h"
 #include "train/tasks/textured_image/pictures.h"
 
 namespace tilegrad::train {
@@ -20,20 +17,13 @@ namespace {
 
 constexpr int kPhotographRows = 8;
 
-class PhotographsTask : public AdversarialTask {
+class PhotographsTask : public NetworkTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }
-  RunHeader Header() override;
   Status Begin(const Path& run, std::int64_t first_step) override;
-  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
-    TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
-    return WithPerceptualNetwork(*context_, config_.adversary, own);
-  }
-
-  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
   Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
@@ -48,12 +38,11 @@ class PhotographsTask : public AdversarialTask {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
-  nn::Module& network() override { return step_->network().module(); }
   LearnedWeights& weights() override { return step_->weights(); }
+  Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
   Status CheckCameras() const;
 
   PhotographsConfig config_;
-  nn::Context* context_ = nullptr;
   PhotographSet set_;
   std::optional<PhotoStore> train_, held_out_;
   std::optional<BatchOrder> order_;
@@ -73,10 +62,9 @@ Status PhotographsTask::CheckCameras() const {
 }
 
 Status PhotographsTask::Start(const TaskStart& start) {
-  context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
-  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
+  TILEGRAD_TRY(BeginStart(start, config_.batch));
   TILEGRAD_ASSIGN(set_, OpenPhotographs(start.data));
   TILEGRAD_TRY(CheckCameras());
   const Workers& workers = start.context.workers();
@@ -86,6 +74,8 @@ Status PhotographsTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(
       held_out_, PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kPhotographRows),
                                   config_.crop, image_size(), workers, start.progress, start.stop));
+  lesson_.source = set_.source;
+  lesson_.objects = train_->count();
   order_.emplace(static_cast<int>(train.size()), 1,
                  static_cast<std::uint64_t>(start.schedule.seed));
   step_.emplace(*context_, config_,
@@ -100,32 +90,16 @@ Status PhotographsTask::Start(const TaskStart& start) {
 Status PhotographsTask::Begin(const Path& run, std::int64_t first_step) {
   TILEGRAD_TRY(RememberPhotographs(run, set_, first_step == 0));
   if (first_step > 0 || config_.start.empty()) return {};
-  return StartAs(*context_, step_->network().module(), config_.start);
+  return StartAs(config_.start);
 }
 
-RunHeader PhotographsTask::Header() {
-  RunHeader header;
-  header.dataset_source = set_.source;
-  header.training_models = train_->count();
-  header.parameters = nn::CountParameters(step_->network().module());
-  return header;
-}
-
-Result<nn::StepVector<nn::Gradient>> PhotographsTask::Backward(const UpdateIndex& at,
-                                                               StepValues* out) {
-  if (at.update > 0) return CriticGradients(at, out);
-  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+Result<nn::Var> PhotographsTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
   std::vector<int> photographs;
   for (const Sample& sample : order_->Batch(slots, 1)) photographs.push_back(sample.model);
   PhotographBatch batch = GatherPhotographs(*context_, config_, *train_, photographs, slots.first);
   batch.portion = at.portion;
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, out));
-  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
-  out->also.emplace_back("epoch", seen / train_->count());
-  out->also.emplace_back("learning_rate",
-                         LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
   out->images = slots.count;
-  return gradients;
+  return step_->Loss(batch, at.step, out);
 }
 
 // Rows of pictures of the photographs of a store.

@@ -9,9 +9,6 @@
 
 namespace tilegrad::train {
 
-// The learning rate of a step follows a schedule of the configuration.
-double LearningRateAt(const SingleImageConfig& config, std::int64_t step);
-
 // Network, optimiser and renderer of a run.
 class TrainStep {
  public:
@@ -20,9 +17,6 @@ class TrainStep {
 
   // Equation 14 of a batch, on the tape; `values` gets the sum and its terms.
   nn::Var Loss(const BatchTensors& batch, std::int64_t step, StepValues* values);
-  // Gradients of the loss. A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, const UpdateIndex& at,
-                                                StepValues* values);
 
   MeshNetwork& network() { return network_; }
   LearnedWeights& weights() { return weights_; }

@@ -10,6 +10,7 @@
 #include "train/data/trained_models.h"
 #include "train/eval/training_pictures.h"
 #include "train/tasks/held_out.h"
+#include "train/tasks/network_task.h"
 #include "train/tasks/single_image/model.h"
 #include "train/tasks/single_image/oracle.h"
 #include "train/tasks/single_image/sample_images.h"
@@ -20,27 +21,14 @@ namespace {
 
 constexpr std::size_t kSingleImageRows = 8;
 
-class SingleImageTask : public Task {
+class SingleImageTask : public NetworkTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.size; }
-  RunHeader Header() override;
   Status Begin(const Path& run, std::int64_t first_step) override;
 
-  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
-  Result<std::vector<nn::NamedTensor>> Statistics() override {
-    return nn::Buffers(step_->network().module());
-  }
-  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->weights().Update(gradients, at.step, at.share);
-  }
-
-  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
-    return step_->weights().LoadState(state, steps);
-  }
   Result<ImageU8> SamplePicture(std::int64_t steps) override {
     if (samples_.empty()) return ImageU8();
     return SampleSheet(*context_, *step_, held_out_, samples_, steps);
@@ -61,6 +49,8 @@ class SingleImageTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
+  LearnedWeights& weights() override { return step_->weights(); }
+  Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
   Status CheckDataset() const;
   Status KeepPictures(const Path& run, std::int64_t first_step) const;
   void WarnOfFewModels() const;
@@ -68,7 +58,6 @@ class SingleImageTask : public Task {
   Status LoadMeshes(const TaskStart& start);
 
   SingleImageConfig config_;
-  nn::Context* context_ = nullptr;
   WarningSink warn_;
   std::optional<Dataset> dataset_;
   ImageStore train_, held_out_;
@@ -79,14 +68,15 @@ class SingleImageTask : public Task {
 };
 
 Status SingleImageTask::Start(const TaskStart& start) {
-  context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
-  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
-  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(BeginStart(start, config_.batch));
+  TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
   TILEGRAD_TRY(LoadMeshes(start));
+  lesson_.source = dataset_->info().source;
+  lesson_.objects = train_.models;
   warn_ = start.warn;
   step_.emplace(*context_, config_, train_.size);
   order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed),
@@ -95,8 +85,7 @@ Status SingleImageTask::Start(const TaskStart& start) {
 }
 
 Status SingleImageTask::Begin(const Path& run, std::int64_t first_step) {
-  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
-                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_, first_step));
   TILEGRAD_TRY(KeepPictures(run, first_step));
   if (first_step == 0) WarnOfFewModels();
   if (!stream_ || first_step > 0) return {};
@@ -107,8 +96,6 @@ Status SingleImageTask::Begin(const Path& run, std::int64_t first_step) {
 Status SingleImageTask::CheckDataset() const {
   const std::string folder = dataset_->folder().string();
   const DatasetInfo& info = dataset_->info();
-  if (dataset_->Select(Split::kTrain).empty())
-    return InvalidArgument("{}: no training models in it", folder);
   if (config_.views > info.views) {
     return InvalidArgument("schedule.views is {}, but the dataset has {} of each model",
                            config_.views, Count(info.views, "view"));
@@ -162,28 +149,14 @@ Status SingleImageTask::LoadMeshes(const TaskStart& start) {
   return {};
 }
 
-RunHeader SingleImageTask::Header() {
-  RunHeader header;
-  header.dataset_source = dataset_->info().source;
-  header.training_models = train_.models;
-  header.parameters = nn::CountParameters(step_->network().module());
-  return header;
-}
-
-Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex& at,
-                                                               StepValues* out) {
-  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+Result<nn::Var> SingleImageTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
   const auto batch = order_->Batch(slots, static_cast<int>(config_.views));
   TILEGRAD_ASSIGN(
       const BatchTensors tensors,
       GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, slots.first));
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at, out));
-  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
-  out->also.emplace_back("epoch", seen / train_.models);
-  out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));
   out->images = slots.count;
   out->stream_seconds = stream_ ? stream_->TakeSeconds() : 0;
-  return gradients;
+  return step_->Loss(tensors, at.step, out);
 }
 
 Result<Showcase> SingleImageTask::Show(const ShowcaseRequest& request, const Workers& workers,

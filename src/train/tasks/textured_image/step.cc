@@ -224,16 +224,4 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   return sum.total();
 }
 
-Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch& batch,
-                                                            const UpdateIndex& at,
-                                                            StepValues* values) {
-  const nn::Var loss = Loss(Draw(batch, at.step), batch, at.step, values);
-  auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
-  TILEGRAD_TRY(context_.TakeStatus());
-  if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
-  return InternalError(
-      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
-      values->loss, values->DescribeTerms(), nn::GlobalNorm(context_, gradients));
-}
-
 }  // namespace tilegrad::train

@@ -34,10 +34,6 @@ class TexturedStep {
   // Equation 14 with textures and light; `values` gets the sum and its terms.
   nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch, std::int64_t step,
                StepValues* values);
-  // Gradients of the loss. A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, const UpdateIndex& at,
-                                                StepValues* values);
-
   // Its terms join Loss; without one there are none. `adversary` outlives the steps.
   void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
 

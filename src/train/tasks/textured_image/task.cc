@@ -4,12 +4,10 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
-#include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
-#include "train/tasks/adversarial_task.h"
 #include "train/tasks/held_out.h"
-#include "train/tasks/start_as.h"
+#include "train/tasks/network_task.h"
 #include "train/tasks/textured_image/evaluate.h"
 #include "train/tasks/textured_image/held_out_views.h"
 #include "train/tasks/textured_image/pictures.h"
@@ -20,20 +18,14 @@ namespace {
 
 constexpr int kTexturedRows = 8, kRowViews = 3;
 
-class TexturedImageTask : public AdversarialTask {
+class TexturedImageTask : public NetworkTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
-  RunHeader Header() override;
-  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
-    TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
-    return WithPerceptualNetwork(*context_, config_.adversary, own);
-  }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
-  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
   Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
@@ -48,14 +40,13 @@ class TexturedImageTask : public AdversarialTask {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
-  nn::Module& network() override { return step_->network().module(); }
   LearnedWeights& weights() override { return step_->weights(); }
+  Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
   ObjectPictures Pictures(int size) const {
     return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
   }
 
   TexturedImageConfig config_;
-  nn::Context* context_ = nullptr;
   std::optional<Dataset> dataset_;
   std::vector<TexturedMesh> meshes_;  // of training, to which the stream refers
   std::optional<TexturedStream> stream_;
@@ -65,15 +56,14 @@ class TexturedImageTask : public AdversarialTask {
 };
 
 Status TexturedImageTask::Start(const TaskStart& start) {
-  context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
-  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
-  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(BeginStart(start, config_.batch));
+  TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_TRY(CheckImageSize(config_.network, image_size()));
   const std::vector<int> train = dataset_->Select(Split::kTrain);
-  if (train.empty())
-    return InvalidArgument("{}: no training models in it", dataset_->folder().string());
+  lesson_.source = dataset_->info().source;
+  lesson_.objects = static_cast<int>(train.size());
   const Workers& workers = start.context.workers();
   TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes, workers,
                                               start.progress, start.stop));
@@ -93,39 +83,22 @@ Status TexturedImageTask::Start(const TaskStart& start) {
 }
 
 Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
-  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
-                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_, first_step));
   if (first_step > 0) return {};
-  if (!config_.start.empty())
-    TILEGRAD_TRY(StartAs(*context_, step_->network().module(), config_.start));
+  if (!config_.start.empty()) TILEGRAD_TRY(StartAs(config_.start));
   TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kTexturedRows, 6));
   return io::SavePng(run / "stream.png", sheet);
 }
 
-RunHeader TexturedImageTask::Header() {
-  RunHeader header;
-  header.dataset_source = dataset_->info().source;
-  header.training_models = static_cast<int>(meshes_.size());
-  header.parameters = nn::CountParameters(step_->network().module());
-  return header;
-}
-
-Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateIndex& at,
-                                                                 StepValues* out) {
-  if (at.update > 0) return CriticGradients(at, out);
-  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+Result<nn::Var> TexturedImageTask::Loss(const UpdateIndex& at, const Slots& slots,
+                                        StepValues* out) {
   const auto models = order_->Batch(slots, 1);
   TILEGRAD_ASSIGN(TexturedBatch batch,
                   RenderBatch(*context_, *stream_, image_size(), models, slots.first));
   batch.portion = at.portion;
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, out));
-  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
-  out->also.emplace_back("epoch", seen / static_cast<double>(meshes_.size()));
-  out->also.emplace_back("learning_rate",
-                         LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
   out->images = kViewsOfObject * slots.count;
   out->stream_seconds = stream_->TakeSeconds();
-  return gradients;
+  return step_->Loss(step_->Draw(batch, at.step), batch, at.step, out);
 }
 
 Result<ImageU8> TexturedImageTask::SamplePicture(std::int64_t /*steps*/) {

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// A task of one network, which a critic may watch (tasks/adversary.h): in each step the network is
+// updated first, then the critic, on the same pictures. Such a task says what its loss is; steps,
+// state, header and the log's progress are here.
+#pragma once
+
+#include "train/tasks/adversary.h"
+#include "train/tasks/learned_weights.h"
+#include "train/tasks/task.h"
+
+namespace tilegrad::train {
+
+class NetworkTask : public Task {
+ public:
+  RunHeader Header() override;
+  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override;
+
+  int Updates(std::int64_t /*step*/) const override {
+    return 1 + (adversary_ ? adversary_->updates() : 0);
+  }
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override;
+  std::vector<nn::NamedTensor> State() override;
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+
+ protected:
+  virtual LearnedWeights& weights() = 0;
+  // Of a portion of a step's batch, on the tape, as a LossSum of `out` has it. Sets out->images.
+  virtual Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) = 0;
+
+  // What Start begins with: sets context_ and lesson_.batch.
+  Status BeginStart(const TaskStart& start, std::int64_t batch);
+  // `start.run`: a new run whose network starts as that of `run`, a folder or a checkpoint, with
+  // the weights that predict there and an optimiser that has taken no step.
+  Status StartAs(const Path& run);
+
+  nn::Context* context_ = nullptr;
+  std::unique_ptr<Adversary> adversary_;  // made when the task starts; or none
+  struct Lesson {
+    std::string source = {};  // of the data
+    int objects = 0;          // of an epoch
+    std::int64_t batch = 1;   // objects a step
+  } lesson_;                  // complete after Start
+};
+
+// The dataset of a run. An error if it has no training models.
+Result<Dataset> OpenTrainingData(const TaskStart& start);
+
+}  // namespace tilegrad::train
