@@ -16,7 +16,7 @@
 #include "scene/camera_conventions.h"
 #include "scene/subdivide.h"
 #include "train/data/batches.h"
-#include "train/models/mesh_network.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 namespace {

@@ -12,7 +12,6 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
-#include "train/models/offset_map.h"
 #include "train/tasks/single_image/step.h"
 #include "train/terms.h"
 
@@ -23,7 +22,7 @@ TEST(MeshNetwork, HasThePapersParameters) {
   nn::Context context(workers);
   MeshNetwork network(context, NetworkConfig{}, 64, 1);
   EXPECT_EQ(nn::CountParameters(network.module()), kPaperParameters);
-  EXPECT_EQ(network.template_mesh().positions.size(), 642u);
+  EXPECT_EQ(network.sphere().mesh().positions.size(), 642u);
 }
 
 TEST(MeshNetwork, PredictionsFillTheirBox) {
@@ -48,7 +47,7 @@ NetworkConfig TinyNetwork() {
           .code = 6,
           .hidden1 = 5,
           .hidden2 = 7,
-          .shape = {.level = 2},
+          .sphere = {.level = 2, .radius = 0.175, .smoothing = 0, .symmetric = false},
           .output_deviation = 1};
 }
 
@@ -71,11 +70,11 @@ TEST(MeshNetwork, SmoothingSpreadsOffsets) {
   nn::Context context(workers);
   const auto roughness = [&](std::int64_t rounds) {
     NetworkConfig config = TinyNetwork();
-    config.shape.smoothing = rounds;
+    config.sphere.smoothing = rounds;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
-    const auto& mesh = network.template_mesh();
+    const auto& mesh = network.sphere().mesh();
     const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
     double differences = 0, squares = 0;
     const float* const m = out.movement.value().data<float>();
@@ -102,11 +101,11 @@ TEST(MeshNetwork, SymmetricPredictionsAre) {
   nn::Context context(workers);
   for (const bool fc_norm : {false, true}) {
     NetworkConfig config = TinyNetwork();
-    config.shape.smoothing = 2, config.shape.symmetric = true, config.fc_norm = fc_norm;
+    config.sphere.smoothing = 2, config.sphere.symmetric = true, config.fc_norm = fc_norm;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
-    const auto& sphere = network.template_mesh().positions;
+    const auto& sphere = network.sphere().mesh().positions;
     const float* const p = out.positions.value().data<float>();
     double moved = 0;
     for (std::size_t v = 0; v < sphere.size(); ++v) {
@@ -134,7 +133,7 @@ struct SmallProblem {
                       .code = 6,
                       .hidden1 = 5,
                       .hidden2 = 7,
-                      .shape = {.level = 1, .smoothing = 2},
+                      .sphere = {.level = 1, .radius = 0.175, .smoothing = 2, .symmetric = false},
                       .fc_deviation = 0,
                       .color_bias = 0.4};
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
@@ -216,7 +215,7 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
 
 TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   SmallProblem p;
-  p.config.network.shape.symmetric = true, p.config.network.fc_norm = false;
+  p.config.network.sphere.symmetric = true, p.config.network.fc_norm = false;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -228,7 +227,7 @@ TEST(Chain, SoDoThoseOfColorsLookedUpInThePicture) {
 
 TEST(Chain, SoDoThoseOfN3mrsVertices) {
   SmallProblem p;
-  p.config.network.shape.n3mr_vertices = true, p.config.network.shape.smoothing = 0;
+  p.config.network.sphere.n3mr_vertices = true, p.config.network.sphere.smoothing = 0;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -380,16 +379,16 @@ TEST(Schedules, LearningRateAndSharpness) {
   EXPECT_EQ(SoftRasSigmaAt(c.rivals, 0.59), 1e-4);
   EXPECT_NEAR(SoftRasSigmaAt(c.rivals, 0.6), 3e-5, 1e-18);
   c.render.sharpness_start = 100, c.render.sharpness = 10000;
-  EXPECT_NEAR(SharpnessAt(c, 0), 100, 1e-9);
-  EXPECT_NEAR(SharpnessAt(c, 25), 1000, 1e-9);
-  EXPECT_NEAR(SharpnessAt(c, 80), 10000, 1e-8);
+  EXPECT_NEAR(SharpnessAt(c.render, 100, 0), 100, 1e-9);
+  EXPECT_NEAR(SharpnessAt(c.render, 100, 25), 1000, 1e-9);
+  EXPECT_NEAR(SharpnessAt(c.render, 100, 80), 10000, 1e-8);
 }
 
 TEST(SingleImageConfig, N3mrVerticesHaveNoOffsets) {
   SingleImageConfig config;
-  config.network.shape.n3mr_vertices = true;
+  config.network.sphere.n3mr_vertices = true;
   EXPECT_TRUE(CheckConfig(config).ok());
-  config.network.shape.symmetric = true;
+  config.network.sphere.symmetric = true;
   EXPECT_NE(CheckConfig(config).message().find("network.n3mr_vertices has no offsets"),
             std::string::npos);
 }

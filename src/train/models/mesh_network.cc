@@ -96,16 +96,16 @@ void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& vis
 
 MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int image_size,
                          std::uint64_t seed)
-    : config_(config), template_(context, config.shape) {
+    : config_(config), sphere_(context, config.sphere) {
   Rng rng(seed, /*stream=*/0x6e6574);
   NetworkBuilder builder{context, config, rng};
   BuildEncoder(builder, all_.encoder, image_size);
-  BuildDecoder(builder, all_.shape, template_.numbers());
-  BuildColors(builder, all_.color, template_.vertices());
+  BuildDecoder(builder, all_.shape, sphere_.numbers());
+  BuildColors(builder, all_.color, sphere_.vertices());
 }
 
 nn::Var MeshNetwork::Colors(const nn::Var& code, const nn::Var& images, nn::Mode mode) {
-  const std::int64_t batch = code.shape()[0], vertices = template_.vertices();
+  const std::int64_t batch = code.shape()[0], vertices = sphere_.vertices();
   const nn::Var raw = all_.color.Forward(code, mode);
   if (!config_.picture_colors) return nn::Reshape(raw, {batch, vertices, 3});
   return nn::SampleColors(images.value(), nn::Reshape(raw, {batch, vertices, 4}));
@@ -114,8 +114,8 @@ nn::Var MeshNetwork::Colors(const nn::Var& code, const nn::Var& images, nn::Mode
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const nn::Var code = all_.encoder.Forward(images, mode);
   PredictedMeshes out;
-  out.movement = template_.Movement(all_.shape.Forward(code, mode));
-  out.positions = template_.Positions(out.movement);
+  out.movement = sphere_.Movement(all_.shape.Forward(code, mode));
+  out.positions = NormalizeMeshes(out.movement + sphere_.Positions());
   out.colors = Colors(code, images, mode);
   return out;
 }

@@ -6,7 +6,7 @@
 
 #include "nn/layers.h"
 #include "scene/mesh.h"
-#include "train/models/deformable_template.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 
@@ -18,7 +18,7 @@ struct NetworkConfig {
   std::int64_t code = 1024;     // width of the encoder's three fully connected layers
   std::int64_t hidden1 = 1024;  // widths of each decoder
   std::int64_t hidden2 = 2048;
-  TemplateConfig shape;             // what is deformed, and how freely
+  SphereConfig sphere = {.radius = 0.175, .smoothing = 0, .symmetric = false};
   bool fc_norm = true;              // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
@@ -53,13 +53,13 @@ class MeshNetwork {
   PredictedMeshes Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
-  const Mesh& template_mesh() const { return template_.mesh(); }
+  const SphereModel& sphere() const { return sphere_; }
 
  private:
   nn::Var Colors(const nn::Var& code, const nn::Var& images, nn::Mode mode);
 
   NetworkConfig config_;
-  DeformableTemplate template_;
+  SphereModel sphere_;
   // The three parts, shown to visitors as one module.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;

@@ -6,9 +6,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "nn/ops/sample_pictures.h"
-#include "scene/shapes.h"
-#include "scene/sphere_uv.h"
-#include "train/models/mirror_columns.h"
 
 namespace tilegrad::train {
 namespace {
@@ -94,10 +91,7 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
     : context_(context),
       config_(config),
       texture_size_(image_size << config.enlarge),
-      template_(Icosphere(static_cast<int>(config.template_level), 1)),
-      uvs_(SphereUvs(template_)),
-      mean_(context, template_, {.smoothing = config.smoothing, .symmetric = true}),
-      offsets_(context, template_, {.smoothing = config.smoothing, .symmetric = true}) {
+      sphere_(context, config.sphere) {
   Rng rng(seed, /*stream=*/0x70686f74);
   const bool flow = config.texture == "flow";
   const nn::UNetShape unet{.in = 3,
@@ -118,8 +112,7 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
 
 void PhotographNetwork::BuildHeads(Rng& rng) {
   const std::int64_t latent = config_.latent;
-  const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
+  auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, sphere_.numbers(), rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
   auto& camera = nn::AddLinear(all_.camera, "fc", context_, latent, kWeakCameraNumbers, rng);
@@ -129,11 +122,11 @@ void PhotographNetwork::BuildHeads(Rng& rng) {
 }
 
 void PhotographNetwork::StartShape(const PhotographStart& start) {
-  const std::size_t vertices = template_.positions.size();
+  const std::size_t vertices = sphere_.mesh().positions.size();
   const KeypointPlace centre = start.keypoints.empty() ? KeypointPlace{} : Middle(start.keypoints);
   std::vector<double> shape, logits(start.count * vertices);
   for (std::size_t v = 0; v < vertices; ++v) {
-    const glm::vec3& p = template_.positions[v];
+    const glm::vec3& p = sphere_.mesh().positions[v];
     const KeypointPlace direction = {p.x, p.y, p.z};
     const double reach = start.keypoints.empty()
                              ? kStartRadius
@@ -154,7 +147,7 @@ void PhotographNetwork::StartShape(const PhotographStart& start) {
         nn::Parameter(context_, context_.From({k, v}, std::span<const double>(logits)));
 }
 
-nn::Var PhotographNetwork::MeanShape() const { return mean_.Apply(all_.mean_shape); }
+nn::Var PhotographNetwork::MeanShape() const { return sphere_.Movement(all_.mean_shape); }
 
 nn::Var PhotographNetwork::KeypointWeights() const {
   return all_.keypoints.valid() ? nn::Softmax(all_.keypoints, 1) : nn::Var();
@@ -185,7 +178,7 @@ PredictedPhotographs PhotographNetwork::Forward(const nn::Var& pictures, nn::Mod
   PredictedPhotographs out;
   const PictureCode::Encoded encoded = all_.code->Encode(pictures, mode);
   if (!encoded.latent.valid()) return out;
-  out.movement = offsets_.Apply(all_.shape.Forward(encoded.latent, mode));
+  out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));
   out.positions = MeanShape() + out.movement;
   out.keypoints = Keypoints(out.positions);
   out.cameras = CamerasOf(all_.camera.Forward(encoded.latent, mode));

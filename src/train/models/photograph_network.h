@@ -12,23 +12,22 @@
 
 #include "nn/ops/axis_map.h"
 #include "scene/mesh.h"
-#include "train/models/offset_map.h"
 #include "train/models/picture_code.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 
 struct PhotographNetworkConfig {
-  std::int64_t base = 24;           // U-Net: channels of the first level; they double to at most
-  std::int64_t most = 192;          // this many
-  std::int64_t levels = 4;          // halvings
-  std::int64_t enlarge = 1;         // the texture is 2^this times as large as the picture
-  bool skips = true;                // the U-Net's skip connections
-  std::int64_t latent = 200;        // all heads start from this code
-  std::string texture = "direct";   // or "flow"
-  bool symmetric_texture = true;    // the map is its mirror image at x = 0
-  std::int64_t template_level = 3;  // subdivisions of the icosahedron
-  std::int64_t smoothing = 2;       // OffsetRules, of movements and mean shape
-  double output_deviation = 1e-4;   // the head of movements starts as N(0, this^2)
+  std::int64_t base = 24;          // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 192;         // this many
+  std::int64_t levels = 4;         // halvings
+  std::int64_t enlarge = 1;        // the texture is 2^this times as large as the picture
+  bool skips = true;               // the U-Net's skip connections
+  std::int64_t latent = 200;       // all heads start from this code
+  std::string texture = "direct";  // or "flow"
+  bool symmetric_texture = true;   // the map is its mirror image at x = 0
+  SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
+  double output_deviation = 1e-4;  // the head of movements starts as N(0, this^2)
 };
 
 // What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
@@ -63,9 +62,7 @@ class PhotographNetwork {
   nn::Var Keypoints(const nn::Var& positions) const;  // [B, V, 3] -> [B, K, 3]
 
   nn::Module& module() { return all_; }
-  const Mesh& template_mesh() const { return template_; }                       // unit sphere
-  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
-  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
+  const SphereModel& sphere() const { return sphere_; }
   int texture_size() const { return texture_size_; }
 
  private:
@@ -76,9 +73,7 @@ class PhotographNetwork {
   nn::Context& context_;
   PhotographNetworkConfig config_;
   int texture_size_;
-  Mesh template_;
-  std::vector<glm::vec2> uvs_;
-  OffsetMap mean_, offsets_;
+  SphereModel sphere_;
   nn::AxisMap mirror_;  // of texel columns
   struct Parts : nn::Module {
     std::optional<PictureCode> code;

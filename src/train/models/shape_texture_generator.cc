@@ -8,8 +8,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "scene/shapes.h"
-#include "scene/sphere_uv.h"
 
 namespace tilegrad::train {
 namespace {
@@ -84,15 +82,8 @@ ShapeTextureGenerator::ShapeTextureGenerator(nn::Context& context, const Generat
                                              std::uint64_t seed)
     : context_(context),
       config_(config),
-      template_(Icosphere(static_cast<int>(config.template_level),
-                          static_cast<float>(config.template_radius))),
-      uvs_(SphereUvs(template_)),
+      sphere_(context, config.sphere),
       columns_(MapColumns(context, config)) {
-  const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
-  template_positions_ =
-      context.From({static_cast<std::int64_t>(template_.positions.size()), 3}, flat);
-  offsets_ =
-      OffsetMap(context, template_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
   Rng rng(seed, /*stream=*/0x67656e);
   BuildShape(rng);
   BuildTexture(rng);
@@ -104,8 +95,7 @@ void ShapeTextureGenerator::BuildShape(Rng& rng) {
   net.Add<nn::Activation>("act1", &nn::LeakyRelu02);
   nn::AddLinear(net, "fc2", context_, config_.hidden, config_.hidden, rng);
   net.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = nn::AddLinear(net, "fc3", context_, config_.hidden, numbers, rng);
+  auto& offsets = nn::AddLinear(net, "fc3", context_, config_.hidden, sphere_.numbers(), rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
   shape_.scale = context_.Full({3}, 1);
@@ -141,9 +131,8 @@ void ShapeTextureGenerator::BuildTexture(Rng& rng) {
 ShapeTextureGenerator::Shapes ShapeTextureGenerator::MakeShapes(const nn::Var& noise,
                                                                 nn::Mode mode) {
   const nn::Var own = nn::Slice(noise, 1, 0, config_.shape_noise);
-  const nn::Var movement = offsets_.Apply(shape_.Forward(own, mode));
-  const nn::Var start =
-      nn::Constant(context_, shape_.scale) * nn::Constant(context_, template_positions_);
+  const nn::Var movement = sphere_.Movement(shape_.Forward(own, mode));
+  const nn::Var start = nn::Constant(context_, shape_.scale) * sphere_.Positions();
   return {movement, movement + start};
 }
 
@@ -164,7 +153,7 @@ nn::Var ShapeTextureGenerator::Textures(const nn::Var& maps) const {
 void ShapeTextureGenerator::SetEllipsoid(const std::array<double, 3>& half_axes) {
   nn::WithFloatType(shape_.scale.dtype(), [&]<class T>(T) {
     std::ranges::transform(half_axes, shape_.scale.span<T>().begin(), [&](double half) {
-      return static_cast<T>(half / config_.template_radius);
+      return static_cast<T>(half / config_.sphere.radius);
     });
   });
 }

@@ -9,18 +9,15 @@
 
 #include "nn/layers.h"
 #include "scene/mesh.h"
-#include "train/models/offset_map.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 
 struct GeneratorConfig {
-  std::int64_t noise = 64;          // numbers of a code; textures follow from all of them,
-  std::int64_t shape_noise = 32;    // shapes from the first ones: one shape has many liveries
-  std::int64_t hidden = 256;        // widths of the two layers before the vertices
-  std::int64_t template_level = 3;  // subdivisions of the icosahedron
-  double template_radius = 0.2;     // world units
-  std::int64_t smoothing = 4;       // OffsetRules
-  bool symmetric = true;            // shapes at x = 0
+  std::int64_t noise = 64;        // numbers of a code; textures follow from all of them,
+  std::int64_t shape_noise = 32;  // shapes from the first ones: one shape has many liveries
+  std::int64_t hidden = 256;      // widths of the two layers before the vertices
+  SphereConfig sphere = {.radius = 0.2};
   double output_deviation = 0.01;   // the head of vertices starts as N(0, this^2)
   std::int64_t texture_size = 128;  // texels a side, 8 times a power of two
   std::int64_t texture_base = 16;   // channels at full size, double with each halving up to
@@ -65,9 +62,7 @@ class ShapeTextureGenerator {
   static std::int64_t FirstColumn(const GeneratorConfig& config) {
     return config.symmetric_texture ? config.texture_size / 4 : 0;
   }
-  const Mesh& template_mesh() const { return template_; }
-  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
-  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
+  const SphereModel& sphere() const { return sphere_; }
 
  private:
   struct ShapeNet : nn::Module {
@@ -91,10 +86,7 @@ class ShapeTextureGenerator {
 
   nn::Context& context_;
   GeneratorConfig config_;
-  Mesh template_;
-  std::vector<glm::vec2> uvs_;
-  nn::Tensor template_positions_;  // [V, 3]
-  OffsetMap offsets_;
+  SphereModel sphere_;
   nn::Tensor columns_;  // of a map for each column of a texture
   ShapeNet shape_;
   TextureNet texture_;

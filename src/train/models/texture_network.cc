@@ -6,10 +6,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "scene/harmonics.h"
-#include "scene/shapes.h"
-#include "scene/sphere_uv.h"
-#include "train/models/mesh_network.h"
-#include "train/models/mirror_columns.h"
 
 namespace tilegrad::train {
 namespace {
@@ -74,9 +70,7 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
       config_(config),
       light_(light),
       texture_size_(image_size << config.enlarge),
-      template_(Icosphere(static_cast<int>(config.template_level),
-                          static_cast<float>(config.template_radius))),
-      uvs_(SphereUvs(template_)) {
+      sphere_(context, config.sphere) {
   Rng rng(seed, /*stream=*/0x74657874);
   const nn::UNetShape unet{.in = 4,
                            .out = config.lookup ? config.lookup_width : 3,
@@ -89,13 +83,8 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
   all_.code.emplace(context, unet,
                     PictureCodeShape{.image_size = image_size, .latent = config.latent}, rng);
   BuildHeads(rng);
-  const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
-  template_positions_ =
-      context.From({static_cast<std::int64_t>(template_.positions.size()), 3}, flat);
-  offsets_ =
-      OffsetMap(context, template_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
   if (config.lookup) BuildLookup(image_size, rng);
-  if (config.cubes) cubes_ = FaceCubes(context, template_, texture_size_);
+  if (config.cubes) cubes_ = FaceCubes(context, sphere_.mesh(), texture_size_);
   if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
 }
 
@@ -103,8 +92,8 @@ void TextureNetwork::BuildHeads(Rng& rng) {
   const std::int64_t latent = config_.latent;
   nn::AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
   all_.shape.Add<nn::Activation>("act", &nn::Relu);
-  const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = nn::AddLinear(all_.shape, "fc2", context_, config_.hidden, numbers, rng);
+  auto& offsets =
+      nn::AddLinear(all_.shape, "fc2", context_, config_.hidden, sphere_.numbers(), rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
   const std::int64_t light = LightNumbers(light_.lighting), width = config_.light_width;
@@ -131,7 +120,7 @@ void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
                                     .texture_size = texture_size_,
                                     .width = config_.lookup_width,
                                     .palette = config_.palette};
-  all_.paint.emplace(context_, template_, painter, rng);
+  all_.paint.emplace(context_, sphere_.mesh(), painter, rng);
 }
 
 nn::Var TextureNetwork::Texture(const PictureCode::Encoded& encoded,
@@ -177,9 +166,9 @@ PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   PredictedObjects out;
   const PictureCode::Encoded encoded = all_.code->Encode(images, mode);
   if (!encoded.latent.valid()) return out;
-  out.movement = offsets_.Apply(all_.shape.Forward(encoded.latent, mode));
-  out.positions = out.movement + nn::Constant(context_, template_positions_);
-  if (config_.normalize) out.positions = NormalizeMeshes(out.positions, kPredictionHalfExtent);
+  out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));
+  out.positions = out.movement + sphere_.Positions();
+  if (config_.normalize) out.positions = NormalizeMeshes(out.positions);
   if (config_.lookup) out.pose = all_.pose.Forward(encoded.latent, mode);
   Light(encoded, mode, &out);
   out.textures = Texture(encoded, out, mode);

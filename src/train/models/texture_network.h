@@ -11,25 +11,22 @@
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
 #include "train/models/face_cubes.h"
-#include "train/models/offset_map.h"
 #include "train/models/picture_code.h"
+#include "train/models/sphere_model.h"
 #include "train/models/texture_painter.h"
 
 namespace tilegrad::train {
 
 struct TextureNetworkConfig {
-  std::int64_t base = 24;           // U-Net: channels of the first level; they double to at most
-  std::int64_t most = 256;          // this many
-  std::int64_t levels = 4;          // halvings
-  std::int64_t enlarge = 1;         // the texture is 2^this times as large as the image
-  bool skips = true;                // the U-Net's skip connections
-  std::int64_t latent = 384;        // all heads start from this code, fully connected
-  std::int64_t hidden = 512;        // width of the head of vertices
-  std::int64_t light_width = 128;   // of the six layers of the head of light
-  std::int64_t template_level = 3;  // subdivisions of the icosahedron
-  double template_radius = 0.3;     // world units
-  std::int64_t smoothing = 4;       // OffsetRules
-  bool symmetric = true;
+  std::int64_t base = 24;          // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 256;         // this many
+  std::int64_t levels = 4;         // halvings
+  std::int64_t enlarge = 1;        // the texture is 2^this times as large as the image
+  bool skips = true;               // the U-Net's skip connections
+  std::int64_t latent = 384;       // all heads start from this code, fully connected
+  std::int64_t hidden = 512;       // width of the head of vertices
+  std::int64_t light_width = 128;  // of the six layers of the head of light
+  SphereConfig sphere = {};
   bool normalize = true;           // shapes are brought to the truth's size and place, else learned
   bool symmetric_texture = false;  // the texture is its mirror image at x = 0
   // Texels are looked up in the picture where the shape and the camera that the network says have
@@ -72,9 +69,7 @@ class TextureNetwork {
   PredictedObjects Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
-  const Mesh& template_mesh() const { return template_; }
-  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
-  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
+  const SphereModel& sphere() const { return sphere_; }
   int texture_size() const { return texture_size_; }
   const FaceCubes& cubes() const { return cubes_; }  // with TextureNetworkConfig::cubes
 
@@ -89,10 +84,7 @@ class TextureNetwork {
   TextureNetworkConfig config_;
   LightHeadShape light_;
   int texture_size_;
-  Mesh template_;
-  std::vector<glm::vec2> uvs_;
-  nn::Tensor template_positions_;  // [V, 3]
-  OffsetMap offsets_;
+  SphereModel sphere_;
   nn::AxisMap mirror_;  // of texel columns
   FaceCubes cubes_;
   // The parts, shown to visitors as one module.

@@ -7,14 +7,14 @@
 
 namespace tilegrad::train {
 
-Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> p,
+Mesh DeformedMesh(const TexturedTemplate& from, std::span<const float> p,
                   std::span<const float> texels) {
   Mesh mesh;
-  mesh.faces = sphere.mesh.faces;
+  mesh.faces = from.sphere.mesh().faces;
   for (std::size_t i = 0; i < p.size(); i += 3)
     mesh.positions.emplace_back(p[i], p[i + 1], p[i + 2]);
-  mesh.corner_uvs = sphere.corner_uvs;
-  ImageU8 image(sphere.texture_size, sphere.texture_size, 3);
+  mesh.corner_uvs = from.sphere.corner_uvs();
+  ImageU8 image(from.texture_size, from.texture_size, 3);
   std::ranges::transform(texels, image.pixels.begin(), ToByte);
   mesh.textures = {{"predicted", std::move(image)}};
   mesh.materials = {{.name = "predicted",

@@ -6,18 +6,17 @@
 #include <vector>
 
 #include "nn/nn.h"
-#include "scene/mesh.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 
-// A sphere to be deformed, with its texture coordinates; textures are square.
+// Textures are square.
 struct TexturedTemplate {
-  const Mesh& mesh;
-  const std::vector<glm::vec2>& corner_uvs;
+  const SphereModel& sphere;
   int texture_size;
 };
 // With these positions [V, 3] and texels [size, size, 3] in [0, 1].
-Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> positions,
+Mesh DeformedMesh(const TexturedTemplate& from, std::span<const float> positions,
                   std::span<const float> texels);
 
 // Item i of a batch [B, ...].

@@ -21,18 +21,15 @@ ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view
   return fields;
 }
 
-ConfigFields FieldsOf(const SphereKeys& keys) {
-  ConfigFields fields = {{"network.template_level", keys.template_level, 0, 6,
-                          "subdivisions of the icosahedron; 3: 642 vertices"}};
-  if (keys.template_radius)
-    fields.push_back({"network.template_radius", keys.template_radius, 1e-3, 10, "world units"});
-  fields.push_back({"network.smoothing", keys.smoothing, 0, 64,
-                    "rounds of diffusion over the template that offsets go through"});
-  if (keys.symmetric != nullptr) {
-    fields.push_back(
-        {"network.symmetric", keys.symmetric, 0, 1, "every shape is symmetric at x = 0"});
-  }
-  return fields;
+ConfigFields FieldsOf(SphereConfig* c) {
+  return {
+      {"network.template_level", &c->level, 0, 6,
+       "subdivisions of the icosahedron; 3: 642 vertices"},
+      {"network.template_radius", &c->radius, 1e-3, 10, "world units"},
+      {"network.smoothing", &c->smoothing, 0, 64,
+       "rounds of diffusion over the template that offsets go through"},
+      {"network.symmetric", &c->symmetric, 0, 1, "every shape is symmetric at x = 0"},
+  };
 }
 
 ConfigFields FieldsOf(const UNetKeys& keys) {
@@ -87,6 +84,14 @@ ConfigFields FieldsOf(OptimizerConfig* c) {
 double LearningRateAt(const OptimizerConfig& o, std::int64_t steps, std::int64_t step) {
   const nn::CosineSchedule cosine{steps, o.final_factor};
   return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
+}
+
+RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size) {
+  RenderOptions options;
+  options.width = options.height = size;
+  options.delta = 1 / sharpness;
+  options.max_alpha_error = config.max_alpha_error;
+  return options;
 }
 
 double SharpnessAt(const RenderConfig& render, std::int64_t steps, std::int64_t step) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "train/models/sphere_model.h"
 #include "train/run/config_fields.h"
 #include "train/run/schedule.h"
 
@@ -47,14 +48,7 @@ ConfigFields Joined(std::initializer_list<ConfigFields> parts);
 // What a task does not have of a table that it shares.
 ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view> keys);
 
-// [network] of what deforms a sphere; null: the network has no such key.
-struct SphereKeys {
-  std::int64_t* template_level;
-  std::int64_t* smoothing;  // OffsetRules
-  double* template_radius = nullptr;
-  bool* symmetric = nullptr;
-};
-ConfigFields FieldsOf(const SphereKeys& keys);
+ConfigFields FieldsOf(SphereConfig* config);  // of [network]; without n3mr_vertices
 
 // [network] of a U-Net whose output is a texture map.
 struct UNetKeys {
@@ -74,5 +68,7 @@ ConfigFields FieldsOf(OptimizerConfig* config);
 // The learning rate and 1/delta at a step of a run of `steps`.
 double LearningRateAt(const OptimizerConfig& config, std::int64_t steps, std::int64_t step);
 double SharpnessAt(const RenderConfig& config, std::int64_t steps, std::int64_t step);
+// Of square images with 1/delta = `sharpness`.
+RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size);
 
 }  // namespace tilegrad::train

@@ -15,11 +15,11 @@ void AddColor(double weight, const nn::Var& loss, LossSum* sum) {
   sum->Add("color", "Colour loss (mean L1)", weight, loss);
 }
 
-void AddRegularizers(const LossConfig& weights, const MovedMeshes& meshes, LossSum* sum) {
+void AddRegularizers(const LossConfig& weights, const DeformedSpheres& meshes, LossSum* sum) {
   sum->Add("smoothness", "Smoothness (normals of neighbouring faces)", weights.smoothness,
-           SmoothnessLoss(meshes.positions, meshes.faces, meshes.topology));
+           SmoothnessLoss(meshes.positions, meshes.sphere.mesh().faces, meshes.sphere.topology()));
   sum->Add("laplacian", "Laplacian of the movement", weights.laplacian,
-           LaplacianLoss(meshes.movement, meshes.topology));
+           LaplacianLoss(meshes.movement, meshes.sphere.topology()));
 }
 
 }  // namespace tilegrad::train

@@ -2,9 +2,6 @@
 // The terms of equation 14 that tasks share.
 #pragma once
 
-#include <span>
-
-#include "scene/topology.h"
 #include "train/losses/loss_sum.h"
 #include "train/tasks/common_config.h"
 
@@ -15,13 +12,12 @@ void AddIou(double weight, const nn::Var& alpha, const nn::Tensor& truth, LossSu
 // `loss`: of colours, however they are compared.
 void AddColor(double weight, const nn::Var& loss, LossSum* sum);
 
-// Meshes that share their faces.
-struct MovedMeshes {
-  const nn::Var& positions;  // [B, V, 3]
-  const nn::Var& movement;   // [B, V, 3] that led there
-  std::span<const Face> faces;
-  const Topology& topology;
+// Of `sphere` deformed to `positions` by `movement`, [B, V, 3] both.
+struct DeformedSpheres {
+  const SphereModel& sphere;
+  const nn::Var& positions;
+  const nn::Var& movement;
 };
-void AddRegularizers(const LossConfig& weights, const MovedMeshes& meshes, LossSum* sum);
+void AddRegularizers(const LossConfig& weights, const DeformedSpheres& meshes, LossSum* sum);
 
 }  // namespace tilegrad::train

@@ -12,7 +12,7 @@ ConfigFields FieldsOf(GeneratorConfig* c) {
       {{{"network.noise", &c->noise, 1, 4096, "numbers of a latent code; all decide the texture"},
         {"network.shape_noise", &c->shape_noise, 1, 4096, "of them that decide the shape"},
         {"network.hidden", &c->hidden, 1, 65536, "width of the two layers before the vertices"}},
-       FieldsOf(SphereKeys{&c->template_level, &c->smoothing, &c->template_radius, &c->symmetric}),
+       FieldsOf(&c->sphere),
        {OutputDeviation(&c->output_deviation),
         {"network.texture_size", &c->texture_size, 16, 4096, "texels a side, a power of two"},
         {"network.texture_base", &c->texture_base, 1, 4096,

@@ -150,7 +150,7 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   const GeneratedObjects objects = Draw(at, 0);
   LossSum sum(out);
   for (GanCritic* critic : Critics(stage)) AddAdversarialLoss(critic, objects, &sum);
-  if (stage == GanStage::kShape) step_.AddShapeLosses(objects.shapes, &sum);
+  if (stage == GanStage::kShape) step_.AddShapeLosses(generator_, objects.shapes, &sum);
   TILEGRAD_ASSIGN(auto gradients, Weights(stage).Gradients(sum.total(), at.listener, *out));
   sum.Watch("gradient_generator", "Norm of the generator's gradient",
             nn::GlobalNorm(context_, gradients));

@@ -30,7 +30,7 @@ Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGener
   const nn::Var positions = generator.MakeShapes(code, nn::Mode::kEval).positions;
   const nn::Var textures = generator.Textures(generator.MakeMaps(code, nn::Mode::kEval));
   TILEGRAD_TRY(context.TakeStatus());
-  const TexturedTemplate sphere{generator.template_mesh(), generator.corner_uvs(),
+  const TexturedTemplate sphere{generator.sphere(),
                                 static_cast<int>(generator.config().texture_size)};
   std::vector<Mesh> meshes;
   for (std::size_t i = 0; i < static_cast<std::size_t>(codes.shape()[0]); ++i) {

@@ -18,7 +18,7 @@ class GeneratorModel : public Model {
                                                       const Checkpoint& checkpoint);
 
   std::int64_t parameters() const override { return parameters_; }
-  const Mesh& template_mesh() const override { return generator_.template_mesh(); }
+  const Mesh& template_mesh() const override { return generator_.sphere().mesh(); }
 
   // Numbers of a code.
   std::int64_t noise() const { return config_.network.noise; }

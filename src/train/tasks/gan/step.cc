@@ -5,8 +5,6 @@
 
 #include "nn/nn.h"
 #include "scene/camera_conventions.h"
-#include "scene/shapes.h"
-#include "scene/sphere_uv.h"
 
 namespace tilegrad::train {
 
@@ -15,10 +13,6 @@ GanStep::GanStep(nn::Context& context, const GanConfig& config, const CameraRule
       config_(config),
       size_(rule.lens.width),
       cameras_(PrimaryCameras(rule, config.views)),
-      template_(Icosphere(static_cast<int>(config.network.template_level),
-                          static_cast<float>(config.network.template_radius))),
-      topology_(BuildTopology(template_.faces, template_.positions.size())),
-      uvs_(SphereUvs(template_)),
       renderer_(context.workers()) {
   for (Camera& camera : cameras_)
     camera = ScaledCamera(camera, static_cast<float>(config.stream.draw.samples));
@@ -33,19 +27,14 @@ nn::Tensor GanStep::Noise(std::uint64_t stream, std::uint64_t number, std::int64
   return noise;
 }
 
-RenderedImages GanStep::Render(const SceneVars& scenes) {
+RenderedImages GanStep::Render(const SphereModel& sphere, const SceneVars& scenes) {
   const auto meshes = static_cast<std::size_t>(scenes.positions.shape()[0]);
-  RenderJob job;
-  job.faces = {template_.faces[0].data(), 3 * template_.faces.size()};
+  RenderJob job = sphere.Job(OptionsOf(config_.render, config_.render.sharpness,
+                                       size_ * static_cast<int>(config_.stream.draw.samples)));
   job.views = static_cast<int>(cameras_.size());
   job.cameras.reserve(meshes * cameras_.size());
   for (std::size_t b = 0; b < meshes; ++b)
     job.cameras.insert(job.cameras.end(), cameras_.begin(), cameras_.end());
-  job.options.width = job.options.height = size_ * static_cast<int>(config_.stream.draw.samples);
-  job.options.delta = 1 / config_.render.sharpness;
-  job.options.max_alpha_error = config_.render.max_alpha_error;
-  job.uvs = {&uvs_[0].x, 2 * uvs_.size()};
-  job.wrap = Wrap::kRepeatClamp;
   return RenderScenes(renderer_, scenes, std::move(job));
 }
 
@@ -60,7 +49,7 @@ nn::Var GanStep::Averaged(const nn::Var& images, std::int64_t channels) const {
 nn::Var GanStep::Colors(const ShapeTextureGenerator& generator, const nn::Var& positions,
                         const nn::Var& maps) {
   const SceneVars scenes{.positions = positions, .textures = generator.Textures(maps)};
-  return Averaged(Render(scenes).colors, 3 * config_.views);
+  return Averaged(Render(generator.sphere(), scenes).colors, 3 * config_.views);
 }
 
 GeneratedObjects GanStep::Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise,
@@ -70,7 +59,8 @@ GeneratedObjects GanStep::Draw(ShapeTextureGenerator& generator, const nn::Tenso
   out.shapes = generator.MakeShapes(code, mode);
   if (!out.shapes.positions.valid()) return out;
   if (stage == GanStage::kShape) {
-    out.cover = Averaged(Render({.positions = out.shapes.positions}).alpha, config_.views);
+    out.cover = Averaged(Render(generator.sphere(), {.positions = out.shapes.positions}).alpha,
+                         config_.views);
     return out;
   }
   out.maps = generator.MakeMaps(code, mode);
@@ -86,13 +76,14 @@ ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& no
   const nn::Var maps = texture == Texture::kMean ? generator.MeanMaps(noise.shape()[0])
                                                  : generator.MakeMaps(code, nn::Mode::kEval);
   if (!positions.valid() || !maps.valid()) return {};
-  return {Colors(generator, positions, maps).value(),
-          Averaged(Render({.positions = positions}).alpha, config_.views).value()};
+  return {
+      Colors(generator, positions, maps).value(),
+      Averaged(Render(generator.sphere(), {.positions = positions}).alpha, config_.views).value()};
 }
 
-void GanStep::AddShapeLosses(const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) {
-  AddRegularizers(config_.loss, {shapes.positions, shapes.movement, template_.faces, topology_},
-                  sum);
+void GanStep::AddShapeLosses(const ShapeTextureGenerator& generator,
+                             const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) const {
+  AddRegularizers(config_.loss, {generator.sphere(), shapes.positions, shapes.movement}, sum);
 }
 
 }  // namespace tilegrad::train

@@ -7,7 +7,6 @@
 #include <memory>
 #include <vector>
 
-#include "scene/topology.h"
 #include "train/ops/render_op.h"
 #include "train/tasks/equation14.h"
 #include "train/tasks/gan/critic.h"
@@ -41,10 +40,11 @@ class GanStep {
   ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                    Texture texture = Texture::kOwn);
 
-  void AddShapeLosses(const ShapeTextureGenerator::Shapes& shapes, LossSum* sum);
+  void AddShapeLosses(const ShapeTextureGenerator& generator,
+                      const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) const;
 
  private:
-  RenderedImages Render(const SceneVars& scenes);
+  RenderedImages Render(const SphereModel& sphere, const SceneVars& scenes);
   nn::Var Colors(const ShapeTextureGenerator& generator, const nn::Var& positions,
                  const nn::Var& maps);
   nn::Var Averaged(const nn::Var& images, std::int64_t channels) const;
@@ -53,9 +53,6 @@ class GanStep {
   GanConfig config_;
   int size_;
   std::vector<Camera> cameras_;  // of `samples` pixels a side of each
-  Mesh template_;
-  Topology topology_;
-  std::vector<glm::vec2> uvs_;
   SceneRenderer renderer_;
 };
 

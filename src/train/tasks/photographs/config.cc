@@ -13,7 +13,7 @@ ConfigFields FieldsOf(PhotographNetworkConfig* c) {
          "\"direct\": a map; \"flow\": where in the photograph each texel is (CMR)"},
         {"network.symmetric_texture", &c->symmetric_texture, 0, 1,
          "the texture is its mirror image at x = 0, as every shape is"}},
-       FieldsOf(SphereKeys{&c->template_level, &c->smoothing}),
+       Without(FieldsOf(&c->sphere), {"network.template_radius", "network.symmetric"}),
        {OutputDeviation(&c->output_deviation)}});
 }
 

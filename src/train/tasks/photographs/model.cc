@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/models/deformable_template.h"
 #include "train/models/textured_mesh.h"
 #include "train/tasks/learned_weights.h"
 
@@ -74,7 +73,7 @@ class LoadedPhotographModel : public PhotographModel {
         config_(config),
         network_(context, config.network, {.count = KeypointsIn(checkpoint)},
                  static_cast<int>(config.size), /*seed=*/0),
-        template_(network_.template_mesh()) {}
+        template_(network_.sphere().mesh()) {}
 
   Status Load(const std::vector<nn::NamedTensor>& state) {
     TILEGRAD_TRY(context_.TakeStatus());
@@ -133,9 +132,8 @@ Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context
   const auto count = static_cast<std::size_t>(pictures.shape()[0]);
   std::vector<PredictedPhotograph> out(count);
   for (std::size_t i = 0; i < count; ++i) {
-    out[i].mesh =
-        DeformedMesh({network.template_mesh(), network.corner_uvs(), network.texture_size()},
-                     ItemOf(all.positions, i), ItemOf(all.textures, i));
+    out[i].mesh = DeformedMesh({network.sphere(), network.texture_size()}, ItemOf(all.positions, i),
+                               ItemOf(all.textures, i));
     if (const Status valid = Validate(out[i].mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
     const auto c = ItemOf(all.cameras, i);

@@ -26,19 +26,15 @@ PhotographStep::PhotographStep(nn::Context& context, const PhotographsConfig& co
   nn::WithFloatType(mean.dtype(), [&]<class T>(T) {
     for (const T x : mean.value().span<T>()) positions.push_back(static_cast<double>(x));
   });
-  edges_ = CotangentWeights(network_.template_mesh().faces, positions);
+  edges_ = CotangentWeights(network_.sphere().mesh().faces, positions);
 }
 
 RenderJob PhotographStep::JobAt(const PhotographBatch& batch, std::int64_t step) const {
-  const auto& faces = network_.template_mesh().faces;
-  RenderJob job{.faces = {faces[0].data(), 3 * faces.size()}, .cameras = {}};
+  const auto size = static_cast<int>(config_.size);
+  const double sharpness = SharpnessAt(config_.render, config_.schedule.steps, step);
+  RenderJob job = network_.sphere().Job(OptionsOf(config_.render, sharpness, size));
   for (const WeakPerspective& camera : batch.cameras)
-    job.cameras.push_back(PinholeIn(camera, static_cast<int>(config_.size)));
-  job.options.width = job.options.height = static_cast<int>(config_.size);
-  job.options.delta = 1 / SharpnessAt(config_.render, config_.schedule.steps, step);
-  job.options.max_alpha_error = config_.render.max_alpha_error;
-  job.uvs = network_.uvs();
-  job.wrap = Wrap::kRepeatClamp;
+    job.cameras.push_back(PinholeIn(camera, size));
   return job;
 }
 

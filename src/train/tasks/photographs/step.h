@@ -3,7 +3,6 @@
 // losses of CMR and DIB-R -> gradients.
 #pragma once
 
-#include "scene/topology.h"
 #include "train/losses/cotangent_laplacian.h"
 #include "train/ops/render_op.h"
 #include "train/run/step_values.h"

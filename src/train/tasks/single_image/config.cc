@@ -7,31 +7,25 @@ namespace tilegrad::train {
 namespace {
 
 ConfigFields FieldsOf(NetworkConfig* c) {
-  return {
-      {"network.channels", &c->channels, 1, 4096, "of the first convolution; then 2x and 4x"},
-      {"network.blocks", &c->blocks, 0, 16,
-       "residual blocks after the second and after the third convolution"},
-      {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
-      {"network.hidden1", &c->hidden1, 1, 65536, "width of each decoder's first layer"},
-      {"network.hidden2", &c->hidden2, 1, 65536, "width of each decoder's second layer"},
-      {"network.template_level", &c->shape.level, 0, 6,
-       "subdivisions of the icosahedron; 3: 642 vertices"},
-      {"network.template_radius", &c->shape.radius, 1e-3, 10, "world units"},
-      {"network.smoothing", &c->shape.smoothing, 0, 64,
-       "rounds of diffusion over the template that offsets go through"},
-      {"network.symmetric", &c->shape.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
-      {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
-      {"network.fc_deviation", &c->fc_deviation, 0, 10,
-       "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
-      {"network.output_deviation", &c->output_deviation, 0, 10,
-       "the decoders' last weights start as N(0, this^2)"},
-      {"network.color_bias", &c->color_bias, -1, 2,
-       "what vertex colours start at, without picture_colors"},
-      {"network.picture_colors", &c->picture_colors, 0, 1,
-       "vertices look up their colours in the picture"},
-      {"network.n3mr_vertices", &c->shape.n3mr_vertices, 0, 1,
-       "N3MR's sigmoids and centroid instead of offsets"},
-  };
+  return Joined(
+      {{{"network.channels", &c->channels, 1, 4096, "of the first convolution; then 2x and 4x"},
+        {"network.blocks", &c->blocks, 0, 16,
+         "residual blocks after the second and after the third convolution"},
+        {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
+        {"network.hidden1", &c->hidden1, 1, 65536, "width of each decoder's first layer"},
+        {"network.hidden2", &c->hidden2, 1, 65536, "width of each decoder's second layer"}},
+       FieldsOf(&c->sphere),
+       {{"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
+        {"network.fc_deviation", &c->fc_deviation, 0, 10,
+         "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
+        {"network.output_deviation", &c->output_deviation, 0, 10,
+         "the decoders' last weights start as N(0, this^2)"},
+        {"network.color_bias", &c->color_bias, -1, 2,
+         "what vertex colours start at, without picture_colors"},
+        {"network.picture_colors", &c->picture_colors, 0, 1,
+         "vertices look up their colours in the picture"},
+        {"network.n3mr_vertices", &c->sphere.n3mr_vertices, 0, 1,
+         "N3MR's sigmoids and centroid instead of offsets"}}});
 }
 
 ConfigFields ScheduleFields(SingleImageConfig* c) {
@@ -46,7 +40,7 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
 }  // namespace
 
 Status CheckConfig(const SingleImageConfig& config) {
-  const TemplateConfig& n = config.network.shape;
+  const SphereConfig& n = config.network.sphere;
   if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
     return InvalidArgument(
         "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
@@ -56,12 +50,9 @@ Status CheckConfig(const SingleImageConfig& config) {
 }
 
 ConfigFields FieldsOf(SingleImageConfig* c) {
-  ConfigFields fields;
-  for (const ConfigFields& more :
-       {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render), FieldsOf(&c->optimizer),
-        ScheduleFields(c), FieldsOf(&c->rivals), FieldsOf(&c->stream)})
-    fields.insert(fields.end(), more.begin(), more.end());
-  return fields;
+  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render),
+                 FieldsOf(&c->optimizer), ScheduleFields(c), FieldsOf(&c->rivals),
+                 FieldsOf(&c->stream)});
 }
 
 }  // namespace tilegrad::train

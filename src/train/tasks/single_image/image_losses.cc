@@ -1,51 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/single_image/image_losses.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "nn/nn.h"
 #include "train/losses/color_l1.h"
 #include "train/tasks/equation14.h"
 
 namespace tilegrad::train {
 
-double SharpnessAt(const SingleImageConfig& config, std::int64_t step) {
-  return SharpnessAt(config.render, config.schedule.steps, step);
-}
-
-ImageLosses::ImageLosses(nn::Context& context, const SingleImageConfig& config, const Mesh& sphere,
-                         int image_size)
+ImageLosses::ImageLosses(nn::Context& context, const SingleImageConfig& config,
+                         const SphereModel& sphere, int image_size)
     : config_(config),
       image_size_(image_size),
-      faces_(sphere.faces),
-      topology_(BuildTopology(sphere.faces, sphere.positions.size())),
+      sphere_(sphere),
       renderer_(context.workers()),
       rival_(RivalOptions(config.render.rule, config.rivals).value()),
       rival_renderer_(context.workers()) {}
-
-RenderOptions ImageLosses::OptionsAt(std::int64_t step) const {
-  RenderOptions options;
-  options.width = options.height = image_size_;
-  options.delta = 1 / SharpnessAt(config_, step);
-  options.max_alpha_error = config_.render.max_alpha_error;
-  return options;
-}
 
 bool ImageLosses::HasColor() const {
   return !rival_ || (rival_->rule == rivals::Rule::kSoftRas ? config_.rivals.softras_color
                                                             : config_.rivals.n3mr_color);
 }
 
+RenderedImages ImageLosses::DrawOurs(const PredictedMeshes& meshes, const BatchTensors& batch,
+                                     std::int64_t step) {
+  const double sharpness = SharpnessAt(config_.render, config_.schedule.steps, step);
+  RenderJob job = sphere_.Job(OptionsOf(config_.render, sharpness, image_size_));
+  job.cameras = batch.cameras;
+  job.views =
+      static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
+  return RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
+                      std::move(job));
+}
+
 RenderedImages ImageLosses::Draw(const PredictedMeshes& meshes, const BatchTensors& batch,
                                  std::int64_t step) {
-  if (!rival_) {
-    const int views =
-        static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
-    return RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
-                        {faces(), batch.cameras, views, OptionsAt(step)});
-  }
-  RivalJob job{faces(), batch.cameras, image_size_, *rival_};
+  if (!rival_) return DrawOurs(meshes, batch, step);
+  RivalJob job{sphere_.faces(), batch.cameras, image_size_, *rival_};
   job.options.softras.sigma = SoftRasSigmaAt(
       config_.rivals, static_cast<double>(step) / static_cast<double>(config_.schedule.steps));
   return RenderRival(rival_renderer_, meshes.positions, HasColor() ? meshes.colors : nn::Var(),
@@ -59,7 +49,7 @@ nn::Var ImageLosses::Total(const PredictedMeshes& meshes, const BatchTensors& ba
   LossSum sum(values);
   AddIou(w.iou, images.alpha, batch.truth_alpha, &sum);
   if (HasColor()) AddColor(w.color, ColorL1Loss(images.colors, batch.truth_colors), &sum);
-  AddRegularizers(w, {meshes.positions, meshes.movement, faces_, topology_}, &sum);
+  AddRegularizers(w, {sphere_, meshes.positions, meshes.movement}, &sum);
   return sum.total();
 }
 

@@ -4,7 +4,6 @@
 
 #include <optional>
 
-#include "scene/topology.h"
 #include "train/models/mesh_network.h"
 #include "train/ops/render_op.h"
 #include "train/ops/rival_op.h"
@@ -14,14 +13,11 @@
 
 namespace tilegrad::train {
 
-// 1/delta of a step: it follows a schedule of the configuration.
-double SharpnessAt(const SingleImageConfig& config, std::int64_t step);
-
 class ImageLosses {
  public:
-  // Of meshes with the faces of `sphere`. The words of config.render and config.rivals are known
-  // (RivalOptions).
-  ImageLosses(nn::Context& context, const SingleImageConfig& config, const Mesh& sphere,
+  // Of deformed copies of `sphere`, which outlives it. The words of config.render and config.rivals
+  // are known (RivalOptions).
+  ImageLosses(nn::Context& context, const SingleImageConfig& config, const SphereModel& sphere,
               int image_size);
 
   // On the tape; `values` gets the sum and its terms.
@@ -29,8 +25,9 @@ class ImageLosses {
                 StepValues* values);
 
   SceneRenderer& renderer() { return renderer_; }
-  RenderOptions OptionsAt(std::int64_t step) const;
-  std::span<const std::int32_t> faces() const { return {faces_[0].data(), 3 * faces_.size()}; }
+  // By our renderer, whoever trains.
+  RenderedImages DrawOurs(const PredictedMeshes& meshes, const BatchTensors& batch,
+                          std::int64_t step);
 
  private:
   // Whether the rule draws colours, which the colour loss needs.
@@ -40,8 +37,7 @@ class ImageLosses {
 
   SingleImageConfig config_;
   int image_size_;
-  std::vector<Face> faces_;
-  Topology topology_;
+  const SphereModel& sphere_;
   SceneRenderer renderer_;
   std::optional<rivals::Options> rival_;  // instead of ours
   RivalRenderer rival_renderer_;

@@ -16,7 +16,7 @@ class SingleImageModel : public Model {
       : context_(context),
         image_size_(image_size),
         network_(context, config, image_size, /*seed=*/0),
-        template_(network_.template_mesh()) {}
+        template_(network_.sphere().mesh()) {}
 
   Status Load(const std::vector<nn::NamedTensor>& state) {
     TILEGRAD_TRY(context_.TakeStatus());

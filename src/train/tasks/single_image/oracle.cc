@@ -45,15 +45,15 @@ class TemplateFitter {
       : config_(config),
         info_(info),
         context_(workers),
-        shape_(context_, config.network.shape),
-        losses_(context_, config, shape_.mesh(), info.image_size) {}
+        shape_(context_, config.network.sphere),
+        losses_(context_, config, shape_, info.image_size) {}
   Result<Mesh> Fit(const ModelData& data);
 
  private:
   PredictedMeshes MeshesOf(const Unknowns& x) const {
     PredictedMeshes meshes;
     meshes.movement = shape_.Movement(x.raw);
-    meshes.positions = shape_.Positions(meshes.movement);
+    meshes.positions = NormalizeMeshes(meshes.movement + shape_.Positions());
     meshes.colors = x.colors;
     return meshes;
   }
@@ -63,7 +63,7 @@ class TemplateFitter {
   SingleImageConfig config_;
   DatasetInfo info_;
   nn::Context context_;
-  DeformableTemplate shape_;
+  SphereModel shape_;
   ImageLosses losses_;
 };
 

@@ -27,9 +27,7 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
   const PredictedMeshes meshes =
       step.network().Forward(nn::Constant(context, batch.input), nn::Mode::kEval);
   const int views = static_cast<int>(samples[0].views.size());
-  const RenderedImages images = RenderScenes(
-      step.losses().renderer(), {.positions = meshes.positions, .colors = meshes.colors},
-      {step.losses().faces(), batch.cameras, views, step.losses().OptionsAt(at_step)});
+  const RenderedImages images = step.losses().DrawOurs(meshes, batch, at_step);
   TILEGRAD_TRY(context.TakeStatus());
   const std::size_t plane =
       static_cast<std::size_t>(store.size) * static_cast<std::size_t>(store.size);

@@ -11,7 +11,7 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
       network_(context, config.network, image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
-      losses_(context, config, network_.template_mesh(), image_size) {}
+      losses_(context, config, network_.sphere(), image_size) {}
 
 nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, StepValues* values) {
   const PredictedMeshes meshes =

@@ -12,7 +12,7 @@ ConfigFields FieldsOf(TextureNetworkConfig* c) {
        {{"network.hidden", &c->hidden, 1, 65536, "width of the head of vertices"},
         {"network.light_width", &c->light_width, 1, 65536,
          "of the six layers of the head of light"}},
-       FieldsOf(SphereKeys{&c->template_level, &c->smoothing, &c->template_radius, &c->symmetric}),
+       FieldsOf(&c->sphere),
        {{"network.normalize", &c->normalize, 0, 1,
          "centre and scale every shape; else it learns its size and place"},
         {"network.symmetric_texture", &c->symmetric_texture, 0, 1, "and so is every texture"},

@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/models/mesh_network.h"
 #include "train/models/textured_mesh.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/step.h"
@@ -20,7 +19,7 @@ class LoadedModel : public TexturedModel {
         config_(config),
         image_size_(image_size),
         network_(context, NetworkOf(config), LightHeadOf(config.light), image_size, /*seed=*/0),
-        template_(network_.template_mesh()) {}
+        template_(network_.sphere().mesh()) {}
 
   Status Load(const std::vector<nn::NamedTensor>& state) {
     TILEGRAD_TRY(context_.TakeStatus());
@@ -70,9 +69,8 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
   TILEGRAD_TRY(context.TakeStatus());
   std::vector<PredictedObject> objects;
   for (std::size_t i = 0; i < count; ++i) {
-    Mesh mesh =
-        DeformedMesh({network.template_mesh(), network.corner_uvs(), network.texture_size()},
-                     ItemOf(predicted.positions, i), ItemOf(predicted.textures, i));
+    Mesh mesh = DeformedMesh({network.sphere(), network.texture_size()},
+                             ItemOf(predicted.positions, i), ItemOf(predicted.textures, i));
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
     objects.push_back({std::move(mesh), LightOf(predicted, i), {}});

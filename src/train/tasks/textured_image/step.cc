@@ -68,20 +68,15 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
       network_(context, NetworkOf(config), LightHeadOf(config.light), image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
-      topology_(
-          BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
       renderer_(context.workers()),
       light_targets_(context, config.light),
       rival_renderer_(context.workers()) {}
 
 RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
-  const auto& faces = network_.template_mesh().faces;
-  RenderJob job{.faces = {faces[0].data(), 3 * faces.size()}, .cameras = batch.cameras, .views = 2};
-  job.options.width = job.options.height = image_size_;
-  job.options.delta = 1 / SharpnessAt(config_.render, config_.schedule.steps, step);
-  job.options.max_alpha_error = config_.render.max_alpha_error;
-  job.uvs = network_.uvs();
-  job.wrap = Wrap::kRepeatClamp;
+  const double sharpness = SharpnessAt(config_.render, config_.schedule.steps, step);
+  RenderJob job = network_.sphere().Job(OptionsOf(config_.render, sharpness, image_size_));
+  job.cameras = batch.cameras;
+  job.views = kViewsOfObject;
   job.shading = {.lighting = LightingOf(config_.light), .two_sided = true, .clamp = true};
   job.surface = SurfaceUnder(config_.light);
   return job;
@@ -91,7 +86,6 @@ RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) con
 // own.
 RenderedImages TexturedStep::DrawN3mr(const PredictedObjects& objects, const nn::Var& directions,
                                       const TexturedBatch& batch) {
-  const auto& faces = network_.template_mesh().faces;
   std::vector<std::int32_t> of_image;
   for (std::size_t n = 0; n < batch.cameras.size(); ++n)
     of_image.push_back(static_cast<std::int32_t>(n / kViewsOfObject));
@@ -99,8 +93,9 @@ RenderedImages TexturedStep::DrawN3mr(const PredictedObjects& objects, const nn:
   const nn::Var positions = nn::Gather(objects.positions, 0, meshes);
   nn::Var cubes = nn::Gather(network_.cubes().Cubes(objects.textures), 0, meshes);
   if (directions.valid())
-    cubes = cubes * FaceLight(positions, faces, directions, config_.light.ambient);
-  RivalJob job{.faces = {faces[0].data(), 3 * faces.size()},
+    cubes = cubes *
+            FaceLight(positions, network_.sphere().mesh().faces, directions, config_.light.ambient);
+  RivalJob job{.faces = network_.sphere().faces(),
                .cameras = batch.cameras,
                .size = image_size_,
                .options = {.rule = rivals::Rule::kN3mr}};
@@ -204,9 +199,7 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   LossSum sum(values);
   AddIou(config_.loss.iou, renders.images.alpha, batch.truth_alpha, &sum);
   AddColor(colored ? config_.loss.color : 0, ColorLoss(renders.images, batch, step), &sum);
-  AddRegularizers(config_.loss,
-                  {objects.positions, objects.movement, network_.template_mesh().faces, topology_},
-                  &sum);
+  AddRegularizers(config_.loss, {network_.sphere(), objects.positions, objects.movement}, &sum);
   if (objects.pose.valid()) {
     sum.Add("pose", "Camera (mean square error of its numbers)", config_.color.pose,
             PoseLoss(objects.pose, batch));

@@ -7,7 +7,6 @@
 // light that is predicted from that other one.
 #pragma once
 
-#include "scene/topology.h"
 #include "train/ops/render_op.h"
 #include "train/ops/rival_op.h"
 #include "train/run/step_values.h"
@@ -58,7 +57,6 @@ class TexturedStep {
   int image_size_;
   TextureNetwork network_;
   LearnedWeights weights_;
-  Topology topology_;
   SceneRenderer renderer_;
   LightTargets light_targets_;
   RivalRenderer rival_renderer_;  // if the rule is N3MR's

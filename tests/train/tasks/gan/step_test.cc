@@ -20,9 +20,7 @@ GanConfig TinyConfig() {
   config.network = {.noise = 6,
                     .shape_noise = 4,
                     .hidden = 6,
-                    .template_level = 1,
-                    .template_radius = 0.3,
-                    .smoothing = 1,
+                    .sphere = {.level = 1, .smoothing = 1},
                     .output_deviation = 0.1,
                     .texture_size = 16,
                     .texture_base = 2,
@@ -61,7 +59,7 @@ struct SmallProblem {
     const GeneratedObjects objects = step.Draw(generator, noise, stage, nn::Mode::kTrain);
     if (stage == GanStage::kShape) {
       silhouettes.AddGeneratorLoss(1, objects.cover, &sum);
-      step.AddShapeLosses(objects.shapes, &sum);
+      step.AddShapeLosses(generator, objects.shapes, &sum);
     } else {
       pictures.AddGeneratorLoss(1, objects.colors, &sum);
       maps.AddGeneratorLoss(1, objects.maps, &sum);

@@ -202,8 +202,12 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
 TEST_F(PhotographsTask, GradientsOfAStep) {
   for (const char* texture : {"direct", "flow"}) {
     PhotographsConfig config;
-    config.network = {
-        .base = 4, .most = 8, .levels = 2, .latent = 8, .texture = texture, .template_level = 1};
+    config.network = {.base = 4,
+                      .most = 8,
+                      .levels = 2,
+                      .latent = 8,
+                      .texture = texture,
+                      .sphere = {.level = 1, .radius = 1, .smoothing = 2}};
     config.size = 16, config.render.sharpness = config.render.sharpness_start = 50;
     config.loss.iou = 1, config.camera = "predicted", config.schedule.steps = 10;
     const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
@@ -263,7 +267,7 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
                              .most = 8,
                              .levels = 2,
                              .latent = 8,
-                             .template_level = 2,
+                             .sphere = {.level = 2, .radius = 1, .smoothing = 2},
                              .output_deviation = 0.5},
                             {shape, 15}, 16, 1);
   const nn::Var mean = network.MeanShape();

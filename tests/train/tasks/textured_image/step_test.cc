@@ -25,8 +25,7 @@ TexturedImageConfig TinyConfig(const std::string& light) {
                     .latent = 6,
                     .hidden = 5,
                     .light_width = 4,
-                    .template_level = 1,
-                    .smoothing = 1,
+                    .sphere = {.level = 1, .smoothing = 1},
                     .output_deviation = 0.3};
   config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
   config.light.model = light;
@@ -133,7 +132,7 @@ TEST(TexturedStep, GradientsUnderHarmonics) {
 
 TEST(TexturedStep, GradientsWithoutLightAndSkips) {
   TexturedImageConfig config = TinyConfig("none");
-  config.network.skips = false, config.network.symmetric = false;
+  config.network.skips = false, config.network.sphere.symmetric = false;
   ExpectGradientsAgreeWithDifferences(config);
 }
 

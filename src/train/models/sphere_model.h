@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sphere that every prediction is a deformation of, and what a network's numbers do to it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "nn/ops/axis_map.h"
+#include "scene/mesh.h"
+#include "scene/topology.h"
+#include "train/ops/render_op.h"
+
+namespace tilegrad::train {
+
+inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, as the truth
+
+struct SphereConfig {
+  std::int64_t level = 3;      // subdivisions of the icosahedron: 3 gives 642 vertices
+  double radius = 0.3;         // world units
+  std::int64_t smoothing = 4;  // rounds of diffusion over the sphere that offsets go through
+  bool symmetric = true;  // offsets are the mean of themselves and their mirror image at x = 0, so
+                          // every prediction is symmetric there
+  bool n3mr_vertices = false;  // sphere_vertices.h instead of offsets; radius is 1/4, and the two
+                               // keys above do not apply
+};
+
+class SphereModel {
+ public:
+  // `context` outlives it.
+  SphereModel(nn::Context& context, const SphereConfig& config);
+
+  const Mesh& mesh() const { return mesh_; }
+  const Topology& topology() const { return topology_; }
+  std::span<const std::int32_t> faces() const {  // [F, 3]
+    return {mesh_.faces[0].data(), 3 * mesh_.faces.size()};
+  }
+  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }  // [3 F], longitude, latitude
+  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
+  std::int64_t vertices() const { return static_cast<std::int64_t>(mesh_.positions.size()); }
+  // That deform one sphere: three for each vertex and, in N3MR's form, three for all.
+  std::int64_t numbers() const { return 3 * vertices() + (config_.n3mr_vertices ? 3 : 0); }
+
+  // raw [B, numbers()] -> offsets [B, V, 3] from the sphere; those of 0 are 0.
+  nn::Var Movement(const nn::Var& raw) const;
+  nn::Var Positions() const;  // of the sphere, [V, 3]
+
+  // To draw deformed spheres, with textures if they have any: faces, uvs and how they wrap. Refers
+  // to the model.
+  RenderJob Job(const RenderOptions& options) const {
+    return {.faces = faces(),
+            .cameras = {},
+            .options = options,
+            .uvs = uvs(),
+            .wrap = Wrap::kRepeatClamp};
+  }
+
+ private:
+  nn::Var Mapped(const nn::Var& raw) const;
+  nn::Var N3mrMovement(const nn::Var& raw) const;
+
+  nn::Context& context_;
+  SphereConfig config_;
+  Mesh mesh_;
+  Topology topology_;
+  std::vector<glm::vec2> uvs_;
+  nn::Tensor positions_;    // [V, 3]
+  nn::Tensor unit_sphere_;  // [V, 3] at radius 1; n3mr_vertices
+  nn::AxisMap diffusion_;   // one round; without n3mr_vertices
+  nn::AxisMap symmetry_;    // of [3 V] offsets
+};
+
+// positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per
+// mesh of [B, V, 3]. The gradient flows through the extremes. A mesh without extent stays finite.
+nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent = kPredictionHalfExtent);
+
+// Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
+// is at 1/2 - u (scene/sphere_uv.h): column i has W/2 - 1 - i.
+nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width);
+
+}  // namespace tilegrad::train
