@@ -73,7 +73,7 @@ TEST(MeshNetwork, SmoothingSpreadsOffsets) {
     config.sphere.smoothing = rounds;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
-    const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
+    const Prediction out = network.Forward(images, nn::Mode::kEval);
     const auto& mesh = network.sphere().mesh();
     const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
     double differences = 0, squares = 0;
@@ -104,7 +104,7 @@ TEST(MeshNetwork, SymmetricPredictionsAre) {
     config.sphere.smoothing = 2, config.sphere.symmetric = true, config.fc_norm = fc_norm;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
-    const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
+    const Prediction out = network.Forward(images, nn::Mode::kEval);
     const auto& sphere = network.sphere().mesh().positions;
     const float* const p = out.positions.value().data<float>();
     double moved = 0;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/models/mesh_network.h"
 
-#include <algorithm>
-
 #include "base/error.h"
 #include "nn/networks/blocks.h"
 #include "nn/nn.h"
@@ -111,27 +109,13 @@ nn::Var MeshNetwork::Colors(const nn::Var& code, const nn::Var& images, nn::Mode
   return nn::SampleColors(images.value(), nn::Reshape(raw, {batch, vertices, 4}));
 }
 
-PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
+Prediction MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const nn::Var code = all_.encoder.Forward(images, mode);
-  PredictedMeshes out;
+  Prediction out;
   out.movement = sphere_.Movement(all_.shape.Forward(code, mode));
   out.positions = NormalizeMeshes(out.movement + sphere_.Positions());
   out.colors = Colors(code, images, mode);
   return out;
-}
-
-Mesh MeshOf(const std::vector<Face>& faces, const PredictedMeshes& meshes, std::size_t i) {
-  const auto unit = [](float x) { return std::clamp(x, 0.0f, 1.0f); };
-  const auto vertices = static_cast<std::size_t>(meshes.positions.shape()[1]);
-  const float* p = meshes.positions.value().data<float>() + 3 * vertices * i;
-  const float* c = meshes.colors.value().data<float>() + 3 * vertices * i;
-  Mesh mesh;
-  mesh.faces = faces;
-  for (std::size_t v = 0; v < vertices; ++v, p += 3, c += 3) {
-    mesh.positions.emplace_back(p[0], p[1], p[2]);
-    mesh.colors.emplace_back(unit(c[0]), unit(c[1]), unit(c[2]), 1.0f);
-  }
-  return mesh;
 }
 
 }  // namespace tilegrad::train

@@ -5,8 +5,7 @@
 #include <memory>
 
 #include "nn/layers.h"
-#include "scene/mesh.h"
-#include "train/models/sphere_model.h"
+#include "train/models/prediction.h"
 
 namespace tilegrad::train {
 
@@ -31,26 +30,15 @@ struct NetworkConfig {
 // At 64 x 64 with NetworkConfig's defaults.
 inline constexpr std::int64_t kPaperParameters = 34'115'916;
 
-// What the network says of a batch of B images.
-struct PredictedMeshes {
-  // [B, V, 3] offsets from the template, before normalisation: what the Laplacian sees.
-  nn::Var movement;
-  // [B, V, 3] template + movement, bounding box centred, largest half-extent 0.45.
-  nn::Var positions;
-  nn::Var colors;  // [B, V, 3] linear, not clamped
-};
-
-// Number i of a batch, with `faces` and with colours brought into [0, 1].
-Mesh MeshOf(const std::vector<Face>& faces, const PredictedMeshes& meshes, std::size_t i);
-
 class MeshNetwork {
  public:
   // `image_size` in pixels, a multiple of 8. The seed decides every weight.
   MeshNetwork(nn::Context& context, const NetworkConfig& config, int image_size,
               std::uint64_t seed);
 
-  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black.
-  PredictedMeshes Forward(const nn::Var& images, nn::Mode mode);
+  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Movement, colours, and positions
+  // whose bounding box is centred, with the largest half-extent 0.45.
+  Prediction Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
   const SphereModel& sphere() const { return sphere_; }

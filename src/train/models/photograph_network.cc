@@ -164,7 +164,7 @@ nn::Var PhotographNetwork::Keypoints(const nn::Var& positions) const {
 }
 
 void PhotographNetwork::Texture(const PictureCode::Encoded& encoded, nn::Mode mode,
-                                PredictedPhotographs* out) {
+                                Prediction* out) {
   nn::Var map = all_.code->DecodeMap(encoded, mode);
   if (config_.symmetric_texture) map = nn::MapAxis(map, 3, mirror_);
   if (config_.texture == "flow") {
@@ -174,8 +174,8 @@ void PhotographNetwork::Texture(const PictureCode::Encoded& encoded, nn::Mode mo
   out->textures = nn::Permute(map, {0, 2, 3, 1});
 }
 
-PredictedPhotographs PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
-  PredictedPhotographs out;
+Prediction PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
+  Prediction out;
   const PictureCode::Encoded encoded = all_.code->Encode(pictures, mode);
   if (!encoded.latent.valid()) return out;
   out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));

@@ -13,7 +13,7 @@
 #include "nn/ops/axis_map.h"
 #include "scene/mesh.h"
 #include "train/models/picture_code.h"
-#include "train/models/sphere_model.h"
+#include "train/models/prediction.h"
 
 namespace tilegrad::train {
 
@@ -39,36 +39,26 @@ struct PhotographStart {
       0;  // keypoints.size(), or, of a network that is to be loaded, as many as it has
 };
 
-// Of B photographs of V vertices and K keypoints; the world is that of the cameras.
-struct PredictedPhotographs {
-  nn::Var movement;   // [B, V, 3] from the mean shape, symmetric
-  nn::Var positions;  // [B, V, 3]
-  nn::Var textures;   // [B, h, w, 3] in [0, 1]
-  nn::Var flow;       // [B, 2, h, w] in [-1, 1] (nn/ops/sample_pictures.h), of "flow"
-  nn::Var keypoints;  // [B, K, 3]; none without keypoints
-  nn::Var cameras;    // [B, 7] (ops/weak_cameras.h), quaternions unit
-};
-
 class PhotographNetwork {
  public:
   // `image_size`: pixels, a multiple of 2^levels. The seed decides every weight.
   PhotographNetwork(nn::Context& context, const PhotographNetworkConfig& config,
                     const PhotographStart& start, int image_size, std::uint64_t seed);
 
-  // pictures: [B, 3, size, size] in [0, 1].
-  PredictedPhotographs Forward(const nn::Var& pictures, nn::Mode mode);
+  // pictures: [B, 3, size, size] in [0, 1]. Movement from the mean shape, symmetric, positions,
+  // textures, with "flow" that, keypoints if it has any, and cameras, whose world it is.
+  Prediction Forward(const nn::Var& pictures, nn::Mode mode);
   nn::Var MeanShape() const;        // [1, V, 3]
   nn::Var KeypointWeights() const;  // [K, V], rows sum to 1; invalid without keypoints
   nn::Var Keypoints(const nn::Var& positions) const;  // [B, V, 3] -> [B, K, 3]
 
   nn::Module& module() { return all_; }
   const SphereModel& sphere() const { return sphere_; }
-  int texture_size() const { return texture_size_; }
 
  private:
   void BuildHeads(Rng& rng);
   void StartShape(const PhotographStart& start);
-  void Texture(const PictureCode::Encoded& encoded, nn::Mode mode, PredictedPhotographs* out);
+  void Texture(const PictureCode::Encoded& encoded, nn::Mode mode, Prediction* out);
 
   nn::Context& context_;
   PhotographNetworkConfig config_;

@@ -128,12 +128,11 @@ void ShapeTextureGenerator::BuildTexture(Rng& rng) {
   texture_.mean = context_.Zeros({1, 3, rows, map_width()});
 }
 
-ShapeTextureGenerator::Shapes ShapeTextureGenerator::MakeShapes(const nn::Var& noise,
-                                                                nn::Mode mode) {
+Prediction ShapeTextureGenerator::MakeShapes(const nn::Var& noise, nn::Mode mode) {
   const nn::Var own = nn::Slice(noise, 1, 0, config_.shape_noise);
   const nn::Var movement = sphere_.Movement(shape_.Forward(own, mode));
   const nn::Var start = nn::Constant(context_, shape_.scale) * sphere_.Positions();
-  return {movement, movement + start};
+  return {.movement = movement, .positions = movement + start};
 }
 
 nn::Var ShapeTextureGenerator::MakeMaps(const nn::Var& noise, nn::Mode mode) {

@@ -9,7 +9,7 @@
 
 #include "nn/layers.h"
 #include "scene/mesh.h"
-#include "train/models/sphere_model.h"
+#include "train/models/prediction.h"
 
 namespace tilegrad::train {
 
@@ -33,11 +33,8 @@ class ShapeTextureGenerator {
   // CheckGenerator(config) is ok. The seed decides every weight.
   ShapeTextureGenerator(nn::Context& context, const GeneratorConfig& config, std::uint64_t seed);
 
-  struct Shapes {
-    nn::Var movement, positions;  // [B, V, 3]: the offsets, and the ellipsoid moved by them
-  };
-  // noise: [B, noise]
-  Shapes MakeShapes(const nn::Var& noise, nn::Mode mode);
+  // noise: [B, noise]. The offsets, and the ellipsoid moved by them.
+  Prediction MakeShapes(const nn::Var& noise, nn::Mode mode);
   // [B, 3, texture_size, map_width()] in [0, 1], by the sphere's longitude and latitude: what is
   // learned of a map. With `symmetric_texture` the half of it around u = 1/2, where x > 0.
   nn::Var MakeMaps(const nn::Var& noise, nn::Mode mode);

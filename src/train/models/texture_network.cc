@@ -123,8 +123,8 @@ void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
   all_.paint.emplace(context_, sphere_.mesh(), painter, rng);
 }
 
-nn::Var TextureNetwork::Texture(const PictureCode::Encoded& encoded,
-                                const PredictedObjects& objects, nn::Mode mode) {
+nn::Var TextureNetwork::Texture(const PictureCode::Encoded& encoded, const Prediction& objects,
+                                nn::Mode mode) {
   nn::Var image = all_.code->DecodeMap(encoded, mode);
   if (all_.paint) {
     const nn::Tensor light = objects.directions.valid() ? objects.directions.value() : nn::Tensor();
@@ -137,8 +137,7 @@ nn::Var TextureNetwork::Texture(const PictureCode::Encoded& encoded,
   return nn::Permute(image, {0, 2, 3, 1});
 }
 
-void TextureNetwork::Light(const PictureCode::Encoded& encoded, nn::Mode mode,
-                           PredictedObjects* out) {
+void TextureNetwork::Light(const PictureCode::Encoded& encoded, nn::Mode mode, Prediction* out) {
   if (light_.lighting == Lighting::kNone) return;
   nn::Var from = encoded.latent;
   if (all_.paint) {
@@ -162,8 +161,8 @@ void TextureNetwork::Light(const PictureCode::Encoded& encoded, nn::Mode mode,
   out->shininess = nn::Exp((high - low) * share + low);
 }
 
-PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
-  PredictedObjects out;
+Prediction TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
+  Prediction out;
   const PictureCode::Encoded encoded = all_.code->Encode(images, mode);
   if (!encoded.latent.valid()) return out;
   out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));

@@ -12,7 +12,7 @@
 #include "tilegrad/scene.h"
 #include "train/models/face_cubes.h"
 #include "train/models/picture_code.h"
-#include "train/models/sphere_model.h"
+#include "train/models/prediction.h"
 #include "train/models/texture_painter.h"
 
 namespace tilegrad::train {
@@ -47,38 +47,26 @@ struct LightHeadShape {
   bool facing = true;
 };
 
-// What the network says of a batch of B images. Light is in the axes of each image's camera.
-struct PredictedObjects {
-  nn::Var movement;    // [B, V, 3] offsets from the template
-  nn::Var positions;   // [B, V, 3] template + movement; with `normalize` then box centred, largest
-                       // half-extent 0.45
-  nn::Var textures;    // [B, h, w, 3] in [0, 1], by the sphere's longitude and latitude
-  nn::Var directions;  // [B, 3] unit; Lambert and Phong
-  nn::Var shininess;   // [B]; Phong
-  nn::Var sh;          // [B, 9]; harmonics
-  nn::Var pose;        // [B, 10] Pose of the picture's camera; with `lookup`
-};
-
 class TextureNetwork {
  public:
   // `image_size` in pixels, a multiple of 2^levels (CheckImageSize). The seed decides every weight.
   TextureNetwork(nn::Context& context, const TextureNetworkConfig& config,
                  const LightHeadShape& light, int image_size, std::uint64_t seed);
 
-  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black.
-  PredictedObjects Forward(const nn::Var& images, nn::Mode mode);
+  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Movement, positions (with
+  // `normalize` box centred, largest half-extent 0.45), textures, light, and with `lookup` the
+  // pose.
+  Prediction Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
   const SphereModel& sphere() const { return sphere_; }
-  int texture_size() const { return texture_size_; }
   const FaceCubes& cubes() const { return cubes_; }  // with TextureNetworkConfig::cubes
 
  private:
   void BuildHeads(Rng& rng);
   void BuildLookup(int image_size, Rng& rng);
-  nn::Var Texture(const PictureCode::Encoded& encoded, const PredictedObjects& objects,
-                  nn::Mode mode);
-  void Light(const PictureCode::Encoded& encoded, nn::Mode mode, PredictedObjects* out);
+  nn::Var Texture(const PictureCode::Encoded& encoded, const Prediction& objects, nn::Mode mode);
+  void Light(const PictureCode::Encoded& encoded, nn::Mode mode, Prediction* out);
 
   nn::Context& context_;
   TextureNetworkConfig config_;

@@ -7,7 +7,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
-#include "train/models/textured_mesh.h"
 #include "train/tasks/gan/critic.h"
 
 namespace tilegrad::train {
@@ -16,28 +15,19 @@ namespace {
 const std::string kShape = "best.shape.", kTexture = "best.texture.";
 constexpr std::uint64_t kCodeStream = 0x73616d706c65;
 
-void MakeGrey(Mesh* mesh) {
-  mesh->textures.clear(), mesh->corner_uvs.clear();
-  mesh->materials = {{.name = "shape", .base_color = {0.7f, 0.7f, 0.7f, 1.0f}}};
-}
-
 }  // namespace
 
 Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGenerator& generator,
                                          const nn::Tensor& codes, bool textured) {
   const nn::NoGrad off(context);
   const nn::Var code = nn::Constant(context, codes);
-  const nn::Var positions = generator.MakeShapes(code, nn::Mode::kEval).positions;
-  const nn::Var textures = generator.Textures(generator.MakeMaps(code, nn::Mode::kEval));
+  Prediction made = generator.MakeShapes(code, nn::Mode::kEval);
+  if (textured) made.textures = generator.Textures(generator.MakeMaps(code, nn::Mode::kEval));
   TILEGRAD_TRY(context.TakeStatus());
-  const TexturedTemplate sphere{generator.sphere(),
-                                static_cast<int>(generator.config().texture_size)};
   std::vector<Mesh> meshes;
   for (std::size_t i = 0; i < static_cast<std::size_t>(codes.shape()[0]); ++i) {
-    Mesh mesh = DeformedMesh(sphere, ItemOf(positions, i), ItemOf(textures, i));
-    if (!textured) MakeGrey(&mesh);
-    if (const Status valid = Validate(mesh); !valid.ok())
-      return InternalError("the generated mesh is broken: {}", valid.message());
+    TILEGRAD_ASSIGN(Mesh mesh, MeshOf(generator.sphere(), made, i));
+    if (!textured) mesh.materials = {{.name = "shape", .base_color = {0.7f, 0.7f, 0.7f, 1.0f}}};
     mesh.normals = SmoothNormals(mesh);
     meshes.push_back(std::move(mesh));
   }

@@ -81,8 +81,8 @@ ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& no
       Averaged(Render(generator.sphere(), {.positions = positions}).alpha, config_.views).value()};
 }
 
-void GanStep::AddShapeLosses(const ShapeTextureGenerator& generator,
-                             const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) const {
+void GanStep::AddShapeLosses(const ShapeTextureGenerator& generator, const Prediction& shapes,
+                             LossSum* sum) const {
   AddRegularizers(config_.loss, {generator.sphere(), shapes.positions, shapes.movement}, sum);
 }
 

@@ -18,7 +18,7 @@ enum class GanStage { kShape, kTexture };
 
 // Of a batch of B objects, what critics look at.
 struct GeneratedObjects {
-  ShapeTextureGenerator::Shapes shapes;
+  Prediction shapes;
   nn::Var maps;    // of the second stage
   nn::Var cover;   // [B, V, size, size]; of the first stage
   nn::Var colors;  // [B, 3 V, size, size], RGB over black; of the second one
@@ -40,8 +40,8 @@ class GanStep {
   ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                    Texture texture = Texture::kOwn);
 
-  void AddShapeLosses(const ShapeTextureGenerator& generator,
-                      const ShapeTextureGenerator::Shapes& shapes, LossSum* sum) const;
+  void AddShapeLosses(const ShapeTextureGenerator& generator, const Prediction& shapes,
+                      LossSum* sum) const;
 
  private:
   RenderedImages Render(const SphereModel& sphere, const SceneVars& scenes);

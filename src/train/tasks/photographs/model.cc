@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/models/textured_mesh.h"
 #include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
@@ -126,16 +125,12 @@ Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context
                                                             PhotographNetwork& network,
                                                             const nn::Tensor& pictures) {
   const nn::NoGrad off(context);
-  const PredictedPhotographs all =
-      network.Forward(nn::Constant(context, pictures), nn::Mode::kEval);
+  const Prediction all = network.Forward(nn::Constant(context, pictures), nn::Mode::kEval);
   TILEGRAD_TRY(context.TakeStatus());
   const auto count = static_cast<std::size_t>(pictures.shape()[0]);
   std::vector<PredictedPhotograph> out(count);
   for (std::size_t i = 0; i < count; ++i) {
-    out[i].mesh = DeformedMesh({network.sphere(), network.texture_size()}, ItemOf(all.positions, i),
-                               ItemOf(all.textures, i));
-    if (const Status valid = Validate(out[i].mesh); !valid.ok())
-      return InternalError("the prediction is broken: {}", valid.message());
+    TILEGRAD_ASSIGN(out[i].mesh, MeshOf(network.sphere(), all, i));
     const auto c = ItemOf(all.cameras, i);
     out[i].camera = {c[0], {c[1], c[2]}, {c[3], c[4], c[5], c[6]}};
     if (!all.keypoints.valid()) continue;

@@ -38,16 +38,15 @@ RenderJob PhotographStep::JobAt(const PhotographBatch& batch, std::int64_t step)
   return job;
 }
 
-nn::Var PhotographStep::CamerasOf(const PredictedPhotographs& predicted,
-                                  const PhotographBatch& batch) const {
+nn::Var PhotographStep::CamerasOf(const Prediction& predicted, const PhotographBatch& batch) const {
   return config_.camera == "predicted"
              ? predicted.cameras
              : nn::Constant(context_, CameraRows(context_, batch.cameras));
 }
 
 // Where colours are not to move shapes, they are drawn a second time, of a shape that is fixed.
-RenderedImages PhotographStep::Draw(const PredictedPhotographs& predicted,
-                                    const PhotographBatch& batch, std::int64_t step) {
+RenderedImages PhotographStep::Draw(const Prediction& predicted, const PhotographBatch& batch,
+                                    std::int64_t step) {
   SceneVars scenes{.positions = predicted.positions, .textures = predicted.textures};
   if (config_.camera == "predicted")
     scenes.cameras = PinholeCameras(predicted.cameras, static_cast<int>(config_.size));
@@ -60,7 +59,7 @@ RenderedImages PhotographStep::Draw(const PredictedPhotographs& predicted,
 }
 
 // CMR's: over all keypoints, those that are not visible with an error of 0.
-nn::Var PhotographStep::KeypointLoss(const PredictedPhotographs& predicted,
+nn::Var PhotographStep::KeypointLoss(const Prediction& predicted,
                                      const PhotographBatch& batch) const {
   const nn::Var seen = ProjectPoints(predicted.keypoints, CamerasOf(predicted, batch));
   const nn::Var visible = nn::Constant(context_, batch.visible);
@@ -100,7 +99,7 @@ nn::Var PhotographStep::Entropy() const {
 }
 
 nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, StepValues* values) {
-  const PredictedPhotographs predicted =
+  const Prediction predicted =
       network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
   if (!predicted.positions.valid()) return predicted.positions;
   const RenderedImages images = Draw(predicted, batch, step);

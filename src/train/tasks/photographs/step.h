@@ -26,11 +26,10 @@ class PhotographStep {
   LearnedWeights& weights() { return weights_; }
 
  private:
-  RenderedImages Draw(const PredictedPhotographs& predicted, const PhotographBatch& batch,
-                      std::int64_t step);
+  RenderedImages Draw(const Prediction& predicted, const PhotographBatch& batch, std::int64_t step);
   RenderJob JobAt(const PhotographBatch& batch, std::int64_t step) const;
-  nn::Var CamerasOf(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
-  nn::Var KeypointLoss(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
+  nn::Var CamerasOf(const Prediction& predicted, const PhotographBatch& batch) const;
+  nn::Var KeypointLoss(const Prediction& predicted, const PhotographBatch& batch) const;
   nn::Var Masked(const nn::Var& colors, const PhotographBatch& batch) const;
   nn::Var FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const;
   nn::Var CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const;

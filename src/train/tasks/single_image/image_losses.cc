@@ -21,7 +21,7 @@ bool ImageLosses::HasColor() const {
                                                             : config_.rivals.n3mr_color);
 }
 
-RenderedImages ImageLosses::DrawOurs(const PredictedMeshes& meshes, const BatchTensors& batch,
+RenderedImages ImageLosses::DrawOurs(const Prediction& meshes, const BatchTensors& batch,
                                      std::int64_t step) {
   const double sharpness = SharpnessAt(config_.render, config_.schedule.steps, step);
   RenderJob job = sphere_.Job(OptionsOf(config_.render, sharpness, image_size_));
@@ -32,7 +32,7 @@ RenderedImages ImageLosses::DrawOurs(const PredictedMeshes& meshes, const BatchT
                       std::move(job));
 }
 
-RenderedImages ImageLosses::Draw(const PredictedMeshes& meshes, const BatchTensors& batch,
+RenderedImages ImageLosses::Draw(const Prediction& meshes, const BatchTensors& batch,
                                  std::int64_t step) {
   if (!rival_) return DrawOurs(meshes, batch, step);
   RivalJob job{sphere_.faces(), batch.cameras, image_size_, *rival_};
@@ -42,8 +42,8 @@ RenderedImages ImageLosses::Draw(const PredictedMeshes& meshes, const BatchTenso
                      std::move(job));
 }
 
-nn::Var ImageLosses::Total(const PredictedMeshes& meshes, const BatchTensors& batch,
-                           std::int64_t step, StepValues* values) {
+nn::Var ImageLosses::Total(const Prediction& meshes, const BatchTensors& batch, std::int64_t step,
+                           StepValues* values) {
   const RenderedImages images = Draw(meshes, batch, step);
   const LossConfig& w = config_.loss;
   LossSum sum(values);

@@ -21,19 +21,18 @@ class ImageLosses {
               int image_size);
 
   // On the tape; `values` gets the sum and its terms.
-  nn::Var Total(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step,
+  nn::Var Total(const Prediction& meshes, const BatchTensors& batch, std::int64_t step,
                 StepValues* values);
 
   SceneRenderer& renderer() { return renderer_; }
   // By our renderer, whoever trains.
-  RenderedImages DrawOurs(const PredictedMeshes& meshes, const BatchTensors& batch,
-                          std::int64_t step);
+  RenderedImages DrawOurs(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
  private:
   // Whether the rule draws colours, which the colour loss needs.
   bool HasColor() const;
   // The images that losses look at.
-  RenderedImages Draw(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step);
+  RenderedImages Draw(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
   SingleImageConfig config_;
   int image_size_;

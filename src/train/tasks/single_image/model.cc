@@ -45,13 +45,11 @@ Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vect
       context_.Empty({static_cast<std::int64_t>(count), 4, image_size_, image_size_});
   std::transform(images.begin(), images.end(), input.data<float>(),
                  [](std::uint8_t b) { return static_cast<float>(b) / 255; });
-  const PredictedMeshes predicted =
+  const Prediction predicted =
       network_.Forward(nn::Constant(context_, std::move(input)), nn::Mode::kEval);
   TILEGRAD_TRY(context_.TakeStatus());
   for (std::size_t i = 0; i < count; ++i) {
-    Mesh mesh = MeshOf(template_.faces, predicted, i);
-    if (const Status valid = Validate(mesh); !valid.ok())
-      return InternalError("the prediction is broken: {}", valid.message());
+    TILEGRAD_ASSIGN(Mesh mesh, MeshOf(network_.sphere(), predicted, i));
     meshes->push_back(std::move(mesh));
   }
   return {};

@@ -50,8 +50,8 @@ class TemplateFitter {
   Result<Mesh> Fit(const ModelData& data);
 
  private:
-  PredictedMeshes MeshesOf(const Unknowns& x) const {
-    PredictedMeshes meshes;
+  Prediction MeshesOf(const Unknowns& x) const {
+    Prediction meshes;
     meshes.movement = shape_.Movement(x.raw);
     meshes.positions = NormalizeMeshes(meshes.movement + shape_.Positions());
     meshes.colors = x.colors;
@@ -96,9 +96,9 @@ Result<Mesh> TemplateFitter::Fit(const ModelData& data) {
   for (int step = 0; step < config_.schedule.steps; ++step)
     TILEGRAD_TRY(Step(store, x, step, optimizers));
   const nn::NoGrad off(context_);
-  const PredictedMeshes meshes = MeshesOf(x);
+  const Prediction meshes = MeshesOf(x);
   TILEGRAD_TRY(context_.TakeStatus());
-  return MeshOf(shape_.mesh().faces, meshes, 0);
+  return MeshOf(shape_, meshes, 0);
 }
 
 }  // namespace

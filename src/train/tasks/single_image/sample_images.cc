@@ -24,7 +24,7 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
                             std::span<const Sample> samples, std::int64_t at_step) {
   const nn::NoGrad off(context);
   const BatchTensors batch = GatherBatch(context, store, {samples.begin(), samples.end()});
-  const PredictedMeshes meshes =
+  const Prediction meshes =
       step.network().Forward(nn::Constant(context, batch.input), nn::Mode::kEval);
   const int views = static_cast<int>(samples[0].views.size());
   const RenderedImages images = step.losses().DrawOurs(meshes, batch, at_step);

@@ -14,8 +14,7 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
       losses_(context, config, network_.sphere(), image_size) {}
 
 nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, StepValues* values) {
-  const PredictedMeshes meshes =
-      network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
+  const Prediction meshes = network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
   return losses_.Total(meshes, batch, step, values);
 }
 

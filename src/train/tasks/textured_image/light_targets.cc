@@ -36,7 +36,7 @@ void Write(const FoundLight& found, const TargetRow<T>& row) {
 LightTargets::LightTargets(nn::Context& context, const LightConfig& config)
     : context_(context), search_(config), renderer_(context.workers()) {}
 
-nn::Tensor LightTargets::Find(const PredictedObjects& objects, const TexturedBatch& batch,
+nn::Tensor LightTargets::Find(const Prediction& objects, const TexturedBatch& batch,
                               RenderJob job) {
   job.shading.lighting = Lighting::kNone;
   job.normals = true;

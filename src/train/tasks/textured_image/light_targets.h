@@ -13,7 +13,7 @@
 namespace tilegrad::train {
 
 // What `objects` says of light that LightTargets has targets for: directions or harmonics.
-inline const nn::Var& SaidOf(const PredictedObjects& objects) {
+inline const nn::Var& SaidOf(const Prediction& objects) {
   return objects.sh.valid() ? objects.sh : objects.directions;
 }
 
@@ -25,7 +25,7 @@ class LightTargets {
   // [M, 9]; what `objects` says itself of inputs in which too little is seen. `job` draws the
   // batch; its shading is replaced. An empty tensor where drawing failed, which the context's
   // status then says.
-  nn::Tensor Find(const PredictedObjects& objects, const TexturedBatch& batch, RenderJob job);
+  nn::Tensor Find(const Prediction& objects, const TexturedBatch& batch, RenderJob job);
 
  private:
   nn::Context& context_;

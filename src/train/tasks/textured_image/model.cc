@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/models/textured_mesh.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/step.h"
 
@@ -64,15 +63,12 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
   nn::Tensor input = context.Empty({static_cast<std::int64_t>(count), 4, image_size, image_size});
   std::ranges::transform(images, input.data<float>(),
                          [](std::uint8_t b) { return static_cast<float>(b) / 255; });
-  const PredictedObjects predicted =
+  const Prediction predicted =
       network.Forward(nn::Constant(context, std::move(input)), nn::Mode::kEval);
   TILEGRAD_TRY(context.TakeStatus());
   std::vector<PredictedObject> objects;
   for (std::size_t i = 0; i < count; ++i) {
-    Mesh mesh = DeformedMesh({network.sphere(), network.texture_size()},
-                             ItemOf(predicted.positions, i), ItemOf(predicted.textures, i));
-    if (const Status valid = Validate(mesh); !valid.ok())
-      return InternalError("the prediction is broken: {}", valid.message());
+    TILEGRAD_ASSIGN(Mesh mesh, MeshOf(network.sphere(), predicted, i));
     objects.push_back({std::move(mesh), LightOf(predicted, i), {}});
     if (!predicted.pose.valid()) continue;
     Pose pose;

@@ -47,7 +47,7 @@ double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b
   return std::acos(std::clamp(dot / std::sqrt(aa * bb), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-DrawnLight LightOf(const PredictedObjects& objects, std::size_t row) {
+DrawnLight LightOf(const Prediction& objects, std::size_t row) {
   DrawnLight light;
   ReadRow(objects.directions, row, &light.direction);
   ReadRow(objects.sh, row, &light.sh);
@@ -84,7 +84,7 @@ RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) con
 
 // Colours of faces differ from image to image with their light, so each image has a mesh of its
 // own.
-RenderedImages TexturedStep::DrawN3mr(const PredictedObjects& objects, const nn::Var& directions,
+RenderedImages TexturedStep::DrawN3mr(const Prediction& objects, const nn::Var& directions,
                                       const TexturedBatch& batch) {
   std::vector<std::int32_t> of_image;
   for (std::size_t n = 0; n < batch.cameras.size(); ++n)
@@ -173,14 +173,14 @@ nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) 
   return nn::Mean(nn::Square(pose - nn::Constant(context_, std::move(truth))));
 }
 
-nn::Var TexturedStep::LightLoss(const PredictedObjects& objects, const TexturedBatch& batch) {
+nn::Var TexturedStep::LightLoss(const Prediction& objects, const TexturedBatch& batch) {
   nn::Tensor targets = light_targets_.Find(objects, batch, JobAt(batch, config_.schedule.steps));
   if (targets.empty()) return nn::Invalid({&objects.positions});
   return nn::Mean(nn::Square(SaidOf(objects) - nn::Constant(context_, std::move(targets))));
 }
 
 // Degrees, mean over the inputs.
-double TexturedStep::LightAngle(const PredictedObjects& objects, const TexturedBatch& batch) const {
+double TexturedStep::LightAngle(const Prediction& objects, const TexturedBatch& batch) const {
   const Lighting lighting = LightingOf(config_.light);
   double mean = 0;
   for (std::size_t m = 0; m < batch.views.size(); ++m) {
@@ -193,7 +193,7 @@ double TexturedStep::LightAngle(const PredictedObjects& objects, const TexturedB
 
 nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
                            std::int64_t step, StepValues* values) {
-  const PredictedObjects& objects = renders.objects;
+  const Prediction& objects = renders.objects;
   if (!objects.positions.valid()) return objects.positions;
   const bool colored = ShareOfRun(step) >= config_.color.from;
   LossSum sum(values);

@@ -20,8 +20,8 @@ namespace tilegrad::train {
 
 // What losses, and critics of the images, look at.
 struct TexturedRenders {
-  PredictedObjects objects;  // of the inputs
-  RenderedImages images;     // of TexturedBatch::cameras
+  Prediction objects;     // of the inputs
+  RenderedImages images;  // of TexturedBatch::cameras
 };
 
 class TexturedStep {
@@ -40,14 +40,14 @@ class TexturedStep {
   LearnedWeights& weights() { return weights_; }
 
  private:
-  RenderedImages DrawN3mr(const PredictedObjects& objects, const nn::Var& directions,
+  RenderedImages DrawN3mr(const Prediction& objects, const nn::Var& directions,
                           const TexturedBatch& batch);
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
   double ShareOfRun(std::int64_t step) const;
   nn::Var Covered(const nn::Var& colors, const TexturedBatch& batch) const;
   void AddAdversary(const RenderedImages& images, const TexturedBatch& batch, LossSum* sum) const;
-  double LightAngle(const PredictedObjects& objects, const TexturedBatch& batch) const;
-  nn::Var LightLoss(const PredictedObjects& objects, const TexturedBatch& batch);
+  double LightAngle(const Prediction& objects, const TexturedBatch& batch) const;
+  nn::Var LightLoss(const Prediction& objects, const TexturedBatch& batch);
   nn::Var PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const;
   nn::Var ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
                     std::int64_t step) const;
@@ -66,7 +66,7 @@ class TexturedStep {
 // Degrees between two directions, neither 0.
 double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b);
 // Row `row` of the lights of a batch of predictions.
-DrawnLight LightOf(const PredictedObjects& objects, std::size_t row);
+DrawnLight LightOf(const Prediction& objects, std::size_t row);
 // Of harmonics that of their linear part, else the light's own.
 std::array<float, 3> DirectionOf(const DrawnLight& light, Lighting lighting);
 

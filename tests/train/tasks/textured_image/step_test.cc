@@ -274,7 +274,7 @@ TEST(TextureNetwork, SymmetricTexturesAre) {
   TextureNetworkConfig config = TinyConfig("none").network;
   config.symmetric_texture = true;
   TextureNetwork network(context, config, {.lighting = Lighting::kNone}, kSize, 1);
-  const PredictedObjects out = network.Forward(
+  const Prediction out = network.Forward(
       nn::Constant(context, context.Full({1, 4, kSize, kSize}, 0.5)), nn::Mode::kEval);
   ASSERT_EQ(out.textures.shape(), (nn::Shape{1, 32, 32, 3}));
   const auto texel = [&](std::size_t row, std::size_t column) {
@@ -300,7 +300,7 @@ TEST(TextureNetwork, LightsFaceTheCamera) {
     for (nn::NamedVar& p : nn::Parameters(network.module())) {
       if (p.name == "light.out.bias") p.value.value().data<float>()[2] = -3;
     }
-    const PredictedObjects out = network.Forward(
+    const Prediction out = network.Forward(
         nn::Constant(context, context.Full({1, 4, kSize, kSize}, 0.5)), nn::Mode::kEval);
     EXPECT_EQ(out.directions.value().data<float>()[2] > 0, facing);
   }

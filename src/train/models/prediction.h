@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// What networks say of pictures, and generators make of noise.
+#pragma once
+
+#include <span>
+
+#include "nn/nn.h"
+#include "train/models/sphere_model.h"
+
+namespace tilegrad::train {
+
+// Of a batch of B. What a network does not say is an invalid Var. Light is in the axes of each
+// picture's camera.
+struct Prediction {
+  nn::Var movement{};    // [B, V, 3] from what is deformed, before normalisation
+  nn::Var positions{};   // [B, V, 3]
+  nn::Var colors{};      // [B, V, 3] linear, not clamped
+  nn::Var textures{};    // [B, h, h, 3] in [0, 1], by the sphere's longitude and latitude
+  nn::Var flow{};        // [B, 2, h, w] in [-1, 1] (nn/ops/sample_pictures.h)
+  nn::Var directions{};  // [B, 3] unit, to the light; Lambert and Phong
+  nn::Var shininess{};   // [B]; Phong
+  nn::Var sh{};          // [B, 9]; harmonics
+  nn::Var pose{};        // [B, 10] Pose of the picture's camera (picture_lookup.h)
+  nn::Var cameras{};     // [B, 7] (ops/weak_cameras.h), quaternions unit
+  nn::Var keypoints{};   // [B, K, 3]
+};
+
+// Number i, a deformed `sphere`, with its texture, or else with colours brought into [0, 1] if it
+// has any. An error if it is not valid.
+Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std::size_t i);
+
+// Item i of a batch [B, ...].
+inline std::span<const float> ItemOf(const nn::Var& batch, std::size_t i) {
+  const std::span<const float> all = batch.value().span<float>();
+  const std::size_t size = all.size() / static_cast<std::size_t>(batch.shape()[0]);
+  return all.subspan(i * size, size);
+}
+
+}  // namespace tilegrad::train
