@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/adversary.h"
 
-#include <cmath>
-
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/fingerprint.h"
@@ -11,7 +9,12 @@
 namespace tilegrad::train {
 namespace {
 
-const std::string kCriticPrefix = "critic.";
+constexpr CriticRole kAdversaryRole = {
+    .prefix = "critic.",
+    .keys = "adversarial",
+    .adversarial = {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
+    .distance = {"critic_distance", "How far the critic tells true from rendered pictures"},
+    .penalty = {"critic_penalty", "Gradient penalty of the critic"}};
 constexpr std::uint64_t kCriticWeightStream = 0x637269746963, kPenaltyStream = 0x70656e616c7479;
 
 }  // namespace
@@ -38,25 +41,28 @@ ConfigFields FieldsOf(AdversaryConfig* c) {
   };
 }
 
-Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed)
-    : context_(context), config_(config), seed_(seed) {
+Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, PenaltyPlace place,
+                     std::uint64_t seed)
+    : context_(context), config_(config) {
   if (!config.HasCritic()) return;
-  Rng rng(seed, kCriticWeightStream);
-  critic_.emplace(
-      context, nn::CriticShape{.base = config.base, .halvings = static_cast<int>(config.halvings)},
-      rng);
-  adam_.emplace(
-      context, nn::Parameters(*critic_),
-      nn::AdamOptions{
-          .learning_rate = config.learning_rate, .beta1 = config.beta1, .beta2 = config.beta2});
+  const LearnedCritic::Job job{
+      .role = kAdversaryRole,
+      .shape = {.base = config.base, .halvings = static_cast<int>(config.halvings)},
+      .game = {.penalty = config.penalty, .place = place},
+      .optimizer = {.learning_rate = config.learning_rate,
+                    .beta1 = config.beta1,
+                    .beta2 = config.beta2},
+      .seed = seed,
+      .weights = kCriticWeightStream,
+      .interpolates = kPenaltyStream};
+  critic_.emplace(context, job);
 }
 
 Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
                                                    const AdversaryConfig& config,
                                                    std::uint64_t seed) {
   TILEGRAD_ASSIGN(const PenaltyPlace place, PenaltyPlaceOf(config.place));
-  auto out = std::unique_ptr<Adversary>(new Adversary(context, config, seed));
-  out->place_ = place;
+  auto out = std::unique_ptr<Adversary>(new Adversary(context, config, place, seed));
   if (config.perceptual == 0) return out;
   if (config.network_file.empty()) {
     return InvalidArgument(
@@ -71,14 +77,11 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
 void Adversary::AddLosses(const Pictures& pictures, LossSum* sum) {
   const auto& [rendered, truth, portion] = pictures;
   kept_.resize(static_cast<std::size_t>(portion.count));
-  kept_[static_cast<std::size_t>(portion.index)] = {rendered.value(), truth};
-  if (config_.weight > 0) {
-    sum->Add("adversarial", "Adversarial loss (− mean score of rendered pictures)", config_.weight,
-             WganGeneratorLoss(*critic_, rendered));
-  }
+  kept_[static_cast<std::size_t>(portion.index)] = {truth, rendered.value()};
+  if (config_.weight > 0) critic_->AddGeneratorLoss(config_.weight, rendered, sum);
   if (config_.features > 0) {
     sum->Add("critic_features", "Features of the critic (L1)", config_.features,
-             FeatureL1Loss(FeaturesOf(*critic_), rendered, truth));
+             FeatureL1Loss(FeaturesOf(critic_->network()), rendered, truth));
   }
   if (config_.perceptual > 0) {
     sum->Add("perceptual", "Features of a trained network (L1)", config_.perceptual,
@@ -89,49 +92,21 @@ void Adversary::AddLosses(const Pictures& pictures, LossSum* sum) {
 Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep& at,
                                                                 StepValues* values) {
   const Slots draw = SlotsOf(at.step * config_.updates + at.update, at.portion.count, at.portion);
-  Rng rng(seed_ ^ kPenaltyStream, static_cast<std::uint64_t>(draw.first));
-  const auto& [rendered, truth] = kept_[static_cast<std::size_t>(at.portion.index)];
-  const CriticLoss loss =
-      WganCriticLoss(*critic_, nn::Constant(context_, truth), nn::Constant(context_, rendered),
-                     {.penalty = config_.penalty, .place = place_}, rng);
-  auto gradients = nn::Gradients(loss.total, adam_->parameters(), at.listener);
-  TILEGRAD_TRY(context_.TakeStatus());
-  if (!std::isfinite(loss.total.item()) || !nn::IsFinite(context_, gradients)) {
-    return InternalError(
-        "the critic's loss is {}; a smaller adversarial.learning_rate or a larger "
-        "adversarial.penalty may help",
-        loss.total.item());
-  }
-  if (at.update > 0) return gradients;
-  LossSum watched(values);
-  watched.Watch("critic_distance", "How far the critic tells true from rendered pictures",
-                loss.wasserstein.item());
-  if (config_.penalty > 0)
-    watched.Watch("critic_penalty", "Gradient penalty of the critic", loss.penalty.item());
-  return gradients;
+  return critic_->Gradients(kept_[static_cast<std::size_t>(at.portion.index)],
+                            static_cast<std::uint64_t>(draw.first), at.listener,
+                            at.update == 0 ? values : nullptr);
 }
 
 std::vector<nn::NamedTensor> Adversary::State() {
-  if (!critic_) return {};
-  std::vector<nn::NamedTensor> out = nn::State(*critic_);
-  for (const nn::NamedTensor& moment : adam_->State()) out.push_back(moment);
-  for (nn::NamedTensor& tensor : out) tensor.name = kCriticPrefix + tensor.name;
-  return out;
+  return critic_ ? critic_->State() : std::vector<nn::NamedTensor>();
 }
 
-Status Adversary::LoadState(const std::vector<nn::NamedTensor>& state) {
-  if (!critic_) return {};
-  std::vector<nn::NamedTensor> own;
-  for (const nn::NamedTensor& tensor : state) {
-    if (tensor.name.starts_with(kCriticPrefix))
-      own.push_back({tensor.name.substr(kCriticPrefix.size()), tensor.value});
-  }
-  TILEGRAD_TRY(nn::LoadState(*critic_, own));
-  return adam_->LoadState(own);
+Status Adversary::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
+  return critic_ ? critic_->LoadState(state, steps * config_.updates) : Status();
 }
 
 std::vector<nn::NamedTensor> Adversary::Buffers() {
-  return critic_ ? nn::Buffers(*critic_) : std::vector<nn::NamedTensor>();
+  return critic_ ? nn::Buffers(critic_->network()) : std::vector<nn::NamedTensor>();
 }
 
 Result<std::string> Adversary::Fingerprint(const std::string& data) const {

@@ -9,13 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "nn/networks/gan.h"
-#include "nn/optim.h"
 #include "train/losses/feature_l1.h"
-#include "train/losses/loss_sum.h"
-#include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"
 #include "train/run/portion.h"
+#include "train/tasks/learned_critic.h"
 
 namespace tilegrad::train {
 
@@ -63,7 +60,7 @@ class Adversary {
   // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at, StepValues* values);
   Status UpdateCritic(std::span<const nn::Gradient> gradients, nn::UpdateShare* share) {
-    return adam_->Step(gradients, share);
+    return critic_->Update(gradients, 0, share);
   }
 
   // Of the data with that fingerprint and the perceptual network, if there is one.
@@ -71,24 +68,19 @@ class Adversary {
 
   // Of the critic: weights and moments, as "critic...".
   std::vector<nn::NamedTensor> State();
-  Status LoadState(const std::vector<nn::NamedTensor>& state);
-  nn::Critic* critic() { return critic_ ? &*critic_ : nullptr; }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
+  nn::Critic* critic() { return critic_ ? &critic_->network() : nullptr; }
   std::vector<nn::NamedTensor> Buffers();  // statistics of the critic's layers
 
  private:
-  Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed);
+  Adversary(nn::Context& context, const AdversaryConfig& config, PenaltyPlace place,
+            std::uint64_t seed);
 
   nn::Context& context_;
   AdversaryConfig config_;
-  std::uint64_t seed_;
-  PenaltyPlace place_ = PenaltyPlace::kRendered;
-  std::optional<nn::Critic> critic_;
-  std::optional<nn::Adam> adam_;
+  std::optional<LearnedCritic> critic_;
   FeatureFunction perceptual_;
-  struct Kept {
-    nn::Tensor rendered, truth;
-  };
-  std::vector<Kept> kept_;  // of the last step, by portion
+  std::vector<LearnedCritic::Pair> kept_;  // of the last step, by portion
 };
 
 }  // namespace tilegrad::train

@@ -6,14 +6,6 @@
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
-namespace {
-
-void Append(std::vector<nn::NamedTensor> more, std::vector<nn::NamedTensor>* all) {
-  for (nn::NamedTensor& tensor : more) all->push_back(std::move(tensor));
-}
-
-}  // namespace
-
 Status NetworkTask::BeginStart(const TaskStart& start, std::int64_t batch) {
   context_ = &start.context;
   lesson_.batch = batch;
@@ -67,7 +59,7 @@ std::vector<nn::NamedTensor> NetworkTask::State() {
 
 Status NetworkTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
   TILEGRAD_TRY(weights().LoadState(state, steps));
-  return adversary_ ? adversary_->LoadState(state) : Status();
+  return adversary_ ? adversary_->LoadState(state, steps) : Status();
 }
 
 Result<Dataset> OpenTrainingData(const TaskStart& start) {

@@ -3,6 +3,8 @@
 // key.
 #pragma once
 
+#include <algorithm>
+
 #include "train/data/stream/textured_stream.h"
 #include "train/models/shape_texture_generator.h"
 #include "train/tasks/common_config.h"
@@ -37,6 +39,11 @@ struct GanConfig {
   std::int64_t score_every = 250, score_count = 128;
   TexturedStreamConfig stream;  // of it what is not a camera's
   Schedule schedule;            // of the run; no keys of the task
+
+  // Of the schedules of a stage: that of shapes, or that of textures.
+  std::int64_t StageSteps(bool shapes) const {
+    return std::max<std::int64_t>(1, shapes ? shape_steps : schedule.steps - shape_steps);
+  }
 };
 
 ConfigFields FieldsOf(GanConfig* config);

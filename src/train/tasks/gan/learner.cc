@@ -36,18 +36,12 @@ GanLearner::GanLearner(nn::Context& context, const Job& job, const Sources& sour
       generator_(context, config_.network, SeedOf(config_)),
       shown_(context, config_.network, SeedOf(config_)),
       kept_(context, config_.network, SeedOf(config_)),
-      shape_(context, generator_.shape(), config_.optimizer,
-             std::max<std::int64_t>(1, config_.shape_steps)),
-      texture_(context, generator_.texture(), config_.optimizer,
-               std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)),
-      silhouettes_(context, config_, SilhouetteRole(config_.views),
-                   std::max<std::int64_t>(1, config_.shape_steps)),
-      pictures_(context, config_, PictureRole(config_.views),
-                std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)) {
-  if (config_.critic.texture_weight > 0) {
-    maps_.emplace(context, config_, TextureRole(config_.network),
-                  std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps));
-  }
+      shape_(context, generator_.shape(), config_.optimizer, config_.StageSteps(true)),
+      texture_(context, generator_.texture(), config_.optimizer, config_.StageSteps(false)),
+      silhouettes_(context, JobOf(config_, GanCritic::kSilhouettes)),
+      pictures_(context, JobOf(config_, GanCritic::kPictures)) {
+  if (config_.critic.texture_weight > 0)
+    maps_.emplace(context, JobOf(config_, GanCritic::kTextures));
   scores_ = context.Zeros({kScores});
   nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
     scores_.data<T>()[kBestShape] = scores_.data<T>()[kBestTexture] = T(kNoScore);
@@ -71,7 +65,7 @@ Result<std::unique_ptr<GanLearner>> GanLearner::Make(nn::Context& context, const
   return out;
 }
 
-std::vector<GanCritic*> GanLearner::Critics(GanStage stage) {
+std::vector<LearnedCritic*> GanLearner::Critics(GanStage stage) {
   if (stage == GanStage::kShape) return {&silhouettes_};
   if (!maps_) return {&pictures_};
   return {&pictures_, &*maps_};
@@ -127,7 +121,7 @@ Status GanLearner::DrawFake(const UpdateIndex& at, int round) {
   return context_.TakeStatus();
 }
 
-GanCritic::Pair GanLearner::PairOf(const GanCritic& critic, const Portion& portion) const {
+LearnedCritic::Pair GanLearner::PairOf(const LearnedCritic& critic, const Portion& portion) const {
   const Seen& real = real_[static_cast<std::size_t>(portion.index)];
   const Seen& fake = fake_[static_cast<std::size_t>(portion.index)];
   if (&critic == &silhouettes_) return {real.cover, fake.cover};
@@ -135,7 +129,7 @@ GanCritic::Pair GanLearner::PairOf(const GanCritic& critic, const Portion& porti
   return {real.maps, fake.maps};
 }
 
-void GanLearner::AddAdversarialLoss(GanCritic* critic, const GeneratedObjects& objects,
+void GanLearner::AddAdversarialLoss(LearnedCritic* critic, const GeneratedObjects& objects,
                                     LossSum* sum) {
   const bool maps = maps_ && critic == &*maps_;
   const nn::Var& seen =
@@ -149,7 +143,7 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   TILEGRAD_TRY(DrawReal(at, 0));
   const GeneratedObjects objects = Draw(at, 0);
   LossSum sum(out);
-  for (GanCritic* critic : Critics(stage)) AddAdversarialLoss(critic, objects, &sum);
+  for (LearnedCritic* critic : Critics(stage)) AddAdversarialLoss(critic, objects, &sum);
   if (stage == GanStage::kShape) step_.AddShapeLosses(generator_, objects.shapes, &sum);
   TILEGRAD_ASSIGN(auto gradients, Weights(stage).Gradients(sum.total(), at.listener, *out));
   sum.Watch("gradient_generator", "Norm of the generator's gradient",
@@ -169,10 +163,9 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::Backward(const UpdateIndex& at,
     TILEGRAD_TRY(DrawReal(at, round));
     TILEGRAD_TRY(DrawFake(at, round));
   }
-  GanCritic& critic = *critics[which];
-  return critic.Gradients(PairOf(critic, at.portion), {.number = NumberOf(at, round),
-                                                       .listener = at.listener,
-                                                       .values = round == 0 ? out : nullptr});
+  LearnedCritic& critic = *critics[which];
+  return critic.Gradients(PairOf(critic, at.portion), NumberOf(at, round), at.listener,
+                          round == 0 ? out : nullptr);
 }
 
 Status GanLearner::Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) {

@@ -55,15 +55,15 @@ class GanLearner {
 
  private:
   GanLearner(nn::Context& context, const Job& job, const Sources& sources);
-  std::vector<GanCritic*> Critics(GanStage stage);
+  std::vector<LearnedCritic*> Critics(GanStage stage);
   std::int64_t StageStep(std::int64_t step) const;
   LearnedWeights& Weights(GanStage stage);
   Status DrawReal(const UpdateIndex& at, int round);
   Status DrawFake(const UpdateIndex& at, int round);
   GeneratedObjects Draw(const UpdateIndex& at, int round);
-  GanCritic::Pair PairOf(const GanCritic& critic, const Portion& portion) const;
+  LearnedCritic::Pair PairOf(const LearnedCritic& critic, const Portion& portion) const;
   Result<nn::StepVector<nn::Gradient>> GeneratorGradients(const UpdateIndex& at, StepValues* out);
-  void AddAdversarialLoss(GanCritic* critic, const GeneratedObjects& objects, LossSum* sum);
+  void AddAdversarialLoss(LearnedCritic* critic, const GeneratedObjects& objects, LossSum* sum);
   std::uint64_t NumberOf(const UpdateIndex& at, int round) const;
   std::int64_t CountOf(const UpdateIndex& at) const { return config_.batch / at.portion.count; }
   Status Score(std::int64_t steps);
@@ -77,8 +77,8 @@ class GanLearner {
   GanStep step_;
   ShapeTextureGenerator generator_, shown_, kept_;
   LearnedWeights shape_, texture_;
-  GanCritic silhouettes_, pictures_;
-  std::optional<GanCritic> maps_;
+  LearnedCritic silhouettes_, pictures_;
+  std::optional<LearnedCritic> maps_;
   std::optional<GanWatch> watch_;
   // Of the last update of the generator, or of this round of the critics, by portion.
   struct Seen {

@@ -16,13 +16,10 @@ const std::string kShapePrefix = "shape.", kTexturePrefix = "texture.", kScoresN
 
 std::vector<nn::NamedTensor> GanLearner::State() {
   std::vector<nn::NamedTensor> out = WithPrefix(kShapePrefix, shape_.State());
-  const auto add = [&](std::vector<nn::NamedTensor> more) {
-    for (nn::NamedTensor& tensor : more) out.push_back(std::move(tensor));
-  };
-  add(WithPrefix(kTexturePrefix, texture_.State()));
-  for (GanCritic* critic : {&silhouettes_, &pictures_}) add(critic->State());
-  if (maps_) add(maps_->State());
-  add(KeptState(kept_));
+  Append(WithPrefix(kTexturePrefix, texture_.State()), &out);
+  for (LearnedCritic* critic : {&silhouettes_, &pictures_}) Append(critic->State(), &out);
+  if (maps_) Append(maps_->State(), &out);
+  Append(KeptState(kept_), &out);
   out.push_back({kScoresName, scores_});
   return out;
 }
@@ -42,11 +39,9 @@ Status GanLearner::LoadState(const std::vector<nn::NamedTensor>& state, std::int
 std::vector<nn::NamedTensor> GanLearner::Statistics() {
   std::vector<nn::NamedTensor> out;
   std::vector<nn::Module*> networks = {&generator_.shape(), &generator_.texture()};
-  for (GanCritic* critic : {&silhouettes_, &pictures_}) networks.push_back(&critic->network());
+  for (LearnedCritic* critic : {&silhouettes_, &pictures_}) networks.push_back(&critic->network());
   if (maps_) networks.push_back(&maps_->network());
-  for (nn::Module* network : networks) {
-    for (nn::NamedTensor& tensor : nn::Buffers(*network)) out.push_back(std::move(tensor));
-  }
+  for (nn::Module* network : networks) Append(nn::Buffers(*network), &out);
   return out;
 }
 

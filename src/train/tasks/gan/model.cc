@@ -84,8 +84,7 @@ std::vector<float> BetweenCodes(std::span<const float> from, std::span<const flo
 
 std::vector<nn::NamedTensor> KeptState(ShapeTextureGenerator& generator) {
   auto out = WithPrefix(kShape, nn::State(generator.shape()));
-  for (nn::NamedTensor& tensor : WithPrefix(kTexture, nn::State(generator.texture())))
-    out.push_back(std::move(tensor));
+  Append(WithPrefix(kTexture, nn::State(generator.texture())), &out);
   return out;
 }
 

@@ -37,16 +37,16 @@ struct SmallProblem {
   nn::Context context{workers, nn::DType::kF64};
   GanStep step;
   ShapeTextureGenerator generator;
-  GanCritic silhouettes, pictures, maps;
+  LearnedCritic silhouettes, pictures, maps;
   nn::Tensor noise;
 
   explicit SmallProblem(const GanConfig& c)
       : config(c),
         step(context, c, Rule()),
         generator(context, c.network, 1),
-        silhouettes(context, c, SilhouetteRole(c.views), 10),
-        pictures(context, c, PictureRole(c.views), 10),
-        maps(context, c, TextureRole(c.network), 10),
+        silhouettes(context, JobOf(c, GanCritic::kSilhouettes)),
+        pictures(context, JobOf(c, GanCritic::kPictures)),
+        maps(context, JobOf(c, GanCritic::kTextures)),
         noise(step.Noise(7, 3, c.batch)) {}
   static CameraRule Rule() {
     CameraRule rule;
