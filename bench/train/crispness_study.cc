@@ -89,7 +89,7 @@ Result<FeatureRows> FeaturesOf(const Data& data, const std::vector<std::vector<f
 
 Status Score(const Data& data, const Path& run) {
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(run, data.workers));
-  auto* model = dynamic_cast<TexturedModel*>(&predictor.model());
+  auto* model = predictor.model().textured();
   if (model == nullptr)
     return InvalidArgument("{}: not of task.kind = \"textured_image\"", run.string());
   TILEGRAD_TRY(predictor.CheckImageSize(data.dataset));

@@ -168,7 +168,7 @@ Status RunAll(const Path& run, const Path& folder, const std::string& out) {
   const Workers workers;
   const StopFlag stop = false;
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(run, workers));
-  auto* model = dynamic_cast<TexturedModel*>(&predictor.model());
+  auto* model = predictor.model().textured();
   if (model == nullptr)
     return InvalidArgument("{}: not of task.kind = \"textured_image\"", run.string());
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));

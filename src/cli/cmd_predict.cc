@@ -127,7 +127,7 @@ Status SaveResult(const train::Predictor& predictor, std::span<const std::uint8_
   TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));
   if (!lit) return io::SaveGlb(glb, *mesh);
   for (Material& material : mesh->materials) material.unlit = false;
-  const auto& model = dynamic_cast<train::TexturedModel&>(predictor.model());
+  const auto& model = *predictor.model().textured();
   return io::SaveLitGlb(glb, *mesh, SunOf(*lit, model.config().light));
 }
 
@@ -138,7 +138,7 @@ Status Relight(const train::Predictor& predictor, std::span<const std::uint8_t> 
     return InvalidArgument(
         "--relight: this network predicts no light; train one with --config texture_quick");
   }
-  const auto& model = dynamic_cast<train::TexturedModel&>(predictor.model());
+  const auto& model = *predictor.model().textured();
   return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size()}, file);
 }
 

@@ -49,7 +49,7 @@ struct SampleFiles {
 };
 
 Result<train::GeneratorModel*> GeneratorOf(const train::Predictor& predictor, const Path& run) {
-  auto* const model = dynamic_cast<train::GeneratorModel*>(&predictor.model());
+  auto* const model = predictor.model().generator();
   if (model != nullptr) return model;
   return InvalidArgument("{}: not a generator; train one with --config gan_quick", run.string());
 }

@@ -31,7 +31,7 @@ std::array<float, 3> Turned(const std::array<float, 3>& d, double angle) {
 
 Result<std::optional<train::PredictedObject>> PredictLit(const train::Predictor& predictor,
                                                          std::span<const std::uint8_t> picture) {
-  auto* model = dynamic_cast<train::TexturedModel*>(&predictor.model());
+  auto* model = predictor.model().textured();
   if (model == nullptr || train::LightingOf(model->config().light) == Lighting::kNone)
     return std::optional<train::PredictedObject>();
   TILEGRAD_ASSIGN(auto objects, model->PredictObjects(picture));

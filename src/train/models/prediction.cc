@@ -43,4 +43,12 @@ Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std
   return mesh;
 }
 
+nn::Tensor InputOf(nn::Context& context, std::span<const std::uint8_t> images, int size) {
+  const auto count = static_cast<std::int64_t>(images.size()) / (4 * size * size);
+  nn::Tensor input = context.Empty({count, 4, size, size});
+  std::ranges::transform(images, input.data<float>(),
+                         [](std::uint8_t b) { return static_cast<float>(b) / 255; });
+  return input;
+}
+
 }  // namespace tilegrad::train

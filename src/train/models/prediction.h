@@ -29,6 +29,9 @@ struct Prediction {
 // has any. An error if it is not valid.
 Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std::size_t i);
 
+// [B][4][size][size] bytes as networks take them: [B, 4, size, size] in [0, 1].
+nn::Tensor InputOf(nn::Context& context, std::span<const std::uint8_t> images, int size);
+
 // Item i of a batch [B, ...].
 inline std::span<const float> ItemOf(const nn::Var& batch, std::size_t i) {
   const std::span<const float> all = batch.value().span<float>();

@@ -2,13 +2,21 @@
 #include "train/tasks/task.h"
 
 #include "base/error.h"
+#include "nn/nn.h"
 #include "train/data/fingerprint.h"
+#include "train/models/sphere_model.h"
+#include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
 
-const Mesh& Model::template_mesh() const {
-  static const Mesh none;
-  return none;
+Status Model::LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state) {
+  parameters_ = nn::CountParameters(network);
+  return LoadPredictingWeights(network, state);
+}
+
+Status Model::SetTemplate(const Mesh& start) {
+  template_ = start;
+  return NormalizeToBox(template_, kPredictionHalfExtent);
 }
 
 Result<std::string> Task::Fingerprint(const Path& data, const Workers& workers) const {

@@ -13,6 +13,7 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "nn/layers.h"
 #include "nn/optim.h"
 #include "nn/tape.h"
 #include "scene/image.h"
@@ -30,6 +31,10 @@ namespace tilegrad::train {
 
 class Crew;
 class Predictor;
+class ClassifierModel;
+class GeneratorModel;
+class PhotographModel;
+class TexturedModel;
 
 // What a task starts training with.
 struct TaskStart {
@@ -55,17 +60,31 @@ struct UpdateIndex {
 class Model {
  public:
   virtual ~Model() = default;
-  virtual std::int64_t parameters() const = 0;
+  std::int64_t parameters() const { return parameters_; }
   // What it predicts before it has learned anything, normalised as predictions are. Without
   // vertices of a task that predicts no meshes.
-  virtual const Mesh& template_mesh() const;
+  const Mesh& template_mesh() const { return template_; }
   // images: [N][4][size][size] planar RGBA bytes, RGB over black, of the size it was trained on;
   // N at most kImagesAtOnce. Appends N valid meshes. InvalidArgument of a task that predicts none.
   virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes);
+  // Itself, of the task that has such models; else null.
+  virtual ClassifierModel* classifier() { return nullptr; }
+  virtual GeneratorModel* generator() { return nullptr; }
+  virtual PhotographModel* photographs() { return nullptr; }
+  virtual TexturedModel* textured() { return nullptr; }
   // Why a prediction cannot be refined on its picture (fit/refine.h), if so.
   virtual Status CheckRefinable() const { return {}; }
 
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
+
+ protected:
+  // Loads the weights that predict, and counts them. Errors say what does not fit in the state.
+  Status LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state);
+  // Brought to the place and size of predictions.
+  Status SetTemplate(const Mesh& start);
+
+  std::int64_t parameters_ = 0;
+  Mesh template_;
 };
 
 // What is done to a prediction before it is scored, with the image that it was made from. Called

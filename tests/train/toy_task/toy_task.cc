@@ -63,12 +63,13 @@ double BoxIou(const Numbers& a, const Numbers& b) {
 class ToyModel : public Model {
  public:
   ToyModel(nn::Context& context, Rng& rng)
-      : layer(context, {.in = 3, .out = 3}, rng), context_(context) {}
+      : layer(context, {.in = 3, .out = 3}, rng), context_(context) {
+    parameters_ = 12;
+    template_ = BoxOf({0.5f, 0.5f, 0.5f});
+  }
 
   nn::LinearLayer layer;
 
-  std::int64_t parameters() const override { return 12; }
-  const Mesh& template_mesh() const override { return template_; }
   Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override {
     constexpr std::size_t kPlane = kImageSize * kImageSize;
     const nn::NoGrad off(context_);
@@ -88,7 +89,6 @@ class ToyModel : public Model {
 
  private:
   nn::Context& context_;
-  Mesh template_ = BoxOf({0.5f, 0.5f, 0.5f});
 };
 
 Numbers SizeOf(const Mesh& mesh) {

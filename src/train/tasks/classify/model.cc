@@ -56,8 +56,7 @@ ClassifierModel::ClassifierModel(nn::Context& context, const ClassifierConfig& c
     : context_(context),
       classes_(std::move(classes)),
       image_size_(image_size),
-      network_(context, config, static_cast<std::int64_t>(classes_.size()), /*seed=*/0),
-      parameters_(nn::CountParameters(network_)) {}
+      network_(context, config, static_cast<std::int64_t>(classes_.size()), /*seed=*/0) {}
 
 Result<std::unique_ptr<ClassifierModel>> ClassifierModel::Load(nn::Context& context,
                                                                const ClassifierConfig& config,
@@ -66,7 +65,7 @@ Result<std::unique_ptr<ClassifierModel>> ClassifierModel::Load(nn::Context& cont
   std::unique_ptr<ClassifierModel> model(new ClassifierModel(
       context, config, std::move(classes), static_cast<int>(checkpoint.info.image_size)));
   TILEGRAD_TRY(context.TakeStatus());
-  TILEGRAD_TRY(nn::LoadState(model->network_, checkpoint.tensors));
+  TILEGRAD_TRY(model->LoadWeights(model->network_, checkpoint.tensors));
   return model;
 }
 

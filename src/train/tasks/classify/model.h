@@ -18,7 +18,7 @@ class ClassifierModel : public Model {
                                                        const ClassifierConfig& config,
                                                        const Checkpoint& checkpoint);
 
-  std::int64_t parameters() const override { return parameters_; }
+  ClassifierModel* classifier() override { return this; }
   ClassifierNetwork& network() { return network_; }
   const std::vector<std::string>& classes() const { return classes_; }
   // The most likely class of each picture; of equals the first. images: [n][4][size][size] planar
@@ -32,7 +32,6 @@ class ClassifierModel : public Model {
   std::vector<std::string> classes_;
   int image_size_;
   ClassifierNetwork network_;
-  std::int64_t parameters_;
 };
 
 // Of each row of scores [n, classes].

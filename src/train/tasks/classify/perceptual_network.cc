@@ -26,7 +26,7 @@ Result<FeatureFunction> LoadClassifier(nn::Context& context, const PerceptualSou
   std::shared_ptr<Model> model = std::move(*loaded);
   const int skipped = std::max(source.first_level, 0);
   return FeatureFunction([model, skipped](const nn::Var& images) {
-    auto levels = static_cast<ClassifierModel&>(*model).network().Levels(images, nn::Mode::kEval);
+    auto levels = model->classifier()->network().Levels(images, nn::Mode::kEval);
     const auto first = std::min<std::ptrdiff_t>(skipped, std::ssize(levels) - 1);
     levels.erase(levels.begin(), levels.begin() + first);
     return levels;

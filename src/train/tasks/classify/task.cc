@@ -63,18 +63,14 @@ class ClassifyTask : public NetworkTask {
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
                               const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluateClassifier(job, ModelOf(job.predictor), workers, progress, stop);
+    return EvaluateClassifier(job, *job.predictor.model().classifier(), workers, progress, stop);
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& /*workers*/,
                         const ProgressSink& progress, const StopFlag& stop) override {
-    return ShowClassified(request, ModelOf(request.predictor), progress, stop);
+    return ShowClassified(request, *request.predictor.model().classifier(), progress, stop);
   }
 
  private:
-  // What LoadModel above made.
-  static ClassifierModel& ModelOf(const Predictor& predictor) {
-    return static_cast<ClassifierModel&>(predictor.model());
-  }
   std::uint64_t seed() const { return static_cast<std::uint64_t>(config_.schedule.seed); }
   LearnedWeights& weights() override { return *weights_; }
   Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;

@@ -38,9 +38,10 @@ GeneratorModel::GeneratorModel(nn::Context& context, const GanConfig& config, bo
     : context_(context),
       config_(config),
       textured_(textured),
-      generator_(context, config.network, /*seed=*/0),
-      parameters_(nn::CountParameters(generator_.shape()) +
-                  nn::CountParameters(generator_.texture())) {}
+      generator_(context, config.network, /*seed=*/0) {
+  template_ = generator_.sphere().mesh();
+  parameters_ = nn::CountParameters(generator_.shape()) + nn::CountParameters(generator_.texture());
+}
 
 Result<std::unique_ptr<GeneratorModel>> GeneratorModel::Load(nn::Context& context,
                                                              const GanConfig& config,

@@ -17,8 +17,7 @@ class GeneratorModel : public Model {
   static Result<std::unique_ptr<GeneratorModel>> Load(nn::Context& context, const GanConfig& config,
                                                       const Checkpoint& checkpoint);
 
-  std::int64_t parameters() const override { return parameters_; }
-  const Mesh& template_mesh() const override { return generator_.sphere().mesh(); }
+  GeneratorModel* generator() override { return this; }
 
   // Numbers of a code.
   std::int64_t noise() const { return config_.network.noise; }
@@ -29,7 +28,7 @@ class GeneratorModel : public Model {
   // codes: [n][noise()].
   Result<std::vector<Mesh>> Generate(std::span<const float> codes);
 
-  ShapeTextureGenerator& generator() { return generator_; }
+  ShapeTextureGenerator& network() { return generator_; }
   nn::Context& context() { return context_; }
   const GanConfig& config() const { return config_; }
 
@@ -39,7 +38,6 @@ class GeneratorModel : public Model {
   GanConfig config_;
   bool textured_;
   ShapeTextureGenerator generator_;
-  std::int64_t parameters_;
 };
 
 // From one code to another along the great circle, as both lie far out on a sphere: `share` in

@@ -74,7 +74,7 @@ class Scorer {
         codes.insert(codes.end(), code.begin(), code.end());
       }
       const nn::Tensor noise = context_.From({end - at, model_.noise()}, codes);
-      const ObjectViews some = step_->Show(model_.generator(), noise,
+      const ObjectViews some = step_->Show(model_.network(), noise,
                                            mean ? GanStep::Texture::kMean : GanStep::Texture::kOwn);
       TILEGRAD_TRY(context_.TakeStatus());
       if (at == 0) out = SetOf(some, job_.count);

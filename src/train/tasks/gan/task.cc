@@ -144,7 +144,7 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
   out.generated = true;
   out.data += " Critics saw only pictures of the training models, no 3D data.";
   out.note = "Objects of the first latent codes, not picked by hand.";
-  auto& model = dynamic_cast<GeneratorModel&>(request.predictor.model());
+  auto& model = *request.predictor.model().generator();
   for (int i = 0; i < request.examples; ++i) {
     if (stop) return Cancelled("stopped while generating; nothing was written");
     TILEGRAD_ASSIGN(auto meshes, model.Generate(model.Code(0, static_cast<std::uint64_t>(i))));

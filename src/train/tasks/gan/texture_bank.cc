@@ -79,7 +79,7 @@ class Extraction {
 };
 
 Result<TexturedModel*> TexturedModelOf(const Predictor& predictor, const Dataset& dataset) {
-  auto* const model = dynamic_cast<TexturedModel*>(&predictor.model());
+  auto* const model = predictor.model().textured();
   if (model == nullptr)
     return InvalidArgument("it extracts no textures: train one with --config texture_quick");
   TILEGRAD_TRY(predictor.CheckImageSize(dataset));

@@ -74,7 +74,7 @@ class PhotographJudge {
   PhotographJudge(const TaskEvaluation& job, const PhotographSet& set)
       : job_(job),
         set_(set),
-        model_(dynamic_cast<PhotographModel&>(job.predictor.model())),
+        model_(*job.predictor.model().photographs()),
         pictures_(static_cast<int>(model_.config().size)),
         share_(job.crew, Model::kImagesAtOnce),
         tallies_(kMethods) {
@@ -239,7 +239,7 @@ Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers&
   if (!set.photographs[0].camera)
     return InvalidArgument("{}: no cameras, so nothing to score by", job.data.string());
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOutPhotographs(job.run, set, job.split));
-  auto& model = dynamic_cast<PhotographModel&>(job.predictor.model());
+  auto& model = *job.predictor.model().photographs();
   const nn::Var weights = model.network().KeypointWeights();
   const std::size_t learned = weights.valid() ? static_cast<std::size_t>(weights.shape()[0]) : 0;
   if (learned != set.keypoint_names.size())

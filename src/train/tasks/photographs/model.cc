@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
 namespace {
@@ -64,46 +63,26 @@ std::size_t KeypointsIn(const Checkpoint& checkpoint) {
   return keypoints == nullptr ? 0 : static_cast<std::size_t>(keypoints->shape()[0]);
 }
 
-class LoadedPhotographModel : public PhotographModel {
- public:
-  LoadedPhotographModel(nn::Context& context, const PhotographsConfig& config,
-                        const Checkpoint& checkpoint)
-      : context_(context),
-        config_(config),
-        network_(context, config.network, {.count = KeypointsIn(checkpoint)},
-                 static_cast<int>(config.size), /*seed=*/0),
-        template_(network_.sphere().mesh()) {}
+}  // namespace
 
-  Status Load(const std::vector<nn::NamedTensor>& state) {
-    TILEGRAD_TRY(context_.TakeStatus());
-    TILEGRAD_TRY(LoadPredictingWeights(network_.module(), state));
-    parameters_ = nn::CountParameters(network_.module());
-    const nn::NoGrad off(context_);
-    const nn::Var mean = network_.MeanShape();
-    TILEGRAD_TRY(context_.TakeStatus());
-    const std::span<const float> p = mean.value().span<float>();
-    for (std::size_t v = 0; v < template_.positions.size(); ++v)
-      template_.positions[v] = {p[3 * v], p[3 * v + 1], p[3 * v + 2]};
-    return NormalizeToBox(template_, kPredictionHalfExtent);
-  }
+PhotographModel::PhotographModel(nn::Context& context, const PhotographsConfig& config,
+                                 const Checkpoint& checkpoint)
+    : context_(context),
+      config_(config),
+      network_(context, config.network, {.count = KeypointsIn(checkpoint)},
+               static_cast<int>(config.size), /*seed=*/0) {}
 
-  std::int64_t parameters() const override { return parameters_; }
-  const Mesh& template_mesh() const override { return template_; }
-  Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
-  nn::Context& context() override { return context_; }
-  PhotographNetwork& network() override { return network_; }
-  const PhotographsConfig& config() const override { return config_; }
+Status PhotographModel::Load(const std::vector<nn::NamedTensor>& state) {
+  TILEGRAD_TRY(context_.TakeStatus());
+  TILEGRAD_TRY(LoadWeights(network_.module(), state));
+  const nn::NoGrad off(context_);
+  const nn::Var mean = network_.MeanShape();
+  TILEGRAD_TRY(context_.TakeStatus());
+  TILEGRAD_ASSIGN(const Mesh shape, MeshOf(network_.sphere(), {.positions = mean}, 0));
+  return SetTemplate(shape);
+}
 
- private:
-  nn::Context& context_;
-  PhotographsConfig config_;
-  PhotographNetwork network_;
-  Mesh template_;  // the mean shape
-  std::int64_t parameters_ = 0;
-};
-
-Status LoadedPhotographModel::Predict(std::span<const std::uint8_t> images,
-                                      std::vector<Mesh>* meshes) {
+Status PhotographModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
   const auto size = static_cast<std::size_t>(config_.size);
   const std::size_t bytes = 4 * size * size, count = images.size() / bytes;
   nn::Tensor pictures =
@@ -118,8 +97,6 @@ Status LoadedPhotographModel::Predict(std::span<const std::uint8_t> images,
   }
   return {};
 }
-
-}  // namespace
 
 Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context,
                                                             PhotographNetwork& network,
@@ -148,7 +125,7 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
   if (checkpoint.info.image_size != config.size)
     return DataLoss("photographs of {} pixels a side, but its configuration says {}",
                     checkpoint.info.image_size, config.size);
-  auto model = std::make_unique<LoadedPhotographModel>(context, config, checkpoint);
+  auto model = std::make_unique<PhotographModel>(context, config, checkpoint);
   TILEGRAD_TRY(model->Load(checkpoint.tensors));
   return std::unique_ptr<Model>(std::move(model));
 }

@@ -19,16 +19,28 @@ Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context
                                                             PhotographNetwork& network,
                                                             const nn::Tensor& pictures);
 
-class PhotographModel : public Model {
- public:
-  virtual nn::Context& context() = 0;
-  virtual PhotographNetwork& network() = 0;
-  virtual const PhotographsConfig& config() const = 0;
-};
-
 // Predict takes cut-outs: RGBA over black, framed anyhow, which are cropped as training crops
 // photographs. Its meshes are brought to the truth's place and size: centred, largest half-extent
-// 0.45. Errors say what does not fit in the checkpoint.
+// 0.45.
+class PhotographModel : public Model {
+ public:
+  PhotographModel(nn::Context& context, const PhotographsConfig& config,
+                  const Checkpoint& checkpoint);
+  Status Load(const std::vector<nn::NamedTensor>& state);
+
+  Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
+  PhotographModel* photographs() override { return this; }
+  nn::Context& context() { return context_; }
+  PhotographNetwork& network() { return network_; }
+  const PhotographsConfig& config() const { return config_; }
+
+ private:
+  nn::Context& context_;
+  PhotographsConfig config_;
+  PhotographNetwork network_;
+};
+
+// Errors say what does not fit in the checkpoint.
 Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
                                                    const PhotographsConfig& config,
                                                    const Checkpoint& checkpoint);

@@ -130,7 +130,7 @@ Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Wor
                                        const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(request.data));
   TILEGRAD_TRY(CheckHeldOutPhotographs(request.run, set, Split::kTest));
-  auto& model = dynamic_cast<PhotographModel&>(request.predictor.model());
+  auto& model = *request.predictor.model().photographs();
   Showcase out;
   out.purpose = "to predict shape, texture and camera of an object from one photograph";
   out.data = fmt::format("It learned from {}, one of each object, with masks{}. It saw no 3D data.",

@@ -80,7 +80,7 @@ class TexturedEvaluator {
         job_(job),
         dataset_(dataset),
         workers_(workers),
-        model_(dynamic_cast<TexturedModel&>(job.predictor.model())),
+        model_(*job.predictor.model().textured()),
         share_(job.crew) {
     for (int w = 0; w < workers.count(); ++w)
       judges_.push_back(std::make_unique<Judge>(config, dataset.info().image_size));

@@ -22,12 +22,22 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
 
 class TexturedModel : public Model {
  public:
+  TexturedModel(nn::Context& context, const TexturedImageConfig& config, int image_size);
+  Status Load(const std::vector<nn::NamedTensor>& state);
+
+  Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
   // As Predict, with the light.
-  virtual Result<std::vector<PredictedObject>> PredictObjects(
-      std::span<const std::uint8_t> images) = 0;
-  virtual const TexturedImageConfig& config() const = 0;
+  Result<std::vector<PredictedObject>> PredictObjects(std::span<const std::uint8_t> images);
+  TexturedModel* textured() override { return this; }
+  const TexturedImageConfig& config() const { return config_; }
   // Refined colours would be those of the picture, its light included.
   Status CheckRefinable() const override;
+
+ private:
+  nn::Context& context_;
+  TexturedImageConfig config_;
+  int image_size_;
+  TextureNetwork network_;
 };
 
 // Meshes have the template's faces, positions with largest half-extent 0.45, centred, and one

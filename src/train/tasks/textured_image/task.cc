@@ -128,7 +128,7 @@ Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const W
       "mesh, its texture map and the light. The models are spread over the classes in the "
       "dataset's "
       "order, not picked by hand.";
-  auto& model = dynamic_cast<TexturedModel&>(request.predictor.model());
+  auto& model = *request.predictor.model().textured();
   const int size = dataset.info().image_size;
   ObjectPictures pictures = Pictures(size);
   TILEGRAD_ASSIGN(HeldOutViews held_out,

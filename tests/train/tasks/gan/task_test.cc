@@ -160,7 +160,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
     const Workers workers(count);
     const auto predictor = Predictor::Load(run, workers);
     ASSERT_TRUE(predictor.ok()) << predictor.status().message();
-    auto& model = dynamic_cast<GeneratorModel&>(predictor->model());
+    auto& model = *predictor->model().generator();
     EXPECT_TRUE(model.textured());
     std::vector<float> codes = model.Code(5, 0);
     for (const float x : model.Code(5, 1)) codes.push_back(x);
