@@ -5,8 +5,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 
-#include "train/data/stream/recolor.h"
-
 namespace tilegrad::train {
 namespace {
 
@@ -53,14 +51,6 @@ void DrawShape(const StreamConfig& config, std::span<const glm::vec3> positions,
     out->push_back(q);
   }
   Normalize(half_extent, out);
-}
-
-void DrawObject(const StreamConfig& config, const ColoredMesh& mesh, float half_extent, Rng& rng,
-                ObjectDraw* out) {
-  DrawShape(config, mesh.positions, half_extent, rng, &out->positions);
-  const Recolor recolor(config, rng);
-  out->colors.clear();
-  for (const glm::vec3& color : mesh.colors) out->colors.push_back(recolor(color));
 }
 
 }  // namespace tilegrad::train

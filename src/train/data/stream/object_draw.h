@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is drawn by lot of one streamed object: its shape and its colours, made from a mesh of the
-// dataset. All of it follows from the state of the random numbers.
+// What is drawn by lot of one streamed object: its shape, made from a mesh of the dataset. It
+// follows from the state of the random numbers.
 #pragma once
 
 #include <span>
@@ -11,18 +11,6 @@
 #include "train/data/stream/stream_config.h"
 
 namespace tilegrad::train {
-
-// A mesh with a colour for each vertex, without anything else.
-struct ColoredMesh {
-  std::vector<glm::vec3> positions;  // [V]; bounding box centred, largest half-extent `half_extent`
-  std::vector<glm::vec3> colors;     // [V] unlit, [0, 1]
-  std::vector<Face> faces;
-};
-
-// Positions and colours of a deformed copy; memory is reused from object to object.
-struct ObjectDraw {
-  std::vector<glm::vec3> positions, colors;
-};
 
 // A monotone map of an interval onto another, linear between knots: each of its pieces is scaled
 // by a factor of its own, and straight lines along the axis stay straight.
@@ -43,9 +31,5 @@ class AxisWarp {
 // the result's.
 void DrawShape(const StreamConfig& config, std::span<const glm::vec3> positions, float half_extent,
                Rng& rng, std::vector<glm::vec3>* out);
-
-// Deforms and recolours; then the bounding box is centred and scaled to `half_extent` again.
-void DrawObject(const StreamConfig& config, const ColoredMesh& mesh, float half_extent, Rng& rng,
-                ObjectDraw* out);
 
 }  // namespace tilegrad::train

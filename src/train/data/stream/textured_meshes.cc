@@ -50,8 +50,9 @@ class Loader {
       : dataset_(dataset), request_(request) {}
 
   Status Open(const std::vector<int>& models) {
-    TILEGRAD_ASSIGN(source_, OpenSource(dataset_, request_.folder));
     entries_.assign(models.size(), kNone);
+    if (clusters()) return {};
+    TILEGRAD_ASSIGN(source_, OpenSource(dataset_, request_.folder));
     if (!source_) return {};
     std::map<std::pair<std::string, std::string>, std::size_t> places;
     for (std::size_t e = 0; e < source_->entries().size(); ++e)
@@ -79,17 +80,23 @@ class Loader {
       TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
       mesh = std::move(data.mesh);
       if (mesh.faces.empty())
-        return InvalidArgument("{}: has no mesh to render", dataset_.ModelPath(model).string());
+        return InvalidArgument("{}: has no mesh to render{}", dataset_.ModelPath(model).string(),
+                               clusters() ? "; set stream.share to 0" : "");
     } else {
       TILEGRAD_ASSIGN(mesh, FromSource(model, entries_[i]));
     }
-    CentreUnusedVertices(&mesh);
+    if (clusters()) {
+      mesh = MakeTruthMesh(mesh, static_cast<std::size_t>(request_.max_faces));
+    } else {
+      CentreUnusedVertices(&mesh);
+    }
     for (MeshTexture& texture : mesh.textures)
       texture.image = ShrunkImage(texture.image, request_.max_texture);
     return std::make_unique<TexturedMesh>(std::move(mesh));
   }
 
  private:
+  bool clusters() const { return request_.max_faces > 0; }
   const ModelInfo& InfoOf(int model) const {
     return dataset_.models()[static_cast<std::size_t>(model)];
   }
@@ -157,10 +164,10 @@ Result<std::vector<TexturedMesh>> LoadTexturedMeshes(
       const std::scoped_lock lock(mutex);
       if (loaded[i]) bytes += loaded[i]->bytes();
       if (progress)
-        progress({"loading textures", ++done, order.size(), fmt::format("{:.1f} MB", bytes / 1e6)});
+        progress({"loading meshes", ++done, order.size(), fmt::format("{:.1f} MB", bytes / 1e6)});
     }
   });
-  if (stop) return Cancelled("stopped while loading textures");
+  if (stop) return Cancelled("stopped while loading meshes");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
   std::vector<TexturedMesh> out;
   for (auto& mesh : loaded) out.push_back(std::move(*mesh));

@@ -32,8 +32,10 @@ struct TexturedMeshRequest {
   // A folder of models as `tilegrad dataset --source folder --input` takes it. Empty: the installed
   // packages that the dataset was made from (sources/installed.h); of any other source the coloured
   // meshes of the dataset itself.
-  std::string folder;
+  std::string folder = {};
   int max_texture = 128;  // texels a side; larger textures are averaged down
+  // More than 0: the coloured meshes of the dataset, clustered to at most so many faces.
+  std::int64_t max_faces = 0;
 };
 
 // Of these models, in their order. Errors: a model that cannot be read, that is not there any more,

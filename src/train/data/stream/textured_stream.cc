@@ -2,11 +2,13 @@
 #include "train/data/stream/textured_stream.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
 #include "base/processor_time.h"
 #include "render/picture/composite.h"
+#include "render/picture/dataset_light.h"
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
 #include "scene/light_frame.h"
@@ -18,7 +20,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::uint64_t kTexturedStream = 0x7465787475726564;
+constexpr std::uint64_t kTexturedStream = 0x7465787475726564, kSceneStream = 0x7363656e65;
 
 void RecolorAll(const Recolor& recolor, std::span<const float> from, std::vector<float>* to) {
   to->resize(from.size());
@@ -100,8 +102,12 @@ void TexturedStream::Worker::DrawColors(const Scene& scene, const Recolor& recol
 
 void TexturedStream::Worker::DrawViews(const Job& job, const Scene& object,
                                        std::span<TexturedView> views, Rng& rng) {
-  const Surface under = SurfaceUnder(job.light);
+  const Surface under = job.dataset_light ? DatasetSurface() : SurfaceUnder(job.light);
   lights.assign(views.size(), {});
+  if (job.dataset_light) {
+    const std::array<Light, 2> two = DrawLights(job.config.draw, rng);
+    lights.assign(two.begin(), two.end());
+  }
   sh.resize(views.size());
   scenes.assign(views.size(), object);
   for (Surface& surface : surfaces) {
@@ -112,8 +118,8 @@ void TexturedStream::Worker::DrawViews(const Job& job, const Scene& object,
   const std::size_t count = surfaces.size();
   surfaces.resize(count * views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
-    views[v].camera = DrawCamera(job.config.draw, job.camera, /*view=*/0, rng);
-    views[v].light = DrawLight(job.light, rng);
+    views[v].camera = DrawCamera(job.config.draw, job.camera, job.dataset_light ? v : 0, rng);
+    if (!job.dataset_light) views[v].light = DrawLight(job.light, rng);
     if (v > 0)
       std::copy_n(surfaces.begin(), count,
                   surfaces.begin() + static_cast<std::ptrdiff_t>(v * count));
@@ -127,9 +133,10 @@ void TexturedStream::Worker::SetViews(const Job& job, std::span<const TexturedVi
   const std::size_t count = surfaces.size() / scenes.size();
   for (std::size_t v = 0; v < scenes.size(); ++v) {
     const DrawnLight& light = views[v].light;
+    scenes[v].camera = ScaledCamera(views[v].camera, static_cast<float>(job.config.draw.samples));
+    if (job.dataset_light) continue;
     lights[v].direction = DirectionToWorld(light.direction, views[v].camera);
     sh[v] = HarmonicsToWorld(light.sh, views[v].camera);
-    scenes[v].camera = ScaledCamera(views[v].camera, static_cast<float>(job.config.draw.samples));
     for (std::size_t s = v * count; s < (v + 1) * count; ++s)
       surfaces[s].shininess = light.shininess;
   }
@@ -157,15 +164,19 @@ TexturedStream::TexturedStream(const Job& job, std::span<const TexturedMesh> mes
 TexturedStream::~TexturedStream() = default;
 TexturedStream::TexturedStream(TexturedStream&&) noexcept = default;
 
+std::size_t TexturedStream::Count(std::size_t batch) const {
+  return static_cast<std::size_t>(std::lround(job_.config.draw.share * static_cast<double>(batch)));
+}
+
 // Everything that is drawn by lot.
 void TexturedStream::Place(int model, std::uint64_t position, Worker* worker,
                            std::span<TexturedView> views) {
   Worker& w = *worker;
   const TexturedMesh& mesh = meshes_[static_cast<std::size_t>(model)];
-  Rng rng(job_.seed ^ kTexturedStream, position);
+  Rng rng(job_.seed ^ (job_.dataset_light ? kSceneStream : kTexturedStream), position);
   DrawShape(job_.config.draw, mesh.mesh().positions, static_cast<float>(job_.camera.half_extent),
             rng, &w.positions);
-  if (rng.Uniform() < job_.config.mirrored) {
+  if (!job_.dataset_light && rng.Uniform() < job_.config.mirrored) {
     for (glm::vec3& p : w.positions) p.x = -p.x;
   }
   w.DrawColors(mesh.scene(), Recolor(job_.config.draw, rng));
@@ -197,8 +208,8 @@ Status TexturedStream::SetUp(int model, std::uint64_t position, std::size_t work
 
 Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appearance appearance) {
   Worker& w = *workers_[worker];
-  const Lighting lighting =
-      appearance == Appearance::kTexture ? Lighting::kNone : LightingOf(job_.light);
+  const Lighting of_job = job_.dataset_light ? Lighting::kLambert : LightingOf(job_.light);
+  const Lighting lighting = appearance == Appearance::kTexture ? Lighting::kNone : of_job;
   w.shown = w.scenes;
   w.white = w.surfaces;
   for (Surface& surface : w.white) surface.base_color = {1, 1, 1}, surface.texture = -1;
@@ -206,7 +217,8 @@ Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appeara
     Scene& scene = w.shown[v];
     scene.shading.lighting = lighting;
     if (lighting == Lighting::kLambert || lighting == Lighting::kPhong)
-      scene.lights = {&w.lights[v], 1};
+      scene.lights = job_.dataset_light ? std::span<const Light>(w.lights)
+                                        : std::span<const Light>(&w.lights[v], 1);
     if (lighting == Lighting::kSphericalHarmonics) scene.sh = w.sh[v];
     if (appearance != Appearance::kLight) continue;
     const std::size_t count = scene.surfaces.size();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of textured objects, each view under a light of its own. A pure function of (seed,
-// position of the object in the run), as scene_stream.h.
+// Pictures that training renders itself, while it trains: each object is a deformed, recoloured
+// copy of a training model, seen by random cameras. Each view is under a light of its own, or all
+// are under that of datasets. A pure function of (seed, position of the object in the run): nothing
+// has to be saved, and a resumed run goes on as if it had never stopped.
 #pragma once
 
 #include <memory>
@@ -17,8 +19,7 @@
 namespace tilegrad::train {
 
 struct TexturedStreamConfig {
-  // Of it `share`, `max_faces` and `light` mean nothing here.
-  StreamConfig draw;
+  StreamConfig draw;  // of it `share`, `max_faces` and `light` are for Job::dataset_light
   TexturedMeshRequest meshes;
   double mirrored = 0.5;  // share of the objects that are shown mirrored at x = 0
 };
@@ -47,14 +48,20 @@ class TexturedStream {
     CameraRule camera;
     int size = 64;
     std::uint64_t seed = 0;
+    // Not `light` but the key and fill light of datasets, drawn once for all views of an object;
+    // the views after the first have elevations of their own, and no object is mirrored.
+    bool dataset_light = false;
   };
   TexturedStream(const Job& job, std::span<const TexturedMesh> meshes, const Workers& workers);
   ~TexturedStream();
   TexturedStream(TexturedStream&&) noexcept;
 
-  // The object at `position` of the run, made from mesh `model`, from as many views as there are
-  // `views`, which are chosen: [views][4][size][size], planar, RGB over black and the covered share
-  // of each pixel, in [0, 1]. Valid until the next call with the same `worker`, in [0, count()).
+  // How many of `batch` objects are streamed: the first ones.
+  std::size_t Count(std::size_t batch) const;
+  // The object at `position` of the run, step * batch + slot, made from mesh `model`, from as many
+  // views as there are `views`, which are chosen: [views][4][size][size], planar, RGB over black
+  // and the covered share of each pixel, in [0, 1]. Valid until the next call with the same
+  // `worker`, in [0, count()).
   Result<std::span<const float>> Render(int model, std::uint64_t position, std::size_t worker,
                                         std::span<TexturedView> views);
   // Sets the object up as Render does, for Again, in views that are given instead of drawn ones.

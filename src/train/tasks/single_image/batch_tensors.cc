@@ -80,7 +80,7 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
 }
 
 Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
-                                 const std::vector<Sample>& batch, SceneStream* stream,
+                                 const std::vector<Sample>& batch, TexturedStream* stream,
                                  std::int64_t first) {
   const auto objects = static_cast<std::int64_t>(batch.size()),
              size = static_cast<std::int64_t>(store.size);
@@ -93,12 +93,17 @@ Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
        context.Empty({images, size, size}), std::vector<Camera>(static_cast<std::size_t>(images))}};
   const std::size_t streamed = stream ? stream->Count(batch.size()) : 0;
   std::vector<Status> failures(streamed);
+  std::vector<std::vector<TexturedView>> streamed_views(
+      static_cast<std::size_t>(context.workers().count()));
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
     context.workers().For(batch.size(), [&](std::size_t b, std::size_t worker) {
       const Sample& sample = batch[b];
       if (b >= streamed) return gathering.FromStore<T>(b, sample);
       const auto position = static_cast<std::uint64_t>(first) + b;
-      const auto rgba = stream->Render(sample.model, position, worker, gathering.CamerasOf(b));
+      std::vector<TexturedView>& drawn = streamed_views[worker];
+      drawn.resize(views);
+      const auto rgba = stream->Render(sample.model, position, worker, drawn);
+      std::ranges::transform(drawn, gathering.CamerasOf(b).begin(), &TexturedView::camera);
       failures[b] = rgba.status();
       if (rgba.ok()) gathering.FromStream<T>(b, sample, *rgba);
     });

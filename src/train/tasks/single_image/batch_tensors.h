@@ -7,7 +7,7 @@
 #include "nn/context.h"
 #include "scene/camera.h"
 #include "train/data/batches.h"
-#include "train/data/stream/scene_stream.h"
+#include "train/data/stream/textured_stream.h"
 
 namespace tilegrad::train {
 
@@ -23,7 +23,7 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
 // The first objects of the batch are rendered instead; null: none are. `first`: position in the run
 // of the first one.
 Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
-                                 const std::vector<Sample>& batch, SceneStream* stream,
+                                 const std::vector<Sample>& batch, TexturedStream* stream,
                                  std::int64_t first);
 
 }  // namespace tilegrad::train

@@ -64,7 +64,8 @@ class SingleImageTask : public NetworkTask {
   std::vector<Sample> samples_;  // of held_out_, for pictures
   std::optional<TrainStep> step_;
   std::optional<BatchOrder> order_;
-  std::optional<SceneStream> stream_;
+  std::vector<TexturedMesh> meshes_;  // to which the stream refers
+  std::optional<TexturedStream> stream_;
 };
 
 Status SingleImageTask::Start(const TaskStart& start) {
@@ -140,12 +141,19 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
 
 Status SingleImageTask::LoadMeshes(const TaskStart& start) {
   if (config_.stream.share <= 0) return {};
-  TILEGRAD_ASSIGN(
-      std::vector<ColoredMesh> meshes,
-      LoadStreamMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.max_faces,
-                       start.context.workers(), start.progress, start.stop));
-  stream_.emplace(config_.stream, std::move(meshes), dataset_->info(),
-                  static_cast<std::uint64_t>(start.schedule.seed), start.context.workers());
+  const TexturedStreamConfig stream{.draw = config_.stream,
+                                    .meshes = {.max_faces = config_.stream.max_faces}};
+  const Workers& workers = start.context.workers();
+  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain),
+                                              stream.meshes, workers, start.progress, start.stop));
+  const DatasetInfo& info = dataset_->info();
+  stream_.emplace(TexturedStream::Job{.config = stream,
+                                      .light = {},
+                                      .camera = info.camera,
+                                      .size = info.image_size,
+                                      .seed = static_cast<std::uint64_t>(start.schedule.seed),
+                                      .dataset_light = true},
+                  meshes_, workers);
   return {};
 }
 

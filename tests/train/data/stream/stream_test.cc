@@ -11,7 +11,9 @@
 #include "render/picture/dataset_light.h"
 #include "render/picture/mesh_pictures.h"
 #include "scene/shapes.h"
-#include "train/data/stream/scene_stream.h"
+#include "train/data/stream/object_draw.h"
+#include "train/data/stream/recolor.h"
+#include "train/data/stream/textured_stream.h"
 #include "train/data/stream/view_draw.h"
 
 namespace tilegrad::train::stream_test {
@@ -26,15 +28,27 @@ StreamConfig Still() {
   return c;
 }
 
-ColoredMesh Ball() {
-  const Mesh ball = Icosphere(2, 0.45f);
-  ColoredMesh out{ball.positions, {}, ball.faces};
-  for (const glm::vec3& p : ball.positions) out.colors.push_back(glm::vec3(0.5f) + p);
+Mesh Ball() {
+  Mesh ball = Icosphere(2, 0.45f);
+  for (const glm::vec3& p : ball.positions) ball.colors.emplace_back(glm::vec3(0.5f) + p, 1.0f);
+  return ball;
+}
+
+std::vector<TexturedMesh> Balls(std::size_t count) {
+  std::vector<TexturedMesh> out;
+  for (std::size_t i = 0; i < count; ++i) out.emplace_back(Ball());
   return out;
 }
 
-std::vector<ColoredMesh> Balls(std::size_t count) {
-  return std::vector<ColoredMesh>(count, Ball());
+TexturedStream::Job JobOf(const StreamConfig& config, int size, std::uint64_t seed) {
+  TexturedStream::Job job{.config = {.draw = config, .meshes = {}},
+                          .light = {},
+                          .camera = {},
+                          .size = size,
+                          .seed = seed,
+                          .dataset_light = true};
+  job.camera.lens.width = job.camera.lens.height = size;
+  return job;
 }
 
 DatasetInfo Info(int size) {
@@ -71,18 +85,21 @@ TEST(AxisWarp, GrowsByItsFactorsAndKeepsSymmetry) {
 TEST(ObjectDraw, FillsTheBoxAndStaysInRange) {
   StreamConfig config;
   config.stretch = 1, config.recolor = 1, config.brightness = 1, config.taper = 1;
-  ObjectDraw object;
+  std::vector<glm::vec3> positions;
+  const Mesh ball = Ball();
   bool deformed = false;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Rng rng(seed);
-    DrawObject(config, Ball(), 0.45f, rng, &object);
+    DrawShape(config, ball.positions, 0.45f, rng, &positions);
+    const Recolor recolor(config, rng);
     glm::vec3 low(1), high(-1);
-    for (const glm::vec3& p : object.positions) low = glm::min(low, p), high = glm::max(high, p);
+    for (const glm::vec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
     const glm::vec3 half = 0.5f * (high - low), centre = 0.5f * (high + low);
     EXPECT_NEAR(std::max({half.x, half.y, half.z}), 0.45f, 1e-6f);
     EXPECT_LT(glm::length(centre), 1e-6f);
     deformed |= std::min({half.x, half.y, half.z}) < 0.3f;
-    for (const glm::vec3& c : object.colors) {
+    for (const glm::vec4& color : ball.colors) {
+      const glm::vec3 c = recolor(glm::vec3(color));
       for (int i = 0; i < 3; ++i) EXPECT_TRUE(c[i] >= 0 && c[i] <= 1) << c[i];
     }
   }
@@ -94,18 +111,15 @@ TEST(ObjectDraw, FillsTheBoxAndStaysInRange) {
 TEST(ObjectDraw, OtherHuesHaveTheSameLuminance) {
   StreamConfig config = Still();
   config.recolor = 1;
-  ColoredMesh mesh = Ball();
-  std::fill(mesh.colors.begin(), mesh.colors.end(), glm::vec3(0.45f, 0.4f, 0.35f));
+  const glm::vec3 color(0.45f, 0.4f, 0.35f);
   const float luminance = 0.299f * 0.45f + 0.587f * 0.4f + 0.114f * 0.35f;
-  ObjectDraw object;
   int kept = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Rng rng(seed);
-    DrawObject(config, mesh, 0.45f, rng, &object);
-    const glm::vec3 c = object.colors[0];
+    const glm::vec3 c = Recolor(config, rng)(color);
     if (std::max({c.r, c.g, c.b}) == 1) continue;
     EXPECT_NEAR(0.299f * c.r + 0.587f * c.g + 0.114f * c.b, luminance, 2e-3f);
-    EXPECT_GT(glm::length(c - mesh.colors[0]), 1e-4f);
+    EXPECT_GT(glm::length(c - color), 1e-4f);
     ++kept;
   }
   EXPECT_GT(kept, 25);
@@ -186,52 +200,53 @@ TEST(ViewDraw, LightsComeFromAbove) {
 
 // At most half a step of 8 bits from the picture of the dataset's renderer, which is rounded to
 // them; and flat normals there are ours.
-TEST(SceneStream, WithoutChanceItIsTheDatasetsPicture) {
+TEST(DatasetLitStream, WithoutChanceItIsTheDatasetsPicture) {
   constexpr int kSize = 32;
   StreamConfig config = Still();
   config.samples = 4;
   const Workers workers(1);
-  SceneStream stream(config, Balls(1), Info(kSize), 7, workers);
-  std::vector<Camera> cameras(3);
-  const auto rgba = stream.Render(0, 0, 0, cameras);
+  const std::vector<TexturedMesh> balls = Balls(1);
+  TexturedStream stream(JobOf(config, kSize, 7), balls, workers);
+  std::vector<TexturedView> views(3);
+  const auto rgba = stream.Render(0, 0, 0, views);
   ASSERT_TRUE(rgba.ok()) << rgba.status().message();
-  Mesh mesh;
-  const ColoredMesh ball = Ball();
-  mesh.positions = ball.positions, mesh.faces = ball.faces;
-  for (const glm::vec3& c : ball.colors) mesh.colors.emplace_back(c, 1.0f);
+  std::vector<Camera> cameras;
+  for (const TexturedView& view : views) cameras.push_back(view.camera);
   LitRenderer lit;
-  const auto want = lit.Render(mesh, cameras, kSize);
+  const auto want = lit.Render(Ball(), cameras, kSize);
   ASSERT_TRUE(want.ok()) << want.status().message();
   ASSERT_EQ(rgba->size(), want->size());
   for (std::size_t i = 0; i < want->size(); ++i)
     EXPECT_NEAR(255 * (*rgba)[i], (*want)[i], 0.51f) << i;
 }
 
-TEST(SceneStream, DependsOnSeedAndPositionOnly) {
+TEST(DatasetLitStream, DependsOnSeedAndPositionOnly) {
   constexpr int kSize = 16;
   StreamConfig config;
   config.share = 0.5;
   const Workers two(2);
-  SceneStream a(config, Balls(2), Info(kSize), 7, two), b(config, Balls(2), Info(kSize), 7, two),
-      other(config, Balls(2), Info(kSize), 8, two);
+  const std::vector<TexturedMesh> balls = Balls(2);
+  TexturedStream a(JobOf(config, kSize, 7), balls, two), b(JobOf(config, kSize, 7), balls, two),
+      other(JobOf(config, kSize, 8), balls, two);
   EXPECT_EQ(a.Count(8), 4u);
-  std::vector<Camera> cameras(2), again(2);
-  const auto draw = [&](SceneStream& s, std::uint64_t position, std::size_t worker,
-                        std::vector<Camera>& to) {
+  std::vector<TexturedView> views(2), again(2);
+  const auto draw = [&](TexturedStream& s, std::uint64_t position, std::size_t worker,
+                        std::vector<TexturedView>& to) {
     const auto rgba = *s.Render(1, position, worker, to);
     return std::vector<float>(rgba.begin(), rgba.end());
   };
-  const auto first = draw(a, 3, 0, cameras);
+  const auto first = draw(a, 3, 0, views);
   draw(b, 9, 1, again);  // a worker that has drawn something else before
   EXPECT_EQ(first, draw(b, 3, 1, again));
-  EXPECT_EQ(std::memcmp(cameras.data(), again.data(), sizeof(Camera) * 2), 0);
+  EXPECT_EQ(std::memcmp(&views[1].camera, &again[1].camera, sizeof(Camera)), 0);
   EXPECT_NE(first, draw(a, 4, 0, again));
   EXPECT_NE(first, draw(other, 3, 0, again));
 }
 
-TEST(SceneStream, ASheetShowsAllOfIt) {
+TEST(DatasetLitStream, ASheetShowsAllOfIt) {
   const Workers workers(1);
-  SceneStream stream(StreamConfig{}, Balls(3), Info(16), 7, workers);
+  const std::vector<TexturedMesh> balls = Balls(3);
+  TexturedStream stream(JobOf({}, 16, 7), balls, workers);
   const auto sheet = stream.Sheet(2, 3);
   ASSERT_TRUE(sheet.ok());
   EXPECT_EQ(sheet->width, 3 * 16 + 2 * 4);
