@@ -27,7 +27,8 @@ ClassifierNetwork::ClassifierNetwork(nn::Context& context, const ClassifierConfi
         .in = in, .out = out, .kernel = 3, .options = {.padding = 1}, .bias = false};
     level.Add<nn::Conv2dLayer>("conv", context, same, rng);
     level.Add<nn::BatchNorm>("norm", context, out);
-    in = out, out = std::min(2 * out, config.most);
+    in = out;
+    out = std::min(2 * out, config.most);
   }
   head_.Add<nn::LinearLayer>("fc", context, nn::LinearShape{.in = in, .out = classes}, rng);
 }

@@ -86,7 +86,8 @@ Pose PoseOf(const Camera& camera, int size) {
   // A shift of the origin along the image is one of the principal point.
   const double x = (camera.cx + camera.fx * camera.translation[0] / distance) / size;
   const double y = (camera.cy - camera.fy * camera.translation[1] / distance) / size;
-  pose[6] = (x - 0.5) / kShiftUnit, pose[7] = (y - 0.5) / kShiftUnit;
+  pose[6] = (x - 0.5) / kShiftUnit;
+  pose[7] = (y - 0.5) / kShiftUnit;
   pose[8] = (camera.fx / distance / size - kScale) / kScaleUnit;
   pose[9] = (1 / distance - kNearness) / kNearnessUnit;
   return pose;
@@ -101,7 +102,8 @@ Camera CameraOf(const Pose& pose, int size) {
   const double distance = 1 / std::max(view.nearness, 1 / kFarthest);
   camera.translation[2] = static_cast<float>(-distance);
   camera.fx = camera.fy = static_cast<float>(view.scale * distance * size);
-  camera.cx = static_cast<float>(view.x * size), camera.cy = static_cast<float>(view.y * size);
+  camera.cx = static_cast<float>(view.x * size);
+  camera.cy = static_cast<float>(view.y * size);
   return camera;
 }
 
@@ -139,7 +141,8 @@ class PictureLookup::Picture {
       x += weight * glm::dvec3(p[0], p[1], p[2]);
       n += weight * normals_[v];
     }
-    x = view_.Turned(x), n = view_.Turned(n);
+    x = view_.Turned(x);
+    n = view_.Turned(n);
     n /= glm::length(n) + 1e-12;
     // In units of the camera's distance: depth 1 at the origin.
     const double depth = std::max(kLeastDepth, 1 - view_.nearness * x.z);
@@ -187,10 +190,13 @@ struct CueSums {
   void Add(const SeenTexel& seen) {
     const double weight = std::max(0.0, seen.facing) * seen.rgba[3];
     const double brightness = (seen.Color(0) + seen.Color(1) + seen.Color(2)) / 3;
-    all += weight, bright += weight * brightness;
-    normal += weight * seen.normal, bright_normal += weight * brightness * seen.normal;
+    all += weight;
+    bright += weight * brightness;
+    normal += weight * seen.normal;
+    bright_normal += weight * brightness * seen.normal;
     if (brightness < kBlack) return;
-    lit += weight, lit_normal += weight * seen.normal;
+    lit += weight;
+    lit_normal += weight * seen.normal;
     lit_bright_normal += weight * brightness * seen.normal;
     lit_products += glm::outerProduct(weight * seen.normal, seen.normal);
   }

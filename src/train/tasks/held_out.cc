@@ -72,7 +72,8 @@ class Exhibitor {
       left.image = OverGrey(
           PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), size, size}, kPaper);
       right.image = std::move(predicted[v]);
-      out.pictures.push_back(std::move(left)), out.pictures.push_back(std::move(right));
+      out.pictures.push_back(std::move(left));
+      out.pictures.push_back(std::move(right));
     }
     return out;
   }
@@ -122,7 +123,8 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   out.credits = info.credits;
   out.fov_y = info.camera.lens.fov_y;
   out.azimuth = info.camera.azimuth_step * ShownViews(info.views)[0];
-  out.elevation = info.camera.elevation, out.distance = info.camera.distance;
+  out.elevation = info.camera.elevation;
+  out.distance = info.camera.distance;
   return out;
 }
 
@@ -132,7 +134,8 @@ Example NamedExample(const Dataset& dataset, int index) {
   out.name = model.name.empty() ? model.id : model.name;
   out.class_name = dataset.info().classes[static_cast<std::size_t>(model.class_index)];
   out.id = model.id;
-  out.creator = model.creator, out.license = model.license;
+  out.creator = model.creator;
+  out.license = model.license;
   return out;
 }
 

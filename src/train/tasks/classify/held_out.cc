@@ -131,7 +131,8 @@ class Examiner {
 
   void Fill(std::span<const int> models) {
     const ClassMeans means(data_, models);
-    out_.classes = means.classes(), out_.class_models = means.class_models();
+    out_.classes = means.classes();
+    out_.class_models = means.class_models();
     out_.rows = {means.Row("most frequent class", frequent_)};
     if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieved_));
     out_.rows.push_back(means.Row("tilegrad", said_));

@@ -24,7 +24,8 @@ std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth) {
     double sum = 0, squares = 0;
     for (std::size_t i = 0; i < truth.rows(); ++i) {
       const double x = truth.Row(i)[c];
-      sum += x, squares += x * x;
+      sum += x;
+      squares += x * x;
     }
     out[c] = squares / n - (sum / n) * (sum / n) > kLeastDeviation * kLeastDeviation;
   }

@@ -205,7 +205,8 @@ Status GanLearner::Score(std::int64_t steps) {
   nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
     T* const scores = scores_.data<T>();
     scores[kDistance] = T(seen.distance);
-    scores[kShapes] = T(seen.shapes), scores[kColors] = T(seen.colors);
+    scores[kShapes] = T(seen.shapes);
+    scores[kColors] = T(seen.colors);
     T& best = scores[stage == GanStage::kShape ? kBestShape : kBestTexture];
     if (scores[kDistance] >= best) return;
     best = scores[kDistance];

@@ -70,13 +70,16 @@ std::vector<float> BetweenCodes(std::span<const float> from, std::span<const flo
                                 double share) {
   double dot = 0, aa = 0, bb = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
-    dot += double{from[i]} * to[i], aa += double{from[i]} * from[i], bb += double{to[i]} * to[i];
+    dot += double{from[i]} * to[i];
+    aa += double{from[i]} * from[i];
+    bb += double{to[i]} * to[i];
   }
   const double angle = std::acos(std::clamp(dot / std::sqrt(std::max(aa * bb, 1e-30)), -1.0, 1.0));
   double a = 1 - share, b = share;
-  if (std::sin(angle) > 1e-6)
-    a = std::sin((1 - share) * angle) / std::sin(angle),
+  if (std::sin(angle) > 1e-6) {
+    a = std::sin((1 - share) * angle) / std::sin(angle);
     b = std::sin(share * angle) / std::sin(angle);
+  }
   std::vector<float> out(from.size());
   for (std::size_t i = 0; i < out.size(); ++i)
     out[i] = static_cast<float>(a * double{from[i]} + b * double{to[i]});

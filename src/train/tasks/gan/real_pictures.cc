@@ -16,8 +16,10 @@ std::array<double, 2> BoxOf(std::span<const T> plane, std::size_t side) {
   std::size_t left = side, right = 0, top = side, bottom = 0;
   for (std::size_t i = 0; i < plane.size(); ++i) {
     if (plane[i] < T(0.5)) continue;
-    left = std::min(left, i % side), right = std::max(right, i % side + 1);
-    top = std::min(top, i / side), bottom = std::max(bottom, i / side + 1);
+    left = std::min(left, i % side);
+    right = std::max(right, i % side + 1);
+    top = std::min(top, i / side);
+    bottom = std::max(bottom, i / side + 1);
   }
   if (right == 0) return {1, 1};
   return {static_cast<double>(right - left), static_cast<double>(bottom - top)};

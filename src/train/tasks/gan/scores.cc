@@ -114,7 +114,8 @@ class Scorer {
                     ScoreSets(Only(truth.shapes, covered), Only(CoverFeatures(made), covered),
                               job_.seed, workers));
     Spread spread = SpreadOf(made, workers);
-    spread.shapes /= out_.truth.shapes, spread.colors /= out_.truth.colors;
+    spread.shapes /= out_.truth.shapes;
+    spread.colors /= out_.truth.colors;
     if (rows->empty())
       rows->push_back({"true objects (floor)", of_pictures.floor, of_shapes.floor, {1, 1}});
     rows->push_back({method, of_pictures.generated, of_shapes.generated, spread});

@@ -149,7 +149,8 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
     if (stop) return Cancelled("stopped while generating; nothing was written");
     TILEGRAD_ASSIGN(auto meshes, model.Generate(model.Code(0, static_cast<std::uint64_t>(i))));
     Example& example = out.examples.emplace_back();
-    example.name = fmt::format("sample {}", i + 1), example.id = fmt::format("{}", i + 1);
+    example.name = fmt::format("sample {}", i + 1);
+    example.id = fmt::format("{}", i + 1);
     for (const double azimuth : {0.0, 180.0}) {
       constexpr int kSize = 192;
       TILEGRAD_ASSIGN(auto pictures,

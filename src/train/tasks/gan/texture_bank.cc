@@ -66,8 +66,10 @@ class Extraction {
   // The cameras that the network knows.
   static TexturedStreamConfig StreamOf(const TextureBank::Job& job, const TexturedModel& model) {
     TexturedStreamConfig out = model.config().stream;
-    out.draw.stretch = job.stream.draw.stretch, out.draw.taper = job.stream.draw.taper;
-    out.draw.recolor = job.stream.draw.recolor, out.draw.brightness = job.stream.draw.brightness;
+    out.draw.stretch = job.stream.draw.stretch;
+    out.draw.taper = job.stream.draw.taper;
+    out.draw.recolor = job.stream.draw.recolor;
+    out.draw.brightness = job.stream.draw.brightness;
     out.mirrored = job.stream.mirrored;
     return out;
   }
@@ -92,7 +94,8 @@ Result<TextureBank> TextureBank::Extract(const Job& job, const Data& data, const
                                          const ProgressSink& progress, const StopFlag& stop) {
   TextureBank out;
   out.seed_ = job.seed;
-  out.rows_ = job.maps.texture_size, out.columns_ = ShapeTextureGenerator::MapWidth(job.maps);
+  out.rows_ = job.maps.texture_size;
+  out.columns_ = ShapeTextureGenerator::MapWidth(job.maps);
   out.map_bytes_ = static_cast<std::size_t>(3 * out.rows_ * out.columns_);
   const std::string place = "textures.run = \"" + job.run.string() + "\"";
   auto predictor = Predictor::Load(job.run, workers);

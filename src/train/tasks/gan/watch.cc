@@ -52,7 +52,9 @@ FeatureRows CellsOf(const nn::Tensor& planes, std::int64_t cells_a_side, bool de
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto x = static_cast<double>(numbers[i]);
     SheetCell& cell = cells[at[i]];
-    ++cell.count, cell.sum += x, cell.squares += x * x;
+    ++cell.count;
+    cell.sum += x;
+    cell.squares += x * x;
   }
   FeatureRows out;
   out.width = deviations ? 2 * count : count;
@@ -115,7 +117,10 @@ Spread SpreadOf(const ObjectViews& set, const Workers& workers) {
   });
   Spread out;
   const double pairs = static_cast<double>(n) * static_cast<double>(n - 1) / 2;
-  for (const Spread& row : rows) out.shapes += row.shapes / pairs, out.colors += row.colors / pairs;
+  for (const Spread& row : rows) {
+    out.shapes += row.shapes / pairs;
+    out.colors += row.colors / pairs;
+  }
   return out;
 }
 

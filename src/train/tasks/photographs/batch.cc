@@ -57,7 +57,8 @@ PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig&
   const std::int64_t s = store.size();
   const bool flow = config.network.texture == "flow";
   PhotographBatch batch;
-  batch.input = context.Empty({b, 3, s, s}), batch.colors = context.Empty({b, 3, s, s});
+  batch.input = context.Empty({b, 3, s, s});
+  batch.colors = context.Empty({b, 3, s, s});
   batch.mask = context.Empty({b, s, s});
   if (flow) batch.barrier = context.Empty({b, 1, s, s});
   batch.crops.resize(photographs.size());

@@ -48,7 +48,8 @@ struct ImageScore {
     double both = 0, either = 0;
     for (std::size_t i = 0; i < plane; ++i) {
       const double a = drawn[3 * plane + i], b = mask[i];
-      both += a * b, either += a + b - a * b;
+      both += a * b;
+      either += a + b - a * b;
     }
     iou_loss = 1 - both / std::max(either, 1e-10);
   }
@@ -154,7 +155,8 @@ class PhotographJudge {
     const ImageScore image(drawn, batch.colors.span<float>().subspan(3 * plane * i, 3 * plane),
                            batch.mask.span<float>().subspan(plane * i, plane));
     Score score;
-    score.texture_l1 = image.color, score.mask_loss = image.iou_loss;
+    score.texture_l1 = image.color;
+    score.mask_loss = image.iou_loss;
     const CroppedPhoto& crop = batch.crops[i];
     KeypointScore own(1, kPckThreshold);
     for (std::size_t k = 0; k < crop.keypoints.size(); ++k) {
@@ -174,8 +176,10 @@ class PhotographJudge {
     Evaluation out;
     out.split = SplitName(job_.split);
     out.predictor = job_.predictor.description();
-    out.dataset_source = set_.source, out.views_per_model = 1;
-    out.classes = {set_.source}, out.class_models = {static_cast<int>(chosen.size())};
+    out.dataset_source = set_.source;
+    out.views_per_model = 1;
+    out.classes = {set_.source};
+    out.class_models = {static_cast<int>(chosen.size())};
     for (int m = 0; m < kMethods; ++m) {
       const Score mean = tallies_[static_cast<std::size_t>(m)].Mean(set_.keypoint_names.size());
       out.rows.push_back({kRowNames[m], {mean}, mean});

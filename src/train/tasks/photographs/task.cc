@@ -150,7 +150,8 @@ Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Wor
     TILEGRAD_ASSIGN(auto predicted,
                     PredictPhotographs(model.context(), model.network(), batch.input));
     Example& example = out.examples.emplace_back();
-    example.name = example.id = store.photograph(i).id, example.class_name = set.source;
+    example.name = example.id = store.photograph(i).id;
+    example.class_name = set.source;
     example.pictures = std::move(rows[static_cast<std::size_t>(i)]);
     example.prediction = std::move(predicted[0].mesh);
   }

@@ -22,7 +22,9 @@ constexpr double kShapeRate = 0.01, kColorRate = 0.03, kFinalFactor = 0.05;
 ImageStore StoreOf(const ModelData& data, const DatasetInfo& info) {
   ImageStore store;
   store.bytes = data.images;
-  store.models = 1, store.views = info.views, store.size = info.image_size;
+  store.models = 1;
+  store.views = info.views;
+  store.size = info.image_size;
   for (int view = 0; view < info.views; ++view) store.cameras.push_back(info.camera.View(view));
   return store;
 }

@@ -95,7 +95,8 @@ class TexturedEvaluator {
     }
     TILEGRAD_ASSIGN(HeldOutViews views,
                     HeldOutViews::Load({config_, dataset_, models}, workers_, progress, stop));
-    scores_.resize(models.size()), unusable_.resize(models.size());
+    scores_.resize(models.size());
+    unusable_.resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
       if (stop) return Cancelled("stopped while evaluating; nothing was written");
       if (progress) progress({"evaluating", i, models.size(), ""});
@@ -149,14 +150,16 @@ class TexturedEvaluator {
 
   static void AddShape(const train::Score& shape, MethodScores* scores) {
     for (train::Score& score : *scores) {
-      score.iou = shape.iou, score.f_score = shape.f_score;
+      score.iou = shape.iou;
+      score.f_score = shape.f_score;
       score.carved_iou = shape.carved_iou;
     }
   }
 
   void Fill(const std::vector<int>& models) {
     const ClassMeans means(dataset_, models);
-    out_.classes = means.classes(), out_.class_models = means.class_models();
+    out_.classes = means.classes();
+    out_.class_models = means.class_models();
     const bool lit = LightingOf(config_.light) != Lighting::kNone;
     for (int m = lit ? kWithoutLight : kTexturedOurs; m < kLightMethods; ++m) {
       std::vector<train::Score> of_method;

@@ -68,7 +68,10 @@ class LightSearch::Attempts {
   void Try(const Direction& direction) {
     const FoundLight light{direction, search_.has_sky_ ? BestSky(direction) : 0};
     const double error = Error(light);
-    if (error < least_) least_ = error, best_ = light;
+    if (error < least_) {
+      least_ = error;
+      best_ = light;
+    }
   }
   // Those around the best one.
   void TryRing(double radius) {

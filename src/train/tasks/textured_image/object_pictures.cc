@@ -19,8 +19,10 @@ MeshSceneOptions SceneOptions(const Surface& surface) {
   options.color_space = ColorSpace::kSrgb;
   options.normals = NormalSource::kSmooth;
   options.filter = Filter::kBilinear;
-  options.ambient = surface.ambient, options.diffuse = surface.diffuse;
-  options.specular = surface.specular, options.shininess = surface.shininess;
+  options.ambient = surface.ambient;
+  options.diffuse = surface.diffuse;
+  options.specular = surface.specular;
+  options.shininess = surface.shininess;
   options.blend = false;
   return options;
 }
@@ -50,8 +52,11 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
   if (lighting == Lighting::kLambert || lighting == Lighting::kPhong) scene.lights = {&light, 1};
   if (lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
   if (appearance == Appearance::kLight) {
-    scene.textures = {}, scene.uvs = {}, scene.colors = {};
-    scene.surfaces = {&surface, 1}, scene.face_surfaces = {};
+    scene.textures = {};
+    scene.uvs = {};
+    scene.colors = {};
+    scene.surfaces = {&surface, 1};
+    scene.face_surfaces = {};
   }
   const RenderOptions options{.width = samples_ * size_, .height = samples_ * size_};
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, options,

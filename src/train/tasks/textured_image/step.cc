@@ -42,7 +42,9 @@ void ReadRow(const nn::Var& rows, std::size_t row, std::array<float, N>* out) {
 double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   double dot = 0, aa = 0, bb = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    dot += double{a[i]} * b[i], aa += double{a[i]} * a[i], bb += double{b[i]} * b[i];
+    dot += double{a[i]} * b[i];
+    aa += double{a[i]} * a[i];
+    bb += double{b[i]} * b[i];
   }
   return std::acos(std::clamp(dot / std::sqrt(aa * bb), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
