@@ -60,7 +60,8 @@ class Adam {
   explicit Adam(float rate) : rate_(rate) {}
 
   void Step(std::span<float> x, std::span<const float> d_x) {
-    m_.resize(x.size()), v_.resize(x.size());
+    m_.resize(x.size());
+    v_.resize(x.size());
     ++steps_;
     const float m_scale = 1 / (1 - std::pow(0.9f, steps_));
     const float v_scale = 1 / (1 - std::pow(0.99f, steps_));

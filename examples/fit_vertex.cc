@@ -18,7 +18,8 @@ int main() {
   const std::vector<float> alpha(frame.images().alpha.begin(), frame.images().alpha.end());
   const std::vector<float> color(frame.images().color.begin(), frame.images().color.end());
 
-  positions[6] = -0.3f, positions[7] = 0.3f;  // the top, moved away
+  positions[6] = -0.3f;
+  positions[7] = 0.3f;  // the top, moved away
   std::vector<float> d_positions(9), d_alpha, d_color;
   const tilegrad::SceneGradients d_scene{.positions = d_positions};
   for (int step = 0; step <= 40; ++step) {

@@ -23,8 +23,10 @@ static int Run(tilegrad_renderer* renderer, tilegrad_frame* frame) {
   int i;
 
   tilegrad_scene_init(&scene);
-  scene.positions = positions, scene.vertices = 3;
-  scene.faces = faces, scene.face_count = 1;
+  scene.positions = positions;
+  scene.vertices = 3;
+  scene.faces = faces;
+  scene.face_count = 1;
   tilegrad_options_init(&options);
   options.width = options.height = kSize;
   options.delta = 1e-3;
@@ -33,7 +35,10 @@ static int Run(tilegrad_renderer* renderer, tilegrad_frame* frame) {
   }
   tilegrad_images_init(&images);
   if (tilegrad_frame_images(frame, &images) != TILEGRAD_OK) return 1;
-  for (i = 0; i < kPixels; ++i) area += images.alpha[i], d_alpha[i] = 1;
+  for (i = 0; i < kPixels; ++i) {
+    area += images.alpha[i];
+    d_alpha[i] = 1;
+  }
 
   tilegrad_frame_gradients_init(&d_frame);
   d_frame.alpha = d_alpha;

@@ -18,7 +18,10 @@ int main() {
   tilegrad::Frame frame;
   tilegrad::Status status =
       renderer.Render({&scene, 1}, {.width = 64, .height = 64, .delta = 1e-3}, {}, &frame);
-  if (!status.ok()) return std::fprintf(stderr, "%s\n", status.message().c_str()), 1;
+  if (!status.ok()) {
+    std::fprintf(stderr, "%s\n", status.message().c_str());
+    return 1;
+  }
   const tilegrad::Images& images = frame.images();
 
   for (int row = 14; row < 50; row += 2) {  // every second row: characters are higher than wide
@@ -33,7 +36,10 @@ int main() {
   std::vector<float> d_positions(positions.size());
   const tilegrad::SceneGradients d_scene{.positions = d_positions};
   status = renderer.Backward(frame, {.alpha = d_alpha}, {&d_scene, 1});
-  if (!status.ok()) return std::fprintf(stderr, "%s\n", status.message().c_str()), 1;
+  if (!status.ok()) {
+    std::fprintf(stderr, "%s\n", status.message().c_str());
+    return 1;
+  }
 
   for (int v = 0; v < 3; ++v) {
     std::printf(

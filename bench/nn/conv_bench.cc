@@ -17,7 +17,9 @@ namespace {
 Conv2dShape ShapeOf(const benchmark::State& state) {
   const auto arg = [&](std::size_t i) { return static_cast<std::size_t>(state.range(i)); };
   Conv2dShape s;
-  s.batch = arg(1), s.in_channels = arg(2), s.out_channels = arg(3);
+  s.batch = arg(1);
+  s.in_channels = arg(2);
+  s.out_channels = arg(3);
   s.in_height = s.in_width = arg(4);
   s.kernel_height = s.kernel_width = arg(5);
   s.stride = arg(6);

@@ -55,12 +55,17 @@ HWY_INLINE void CountUp(std::uint64_t* count) {
 }
 
 // Two additions for each FMA: six instructions a cycle where two of them are FMAs.
+template <std::size_t i>
+HWY_INLINE void AddAndCount(Vec factor, Vec* sum, std::uint64_t* count) {
+  sum[i] = hn::MulAdd(factor, factor, sum[i]);
+  CountUp(&count[i % 6]);
+  CountUp(&count[(i + 3) % 6]);
+}
+
 template <std::size_t... i>
 HWY_INLINE void FullCoreStep(std::index_sequence<i...>, Vec factor, Vec* sum,
                              std::uint64_t* count) {
-  ((sum[i] = hn::MulAdd(factor, factor, sum[i]), CountUp(&count[i % 6]),
-    CountUp(&count[(i + 3) % 6])),
-   ...);
+  (AddAndCount<i>(factor, sum, count), ...);
 }
 
 double RunFullCoreTarget() {

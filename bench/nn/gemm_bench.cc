@@ -26,11 +26,17 @@ struct Matrices {
 struct Setup {
   explicit Setup(const benchmark::State& state)
       : m(Arg(state, 0)), n(Arg(state, 1)), k(Arg(state, 2)), matrices(m, n, k) {
-    p.m = m, p.n = n, p.k = k;
-    p.transpose_a = state.range(3) == kTN, p.transpose_b = state.range(3) == kNT;
-    p.a = matrices.a.data(), p.lda = p.transpose_a ? m : k;
-    p.b = matrices.b.data(), p.ldb = p.transpose_b ? k : n;
-    p.c = matrices.c.data(), p.ldc = n;
+    p.m = m;
+    p.n = n;
+    p.k = k;
+    p.transpose_a = state.range(3) == kTN;
+    p.transpose_b = state.range(3) == kNT;
+    p.a = matrices.a.data();
+    p.lda = p.transpose_a ? m : k;
+    p.b = matrices.b.data();
+    p.ldb = p.transpose_b ? k : n;
+    p.c = matrices.c.data();
+    p.ldc = n;
   }
   static std::size_t Arg(const benchmark::State& state, std::size_t i) {
     return static_cast<std::size_t>(state.range(i));

@@ -70,6 +70,9 @@ int main(int argc, char** argv) {
     return 2;
   }
   const tilegrad::Status status = tilegrad::ForceTargetFromEnvironment();
-  if (!status.ok()) return std::fprintf(stderr, "%s\n", status.message().c_str()), 2;
+  if (!status.ok()) {
+    std::fprintf(stderr, "%s\n", status.message().c_str());
+    return 2;
+  }
   return tilegrad::nn::bench::Serve(argv[1], std::atoi(argv[2]));
 }

@@ -30,8 +30,12 @@ std::vector<T> Read(std::ifstream& from, std::size_t count) {
 
 tilegrad::Camera CameraOf(const float* numbers) {
   tilegrad::Camera out;
-  std::copy_n(numbers, 9, out.rotation), std::copy_n(numbers + 9, 3, out.translation);
-  out.fx = numbers[12], out.fy = numbers[13], out.cx = numbers[14], out.cy = numbers[15];
+  std::copy_n(numbers, 9, out.rotation);
+  std::copy_n(numbers + 9, 3, out.translation);
+  out.fx = numbers[12];
+  out.fy = numbers[13];
+  out.cx = numbers[14];
+  out.cy = numbers[15];
   out.near_plane = numbers[16];
   return out;
 }
@@ -47,15 +51,18 @@ Batch ReadBatch(const char* path) {
   std::ifstream file(path, std::ios::binary);
   const auto sizes = Read<std::int32_t>(file, 4);
   Batch b;
-  b.images = static_cast<std::size_t>(sizes[0]), b.vertices = static_cast<std::size_t>(sizes[1]);
+  b.images = static_cast<std::size_t>(sizes[0]);
+  b.vertices = static_cast<std::size_t>(sizes[1]);
   b.size = sizes[3];
   b.positions = Read<float>(file, b.images * b.vertices * 3);
   b.colors = Read<float>(file, b.vertices * 3);
   b.cameras = Read<float>(file, b.images * kCamera);
   b.faces = Read<std::int32_t>(file, static_cast<std::size_t>(sizes[2]) * 3);
   const std::size_t pixels = b.images * static_cast<std::size_t>(b.size) * b.size;
-  b.d_color = Read<float>(file, 3 * pixels), b.d_alpha = Read<float>(file, pixels);
-  b.d_positions.resize(b.positions.size()), b.d_colors.resize(b.colors.size());
+  b.d_color = Read<float>(file, 3 * pixels);
+  b.d_alpha = Read<float>(file, pixels);
+  b.d_positions.resize(b.positions.size());
+  b.d_colors.resize(b.colors.size());
   if (!file) std::exit(2);
   return b;
 }
@@ -88,7 +95,10 @@ double CpuSeconds() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) return std::fprintf(stderr, "usage: call_server BATCH THREADS\n"), 2;
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: call_server BATCH THREADS\n");
+    return 2;
+  }
   Batch batch = ReadBatch(argv[1]);
   tilegrad::Renderer renderer({.threads = std::atoi(argv[2])});
   tilegrad::Frame frame;
@@ -98,7 +108,10 @@ int main(int argc, char** argv) {
     const double cpu = CpuSeconds();
     for (int i = 0; i < steps; ++i) {
       const tilegrad::Status status = Step(batch, backward != 0, renderer, frame);
-      if (!status.ok()) return std::fprintf(stderr, "%s\n", status.message().c_str()), 1;
+      if (!status.ok()) {
+        std::fprintf(stderr, "%s\n", status.message().c_str());
+        return 1;
+      }
     }
     const double cpu_seconds = CpuSeconds() - cpu;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - wall;

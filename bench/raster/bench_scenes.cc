@@ -15,7 +15,10 @@ namespace {
 // Rotation of a random unit quaternion, row-major.
 std::array<double, 9> RandomRotation(Rng* rng) {
   double q[4], norm = 0;
-  for (double& v : q) v = rng->Normal(), norm += v * v;
+  for (double& v : q) {
+    v = rng->Normal();
+    norm += v * v;
+  }
   for (double& v : q) v /= std::sqrt(norm);
   const auto [w, x, y, z] = q;
   return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
@@ -73,7 +76,8 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
   const std::size_t pixels = static_cast<std::size_t>(spec.images) *
                              static_cast<std::size_t>(spec.size) *
                              static_cast<std::size_t>(spec.size);
-  d_attributes.resize(3 * pixels), d_alpha.resize(pixels);
+  d_attributes.resize(3 * pixels);
+  d_alpha.resize(pixels);
   for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
   for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
 }

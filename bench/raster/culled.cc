@@ -25,7 +25,8 @@ void DrawFaces(const CulledScene& scene, CulledFrame* frame) {
       if (!Weights(t, inverse, p, w)) return;
       const float depth = w[0] * z[0] + w[1] * z[1] + w[2] * z[2];
       if (!(depth < frame->depth[pixel])) return;
-      frame->depth[pixel] = depth, frame->face_ids[pixel] = static_cast<std::int32_t>(f);
+      frame->depth[pixel] = depth;
+      frame->face_ids[pixel] = static_cast<std::int32_t>(f);
       std::copy(w, w + 3, &frame->weights[3 * pixel]);
     });
   }
@@ -64,7 +65,8 @@ void SoftAlpha(const CulledScene& scene, CulledFrame* frame) {
 }
 
 void Add(std::span<float> to, std::int32_t vertex, float x, float y) {
-  to[2 * static_cast<std::size_t>(vertex)] += x, to[2 * static_cast<std::size_t>(vertex) + 1] += y;
+  to[2 * static_cast<std::size_t>(vertex)] += x;
+  to[2 * static_cast<std::size_t>(vertex) + 1] += y;
 }
 
 void ColorBackward(const CulledScene& scene, const CulledFrame& frame, const CulledGradients& g) {

@@ -33,8 +33,11 @@ struct CulledFrame {
   std::vector<float> depth, weights, colors, alpha;  // weights [H,W,3] barycentric
 
   void Resize(std::size_t pixels) {
-    face_ids.resize(pixels), depth.resize(pixels), alpha.resize(pixels);
-    weights.resize(3 * pixels), colors.resize(3 * pixels);
+    face_ids.resize(pixels);
+    depth.resize(pixels);
+    alpha.resize(pixels);
+    weights.resize(3 * pixels);
+    colors.resize(3 * pixels);
   }
 };
 

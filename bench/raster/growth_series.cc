@@ -45,6 +45,10 @@ void AddDelta() {
 
 }  // namespace
 
-void AddGrowthSeries() { AddFaces(), AddPixels(), AddDelta(); }
+void AddGrowthSeries() {
+  AddFaces();
+  AddPixels();
+  AddDelta();
+}
 
 }  // namespace tilegrad::bench

@@ -31,9 +31,14 @@ struct ProjectedBench {
     mask.delta = batch.options.delta;
     for (const PipelineScene& scene : batch.scenes) Append(scene, spec.size);
     const std::size_t pixels = compat::PixelCount(raster.size) * batch.scenes.size();
-    features.assign(z.size() * kChannels, T(0.5)), d_features.resize(features.size());
-    ids.resize(pixels), alpha.resize(pixels), d_alpha.assign(pixels, T(1));
-    image.resize(pixels * kChannels), d_image.assign(image.size(), T(1)), d_xy.resize(xy.size());
+    features.assign(z.size() * kChannels, T(0.5));
+    d_features.resize(features.size());
+    ids.resize(pixels);
+    alpha.resize(pixels);
+    d_alpha.assign(pixels, T(1));
+    image.resize(pixels * kChannels);
+    d_image.assign(image.size(), T(1));
+    d_xy.resize(xy.size());
     failed = !Rasterize().ok() || !Soften().ok();
   }
   compat::ProjectedBatchT<T> View() const {
@@ -112,7 +117,9 @@ void Layers(benchmark::State& state, const SceneSpec& spec, int layers) {
     vertices.insert(vertices.end(), {-b.xy[2 * i], b.xy[2 * i + 1], -b.z[i]});
   }
   pytorch3d::LayeredOptions options;
-  options.size = b.raster.size, options.faces_per_pixel = layers, options.blur_radius = 9.2e-4;
+  options.size = b.raster.size;
+  options.faces_per_pixel = layers;
+  options.blur_radius = 9.2e-4;
   options.rule.clip_barycentrics = true;
   const std::size_t n = compat::PixelCount(options.size) * static_cast<std::size_t>(layers);
   std::vector<std::int64_t> ids(n);
@@ -131,15 +138,18 @@ void RegisterProjected(const std::string& scalar, const SceneSpec& spec) {
     benchmark::RegisterBenchmark((what + ("/" + name)).c_str(), Projected<T>, spec, call)
         ->Unit(benchmark::kMillisecond);
   };
-  add("Rasterize", &Bench::Rasterize), add("RasterizeBackward", &Bench::RasterizeBack);
-  add("SoftMask", &Bench::Soften), add("SoftMaskBackward", &Bench::SoftenBack);
+  add("Rasterize", &Bench::Rasterize);
+  add("RasterizeBackward", &Bench::RasterizeBack);
+  add("SoftMask", &Bench::Soften);
+  add("SoftMaskBackward", &Bench::SoftenBack);
   benchmark::RegisterBenchmark(("NaiveVisibility/" + name).c_str(), NaiveVisibility<T>, spec)
       ->Unit(benchmark::kMillisecond);
 }
 
 const bool kRegistered = [] {
   for (const SceneSpec& spec : {kScenes[0], kScenes[1], kScenes[2]}) {
-    RegisterProjected<float>("float", spec), RegisterProjected<double>("double", spec);
+    RegisterProjected<float>("float", spec);
+    RegisterProjected<double>("double", spec);
     for (const int layers : {1, 8, 50}) {
       const std::string name = "Layers/" + std::string(spec.name) + "/" + std::to_string(layers);
       benchmark::RegisterBenchmark(name.c_str(), Layers, spec, layers)

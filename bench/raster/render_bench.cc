@@ -34,7 +34,8 @@ void AddBoth(const std::string& name, RunSpec spec) {
 void AddParts(const std::string& name, RunSpec spec) {
   for (const bool color : {true, false}) {
     const std::string what = color ? "color" : "alpha";
-    spec.color = color, spec.alpha = !color;
+    spec.color = color;
+    spec.alpha = !color;
     AddRun({name, what, "culled"}, spec, Who::kCulled);
     AddRun({name, what, "naive"}, spec, Who::kNaive);
     AddOurs(name, what, spec);

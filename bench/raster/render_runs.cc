@@ -121,7 +121,8 @@ void CulledForwardRun(benchmark::State& state, const RunSpec& spec) {
 
 void CulledBackwardRun(benchmark::State& state, const RunSpec& spec) {
   CulledBatch culled(MakeBatch(spec));
-  culled.Forward({}), culled.Backward(PartsOf(spec));
+  culled.Forward({});
+  culled.Backward(PartsOf(spec));
   for (auto _ : state) culled.Backward(PartsOf(spec));
 }
 

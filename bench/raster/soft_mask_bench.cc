@@ -19,7 +19,8 @@ namespace {
 // Image 0 of a scene on the screen, with what the soft mask reads.
 struct SoftBench {
   SoftBench(const SceneSpec& spec, double delta, double error) : batch(spec) {
-    batch.options.delta = delta, batch.options.max_alpha_error = error;
+    batch.options.delta = delta;
+    batch.options.max_alpha_error = error;
     const PipelineScene& scene = batch.scenes[0];
     raster::Project(FaceSourceOf(scene, batch.options), spec.size, spec.size, &buffers);
     mesh = buffers.View();
@@ -30,7 +31,8 @@ struct SoftBench {
         renderer.Render({&scene, 1}, batch.options, {.alpha = false, .attributes = false}, &frame);
     failed = !status.ok();
     Build();
-    alpha.resize(frame.face_ids.size()), transmittance.resize(alpha.size());
+    alpha.resize(frame.face_ids.size());
+    transmittance.resize(alpha.size());
   }
   void Build() {
     raster::SetUpFaces(mesh, /*cull_back=*/false, buffers.reject, {.corners = &tree.corners});

@@ -60,18 +60,27 @@ Limit Combine(double hard, double soft, double soft_in_blocks, double memory, do
 }  // namespace
 
 WorkCount& WorkCount::operator+=(const WorkCount& other) {
-  pixels += other.pixels, faces += other.faces, covered += other.covered, seen += other.seen;
-  hard_blocks += other.hard_blocks, soft_blocks += other.soft_blocks, pairs += other.pairs;
+  pixels += other.pixels;
+  faces += other.faces;
+  covered += other.covered;
+  seen += other.seen;
+  hard_blocks += other.hard_blocks;
+  soft_blocks += other.soft_blocks;
+  pairs += other.pairs;
   return *this;
 }
 
 WorkCount CountWork(const CulledScene& scene, const CulledFrame& frame) {
   WorkCount work;
   const std::size_t faces = scene.faces.size() / 3;
-  work.pixels = static_cast<double>(frame.face_ids.size()), work.faces = static_cast<double>(faces);
+  work.pixels = static_cast<double>(frame.face_ids.size());
+  work.faces = static_cast<double>(faces);
   std::vector<bool> seen(faces);
   for (const std::int32_t id : frame.face_ids) {
-    if (id >= 0) ++work.covered, seen[static_cast<std::size_t>(id)] = true;
+    if (id >= 0) {
+      ++work.covered;
+      seen[static_cast<std::size_t>(id)] = true;
+    }
   }
   work.seen = static_cast<double>(std::count(seen.begin(), seen.end(), true));
   for (std::size_t f = 0; f < faces; ++f) CountFace(scene, frame, plain::FaceAt(scene, f), &work);

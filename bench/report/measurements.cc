@@ -63,7 +63,8 @@ Result<std::vector<Measurement>> Collect(const ordered_json& runs) {
                    [](const Samples& a, const Samples& b) { return a.family < b.family; });
   std::vector<Measurement> out;
   for (Samples& s : all) {
-    s.result.cpu_ms = Median(s.cpu), s.result.wall_ms = Median(s.wall);
+    s.result.cpu_ms = Median(s.cpu);
+    s.result.wall_ms = Median(s.wall);
     s.result.repetitions = static_cast<int>(s.cpu.size());
     out.push_back(std::move(s.result));
   }

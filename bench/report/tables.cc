@@ -145,7 +145,8 @@ std::string GrowthTable(const std::vector<Measurement>& all, const std::string& 
   if (plot.series.empty()) return "";
   std::string head = "| " + plot.x_label, line = "|--:", out;
   for (const train::LogSeries& series : plot.series) {
-    head += " | " + series.name[0] + ", ms", line += "|--:";
+    head += " | " + series.name[0] + ", ms";
+    line += "|--:";
   }
   for (const train::LogPoint& place : plot.series[0].points) {
     out += fmt::format("| {:g}", place.x);

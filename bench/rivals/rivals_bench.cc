@@ -35,11 +35,13 @@ struct RivalBench {
       positions.insert(positions.end(), scene.positions.begin(), scene.positions.end());
       cameras.push_back(scene.camera);
     }
-    alpha.resize(batch.d_alpha.size()), d_positions.resize(positions.size());
+    alpha.resize(batch.d_alpha.size());
+    d_positions.resize(positions.size());
     if (!with_color) return;
     while (colors.size() < positions.size())
       colors.insert(colors.end(), batch.colors.begin(), batch.colors.end());
-    color.resize(3 * alpha.size()), d_colors.resize(colors.size());
+    color.resize(3 * alpha.size());
+    d_colors.resize(colors.size());
     for (int c = 0; c < 3; ++c)
       d_color.insert(d_color.end(), batch.d_alpha.begin(), batch.d_alpha.end());
   }
@@ -82,7 +84,8 @@ void Rival(benchmark::State& state, const RivalRun& run, Way way, int count) {
                             {bench.d_positions, bench.d_colors}),
           state);
   };
-  forward(), backward();  // which find their memory
+  forward();
+  backward();  // which find their memory
   for (auto _ : state) way == Way::kForward ? forward() : backward();
   state.counters["images"] = kScenes[0].images;
 }
@@ -90,7 +93,8 @@ void Rival(benchmark::State& state, const RivalRun& run, Way way, int count) {
 // As training does: delta 1/7000, max_alpha_error 1e-5.
 void Dibr(benchmark::State& state, Way way, int count) {
   RivalBench bench;
-  bench.batch.options.delta = 1.0 / 7000, bench.batch.options.max_alpha_error = 1e-5;
+  bench.batch.options.delta = 1.0 / 7000;
+  bench.batch.options.max_alpha_error = 1e-5;
   const Workers workers(count);
   Pipeline renderer(workers);
   PipelineFrame frame;
@@ -106,7 +110,8 @@ void Dibr(benchmark::State& state, Way way, int count) {
                             bench.batch.d_scenes),
           state);
   };
-  forward(), backward();
+  forward();
+  backward();
   for (auto _ : state) way == Way::kForward ? forward() : backward();
   state.counters["images"] = kScenes[0].images;
 }
@@ -156,7 +161,10 @@ void RegisterAll() {
   }
 }
 
-const bool kRegistered = (RegisterAll(), true);
+const bool kRegistered = [] {
+  RegisterAll();
+  return true;
+}();
 
 }  // namespace
 }  // namespace tilegrad::bench

@@ -47,12 +47,14 @@ class ShadedBatch {
   ShadedBatch(const SceneSpec& spec, const RequestSpec& request)
       : batch_(spec), request_spec_(request) {
     batch_.options.interpolation = Interpolation::kPerspective;
-    request_.color = request.color, request_.attributes = false;
+    request_.color = request.color;
+    request_.attributes = false;
     Rng rng(11, 2);
     Fill(2 * batch_.positions[0].size() / 3, &rng, &uvs_);
     Fill(3 * kTextureSize * kTextureSize, &rng, &texels_);
     texture_ = {texels_, kTextureSize, kTextureSize, Wrap::kRepeat, request.filter};
-    d_texture_.resize(texels_.size()), d_uvs_.resize(uvs_.size());
+    d_texture_.resize(texels_.size());
+    d_uvs_.resize(uvs_.size());
     d_texture_views_ = {d_texture_};
     d_colors_.resize(batch_.colors.size());
     for (float& color : batch_.colors) color *= request.scale;
@@ -73,23 +75,31 @@ class ShadedBatch {
   void AddScene(std::size_t n) {
     Scene scene;
     const PipelineScene& mesh = batch_.scenes[n];
-    scene.positions = mesh.positions, scene.faces = mesh.faces, scene.camera = mesh.camera;
+    scene.positions = mesh.positions;
+    scene.faces = mesh.faces;
+    scene.camera = mesh.camera;
     SceneGradients d;
     d.positions = batch_.d_positions[n];
     if (request_spec_.textured) {
-      scene.uvs = {uvs_, Rate::kVertex}, scene.textures = {&texture_, 1};
-      d.uvs = d_uvs_, d.textures = d_texture_views_;
+      scene.uvs = {uvs_, Rate::kVertex};
+      scene.textures = {&texture_, 1};
+      d.uvs = d_uvs_;
+      d.textures = d_texture_views_;
     } else if (request_spec_.color) {
       scene.colors = {batch_.colors, Rate::kVertex};
       d.colors = d_colors_;
     }
     scene.shading.lighting = request_spec_.lighting;
     if (request_spec_.lighting == Lighting::kSphericalHarmonics) {
-      scene.sh = sh_, d.sh = d_sh_;
+      scene.sh = sh_;
+      d.sh = d_sh_;
     } else if (request_spec_.lighting != Lighting::kNone) {
-      scene.lights = lights_, d.lights = d_lights_, d.surfaces = d_surfaces_;
+      scene.lights = lights_;
+      d.lights = d_lights_;
+      d.surfaces = d_surfaces_;
     }
-    scenes_.push_back(scene), d_scenes_.push_back(d);
+    scenes_.push_back(scene);
+    d_scenes_.push_back(d);
   }
 
   BenchBatch batch_;

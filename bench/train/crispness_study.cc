@@ -104,7 +104,8 @@ Status Score(const Data& data, const Path& run) {
     };
     TILEGRAD_ASSIGN(const double of_a, HighPassEnergy(planes(a), both));
     TILEGRAD_ASSIGN(const double of_b, HighPassEnergy(planes(b), both));
-    energy += of_a, true_energy += of_b;
+    energy += of_a;
+    true_energy += of_b;
     for (std::size_t k = 0; k < numbers; ++k)
       l1 += std::abs(static_cast<double>(a[k]) - static_cast<double>(b[k])) /
             static_cast<double>(numbers * pictures.truth.size());

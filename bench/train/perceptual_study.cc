@@ -81,7 +81,8 @@ std::vector<std::vector<double>> Excess(const FeatureFunction& features, const P
 class Tally {
  public:
   void Add(const std::vector<std::vector<double>>& layers) {
-    single_.resize(layers.size()), from_.resize(layers.size());
+    single_.resize(layers.size());
+    from_.resize(layers.size());
     pictures_ += layers[0].size();
     for (std::size_t p = 0; p < layers[0].size(); ++p) {
       double sum = 0;

@@ -44,7 +44,10 @@ int main() {
   SilhouetteLoss loss({.width = 64, .height = 64, .delta = 1e-3}, std::vector<float>(64 * 64));
   std::vector<float> d_positions(positions.size());
   const tilegrad::Result<float> value = loss.Add(scene, d_positions);
-  if (!value.ok()) return std::fprintf(stderr, "%s\n", value.status().message().c_str()), 1;
+  if (!value.ok()) {
+    std::fprintf(stderr, "%s\n", value.status().message().c_str());
+    return 1;
+  }
   std::printf("tilegrad %s: loss %.4f, d_positions[0] %.4f\n", TILEGRAD_VERSION, *value,
               d_positions[0]);
   return *value > 0 && d_positions[0] < 0 ? 0 : 1;  // a mask without anything: shrink

@@ -186,7 +186,9 @@ void BindNames(py::module_& m) {
 // Defaults of records that are plain numbers in Python.
 void BindDefaults(py::module_& m) {
   std::vector<double> camera(kCameraNumbers), surface(kSurfaceNumbers), light(kLightNumbers);
-  PutCamera<double>({}, camera), PutSurface<double>({}, surface), PutLight<double>({}, light);
+  PutCamera<double>({}, camera);
+  PutSurface<double>({}, surface);
+  PutLight<double>({}, light);
   m.attr("CAMERA") = py::cast(camera);
   m.attr("SURFACE") = py::cast(surface);
   m.attr("LIGHT") = py::cast(light);
@@ -200,7 +202,10 @@ void BindDefaults(py::module_& m) {
 }  // namespace
 
 void BindRenderer(py::module_& m) {
-  BindNames(m), BindDefaults(m), BindOptions(m), BindSceneArrays(m);
+  BindNames(m);
+  BindDefaults(m);
+  BindOptions(m);
+  BindSceneArrays(m);
   py::class_<RendererObject> renderer(m, "Renderer", "Threads and scratch memory.");
   renderer
       .def(py::init<int>(), py::arg("threads"), "threads: as of tilegrad.Renderer, checked there.")

@@ -22,15 +22,7 @@ void BindRuns(py::module_& m);
 
 namespace {
 
-Camera CameraOf(const CameraRow& row) {
-  const Camera64 from = CameraOfNumbers(row);
-  Camera out;
-  std::copy_n(from.rotation, 9, out.rotation), std::copy_n(from.translation, 3, out.translation);
-  out.fx = static_cast<float>(from.fx), out.fy = static_cast<float>(from.fy);
-  out.cx = static_cast<float>(from.cx), out.cy = static_cast<float>(from.cy);
-  out.near_plane = static_cast<float>(from.near_plane);
-  return out;
-}
+Camera CameraOf(const CameraRow& row) { return CameraCast<float>(CameraOfNumbers(row)); }
 
 using Words = std::vector<std::string>;  // "key=value"
 
@@ -195,7 +187,8 @@ py::dict Train(const py::dict& request, const py::object& listener) {
   train::TrainJob job;
   job.config = ValueOrThrow(train::FindConfig(request["config"].cast<std::string>()));
   ThrowIfError(train::ApplyOverrides(request["overrides"].cast<Words>(), &job.config));
-  job.data = request["data"].cast<Path>(), job.run = request["out"].cast<Path>();
+  job.data = request["data"].cast<Path>();
+  job.run = request["out"].cast<Path>();
   job.existing = ExistingOf(request);
   job.extends = request["resume"].cast<bool>();
   job.max_minutes = request["max_minutes"].cast<double>();

@@ -15,7 +15,11 @@ namespace {
 py::tuple ArraysOf(const Mesh& mesh) {
   py::array_t<float> positions({static_cast<py::ssize_t>(mesh.positions.size()), py::ssize_t{3}});
   float* p = positions.mutable_data();
-  for (const glm::vec3& v : mesh.positions) *p++ = v.x, *p++ = v.y, *p++ = v.z;
+  for (const glm::vec3& v : mesh.positions) {
+    *p++ = v.x;
+    *p++ = v.y;
+    *p++ = v.z;
+  }
   py::array_t<std::int32_t> faces({static_cast<py::ssize_t>(mesh.faces.size()), py::ssize_t{3}});
   std::int32_t* f = faces.mutable_data();
   for (const auto& face : mesh.faces) {

@@ -16,7 +16,8 @@ using CameraRow = std::array<double, kCameraNumbers>;
 
 inline CameraRow NumbersOf(const Camera64& c) {
   CameraRow out;
-  std::copy_n(c.rotation, 9, out.begin()), std::copy_n(c.translation, 3, out.begin() + 9);
+  std::copy_n(c.rotation, 9, out.begin());
+  std::copy_n(c.translation, 3, out.begin() + 9);
   const double rest[] = {c.fx, c.fy, c.cx, c.cy, c.near_plane};
   std::copy_n(rest, 5, out.begin() + 12);
   return out;
@@ -26,7 +27,10 @@ inline Camera64 CameraOfNumbers(const CameraRow& numbers) {
   Camera64 out;
   std::copy_n(numbers.begin(), 9, out.rotation);
   std::copy_n(numbers.begin() + 9, 3, out.translation);
-  out.fx = numbers[12], out.fy = numbers[13], out.cx = numbers[14], out.cy = numbers[15];
+  out.fx = numbers[12];
+  out.fy = numbers[13];
+  out.cx = numbers[14];
+  out.cy = numbers[15];
   out.near_plane = numbers[16];
   return out;
 }

@@ -37,7 +37,9 @@ GradientRecord<T>::GradientRecord(const SceneRecord<T>& scene, const py::dict& a
     arrays_.emplace_back(py::cast<std::string_view>(entry.first),
                          py::reinterpret_borrow<py::object>(entry.second));
   }
-  SetStreams(scene), SetTextures(scene), SetRecords(scene);
+  SetStreams(scene);
+  SetTextures(scene);
+  SetRecords(scene);
 }
 
 // The names live as long as the dictionary, which lives as long as the call.

@@ -90,10 +90,14 @@ SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
   };
   for (std::size_t n = 0; n < count; ++n) {
     SceneT<T>& scene = scenes_[n];
-    scene.faces = faces.Of(n), scene.camera = CameraOf(cameras.Of(n));
+    scene.faces = faces.Of(n);
+    scene.camera = CameraOf(cameras.Of(n));
     scene.shading = std::apply(model, arrays_.shading);
   }
-  SetStreams(), SetTextures(), SetSurfaces(), SetLights();
+  SetStreams();
+  SetTextures();
+  SetSurfaces();
+  SetLights();
 }
 
 namespace {

@@ -90,7 +90,8 @@ py::tuple RasterizeBackward(const py::array& xy, const RasterBackwardCall& call)
       SpanOf<T>(call.d_image, kName, "the gradient", {of.images, height, width, channels});
   auto d_xy = NewArray<T>({call.wants_xy ? of.images : 0, of.faces, 3, 2});
   auto d_features = NewArray<T>({call.wants_features ? of.images : 0, of.faces, 3, channels});
-  adjoint.d_xy = NumbersOf(d_xy), adjoint.d_features = NumbersOf(d_features);
+  adjoint.d_xy = NumbersOf(d_xy);
+  adjoint.d_features = NumbersOf(d_features);
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
     return kaolin::RasterizeProjectedBackward<T>(
@@ -114,7 +115,8 @@ struct MaskInput {
       : of(xy), batch{of.n(), of.f(), {}, {}, {}}, options(rule) {
     batch.xy = SpanOf<T>(xy, name, "face_vertices_image", {of.images, of.faces, 3, 2});
     ids = SpanOf<std::int32_t>(face_ids, name, "selected_face_idx", {of.images, kAny, kAny});
-    height = face_ids.shape(1), width = face_ids.shape(2);
+    height = face_ids.shape(1);
+    width = face_ids.shape(2);
     options.size = {static_cast<int>(width), static_cast<int>(height)};
   }
 };
@@ -163,7 +165,8 @@ void BindMaskOptions(py::module_& m) {
                                            "How projected_soft_mask works.")
       .def(py::init([](double delta, double max_alpha_error) {
              kaolin::ProjectedMaskOptions options;
-             options.delta = delta, options.max_alpha_error = max_alpha_error;
+             options.delta = delta;
+             options.max_alpha_error = max_alpha_error;
              return options;
            }),
            py::kw_only(), py::arg("delta"), py::arg("max_alpha_error"))
@@ -171,8 +174,11 @@ void BindMaskOptions(py::module_& m) {
           "paper",
           [](double delta, double boxlen, int knum, double edge_eps) {
             kaolin::ProjectedMaskOptions options;
-            options.delta = delta, options.rule = AlphaRule::kPaper;
-            options.paper_box = boxlen, options.paper_faces = knum, options.paper_eps = edge_eps;
+            options.delta = delta;
+            options.rule = AlphaRule::kPaper;
+            options.paper_box = boxlen;
+            options.paper_faces = knum;
+            options.paper_eps = edge_eps;
             return options;
           },
           py::kw_only(), py::arg("delta"), py::arg("boxlen"), py::arg("knum"), py::arg("edge_eps"),

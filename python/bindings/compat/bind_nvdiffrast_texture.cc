@@ -33,7 +33,8 @@ py::ssize_t ChannelsOf(const py::array& level) { return level.shape(level.ndim()
 
 std::vector<py::ssize_t> LevelShape(const py::array& base, const nvdiffrast::MipSize& size) {
   std::vector<py::ssize_t> shape(base.shape(), base.shape() + base.ndim());
-  shape[shape.size() - 3] = size.height, shape[shape.size() - 2] = size.width;
+  shape[shape.size() - 3] = size.height;
+  shape[shape.size() - 2] = size.width;
   return shape;
 }
 
