@@ -68,9 +68,12 @@ tilegrad_scene DefaultScene() {
 tilegrad_options DefaultOptions() {
   const tilegrad::RenderOptions from;
   tilegrad_options to = {};
-  to.width = from.width, to.height = from.height, to.delta = from.delta;
+  to.width = from.width;
+  to.height = from.height;
+  to.delta = from.delta;
   to.max_alpha_error = from.max_alpha_error;
-  to.paper_box = from.paper_box, to.paper_faces = from.paper_faces;
+  to.paper_box = from.paper_box;
+  to.paper_faces = from.paper_faces;
   to.color = to.alpha = to.attributes = 1;
   return to;
 }
@@ -175,7 +178,8 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
       return ReadScenes(scenes, count, frame);
     });
     if (!status.ok()) {
-      frame->frame = {}, frame->count = 0;
+      frame->frame = {};
+      frame->count = 0;
       return status;
     }
     return renderer->renderer.Render(frame->views, api::OptionsOf(known), api::OutputsOf(known),

@@ -136,7 +136,9 @@ Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
 }
 
 void CScene::Set(const tilegrad_scene& from) {
-  textures.clear(), surfaces.clear(), lights.clear();
+  textures.clear();
+  surfaces.clear();
+  lights.clear();
   for (const tilegrad_texture& t : SpanOf(from.textures, from.texture_count)) {
     textures.push_back({SpanOf(t.texels, TexelsOf(t)), t.width, t.height, static_cast<Wrap>(t.wrap),
                         static_cast<Filter>(t.filter)});
@@ -151,7 +153,9 @@ void CScene::Set(const tilegrad_scene& from) {
   scene.channels = from.channels;
   SetStreams(from, &scene);
   scene.camera = CopyCamera<Camera>(from.camera);
-  scene.textures = textures, scene.surfaces = surfaces, scene.lights = lights;
+  scene.textures = textures;
+  scene.surfaces = surfaces;
+  scene.lights = lights;
   scene.face_surfaces = SpanOf(from.face_surfaces, from.face_count);
   scene.shading = {static_cast<Lighting>(from.lighting), static_cast<Normals>(from.normal_kind),
                    from.two_sided != 0, from.clamp != 0};
@@ -184,7 +188,9 @@ void CGradients::Set(const tilegrad_scene_gradients& from, const Scene& scene) {
   surfaces.resize(from.surfaces == nullptr ? 0 : SurfacesOf(scene));
   lights.resize(from.lights == nullptr ? 0 : scene.lights.size());
   gradients.camera = from.camera == nullptr ? nullptr : &camera;
-  gradients.textures = textures, gradients.surfaces = surfaces, gradients.lights = lights;
+  gradients.textures = textures;
+  gradients.surfaces = surfaces;
+  gradients.lights = lights;
   gradients.sh = SpanOf(from.sh, scene.sh.size());
   SetArrays(from, scene, &gradients);
   GradientRecords<float>::Clear(gradients);
@@ -244,7 +250,9 @@ FrameGradients FrameGradientsOf(const tilegrad_frame_gradients& from, const Imag
 
 tilegrad_images ImagesOf(const Images& from) {
   tilegrad_images to = {};
-  to.count = from.count, to.height = from.height, to.width = from.width;
+  to.count = from.count;
+  to.height = from.height;
+  to.width = from.width;
   to.channels = from.channels;
   to.face_ids = from.face_ids.empty() ? nullptr : from.face_ids.data();
   ForEachOutput(

@@ -184,7 +184,9 @@ Status RunFitting(const FitOptions& options) {
   const Workers workers(options.workers);
   if (options.doctor) return RunDoctor(options, std::move(job), workers, watch);
   TILEGRAD_ASSIGN(const FolderLock lock, ClaimFolder(options, guard));
-  job.out = options.out, job.locked = true, job.existing = train::ExistingRun::kContinue;
+  job.out = options.out;
+  job.locked = true;
+  job.existing = train::ExistingRun::kContinue;
   job.warn = line.Warnings();
   return WithCommand(RunShown(options, &job, workers, watch.progress),
                      "tilegrad fit --resume --out " + options.out);

@@ -74,11 +74,13 @@ Status RunTradeoff(const TradeoffOptions& options) {
   for (const StudyScene& scene : scenes) {
     for (const double delta : options.deltas) {
       TradeoffJob job;
-      job.scene.positions = scene.positions, job.scene.faces = scene.faces;
+      job.scene.positions = scene.positions;
+      job.scene.faces = scene.faces;
       job.scene.camera = scene.camera;
       job.options.width = job.options.height = scene.size;
       job.options.delta = delta;
-      job.errors = options.errors, job.repetitions = options.repetitions;
+      job.errors = options.errors;
+      job.repetitions = options.repetitions;
       auto tradeoff = MeasureTradeoff(job, line.Sink(), StopOnSignals());
       if (!tradeoff.ok()) {
         return tradeoff.status().Within(fmt::format("{}, delta = {:g}", scene.name, delta));

@@ -71,7 +71,10 @@ std::array<float, 3> FaceColor(std::int32_t id) {
 std::vector<float> ShownDepth(const std::vector<float>& depth) {
   float near = std::numeric_limits<float>::infinity(), far = 0;
   for (const float z : depth) {
-    if (std::isfinite(z)) near = std::min(near, z), far = std::max(far, z);
+    if (std::isfinite(z)) {
+      near = std::min(near, z);
+      far = std::max(far, z);
+    }
   }
   std::vector<float> out;
   const float range = std::max(far - near, 1e-30f);

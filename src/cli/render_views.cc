@@ -125,7 +125,8 @@ Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& m
   const Framing framing{{s.fov, size.width, size.height}, s.margin, s.distance};
   TILEGRAD_ASSIGN(const UpAxis axis, UpAxisOf(s));
   Mesh upright;
-  upright.positions = mesh.positions, upright.faces = mesh.faces;
+  upright.positions = mesh.positions;
+  upright.faces = mesh.faces;
   TurnUpright(axis, &upright);
   TILEGRAD_ASSIGN(const auto cameras, FrameMesh(upright, framing, angles));
   std::vector<CameraView> views;

@@ -27,7 +27,8 @@ double LargestStep(std::span<const ImageU8> row) {
   double sum = 0, largest = 0;
   for (std::size_t k = 1; k < row.size(); ++k) {
     const double step = Difference(row[k - 1], row[k]);
-    sum += step, largest = std::max(largest, step);
+    sum += step;
+    largest = std::max(largest, step);
   }
   return sum > 0 ? largest * static_cast<double>(row.size() - 1) / sum : 1;
 }

@@ -281,7 +281,8 @@ Result<std::string> ZipFingerprint(const Path& path) {
         (~info.valid & (ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_CRC)) != 0) {
       return DataLoss("{}: entry {} has no name, size or checksum", path.string(), i);
     }
-    hash.Add(info.name), hash.Add(fmt::format("{} {}", info.size, info.crc));
+    hash.Add(info.name);
+    hash.Add(fmt::format("{} {}", info.size, info.crc));
   }
   return hash.Text();
 }

@@ -98,7 +98,10 @@ Status AddView(const std::string& place, const Cameras& cameras, std::uint32_t c
                     camera_id);
   if (!found->second.ok()) return found->second.status();
   const ColmapCamera& k = found->second->camera;
-  camera.fx = k.fx, camera.fy = k.fy, camera.cx = k.cx, camera.cy = k.cy;
+  camera.fx = k.fx;
+  camera.fy = k.fy;
+  camera.cx = k.cx;
+  camera.cy = k.cy;
   const auto converted = FromColmap(camera);
   if (!converted.ok())
     return DataLoss("{}: image \"{}\": {}", place, name, converted.status().message());

@@ -85,7 +85,10 @@ Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
   Json attributes;
   attributes["POSITION"] = glb.AddVectors(p.positions);
   glm::vec3 low = p.positions[0], high = low;
-  for (const glm::vec3& q : p.positions) low = glm::min(low, q), high = glm::max(high, q);
+  for (const glm::vec3& q : p.positions) {
+    low = glm::min(low, q);
+    high = glm::max(high, q);
+  }
   Json& accessor = glb.json["accessors"].back();
   accessor["min"] = {low.x, low.y, low.z};
   accessor["max"] = {high.x, high.y, high.z};

@@ -162,7 +162,8 @@ std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
     if (type == "PLTE") {
       Bytes out(bytes.begin(), bytes.end());
       out.insert(out.begin() + static_cast<std::ptrdiff_t>(at + 8 + length), kFull - length, 0);
-      out[at + 2] = kFull >> 8, out[at + 3] = kFull & 0xff;  // stb_image looks at no checksum
+      out[at + 2] = kFull >> 8;
+      out[at + 3] = kFull & 0xff;  // stb_image looks at no checksum
       return out;
     }
     at += kFrame + length;

@@ -33,8 +33,10 @@ void EachUsed(const LoadedMesh& loaded, Use use) {
 
 ExactBounds BoundsOf(const LoadedMesh& loaded) {
   ExactBounds b;
-  EachUsed(loaded,
-           [&](const glm::dvec3& p) { b.low = glm::min(b.low, p), b.high = glm::max(b.high, p); });
+  EachUsed(loaded, [&](const glm::dvec3& p) {
+    b.low = glm::min(b.low, p);
+    b.high = glm::max(b.high, p);
+  });
   return b;
 }
 

@@ -70,7 +70,10 @@ class OffColors {
       fractions = fractions || token.find_first_of(".eE") != std::string_view::npos;
     }
     good = good && (count == 0 || count >= 3);
-    if (!good || count == 0) return rows_.push_back({glm::vec4(1), 0}), good;
+    if (!good || count == 0) {
+      rows_.push_back({glm::vec4(1), 0});
+      return good;
+    }
     rows_.push_back({color, fractions ? 0 : count});
     any_ = true;
     fractions_ = fractions_ || fractions;

@@ -46,7 +46,8 @@ class Pixels {
 
   bool Import(const ImageU8& image) {
     picture_.use_argb = 1;
-    picture_.width = image.width, picture_.height = image.height;
+    picture_.width = image.width;
+    picture_.height = image.height;
     const int stride = image.width * image.channels;
     return valid_ && (image.channels == 4
                           ? WebPPictureImportRGBA(&picture_, image.pixels.data(), stride)

@@ -147,10 +147,14 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
     return Update(slot, product.Value().value(), {0, slot.parameter.value.value().elements()});
   }
   GemmProblem<float> gradient;
-  gradient.m = static_cast<std::size_t>(a.shape()[1]), gradient.k = steps;
+  gradient.m = static_cast<std::size_t>(a.shape()[1]);
+  gradient.k = steps;
   gradient.n = static_cast<std::size_t>(b.shape()[1]);
-  gradient.a = a.data<float>(), gradient.lda = gradient.m, gradient.transpose_a = true;
-  gradient.b = b.data<float>(), gradient.ldb = gradient.n;
+  gradient.a = a.data<float>();
+  gradient.lda = gradient.m;
+  gradient.transpose_a = true;
+  gradient.b = b.data<float>();
+  gradient.ldb = gradient.n;
   const Numbers all{0, slot.parameter.value.value().elements()};
   ProductAdamStep(gradient, Problem<float>(slot, all), context_.kernels());
 }

@@ -127,7 +127,8 @@ Status CheckApart(std::vector<std::tuple<std::size_t, std::size_t, std::string>>
     if (begin < last_end) {
       return BadEntry(name, fmt::format("its data overlaps that of \"{}\"", last).c_str());
     }
-    last_end = end, last = name;
+    last_end = end;
+    last = name;
   }
   return {};
 }

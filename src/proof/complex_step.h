@@ -45,9 +45,12 @@ inline std::complex<double> SlopeLoss(const SlopeProblem& p,
       if (seen || std::isfinite(image[i].real())) sum += image[i] * weights[i];  // not far depth
     }
   };
-  add(frame.color, p.d_frame.color), add(frame.alpha, p.d_frame.alpha);
-  add(frame.normals, p.d_frame.normals), add(frame.uv, p.d_frame.uv);
-  add(frame.depth, p.d_frame.depth), add(frame.attributes, p.d_frame.attributes);
+  add(frame.color, p.d_frame.color);
+  add(frame.alpha, p.d_frame.alpha);
+  add(frame.normals, p.d_frame.normals);
+  add(frame.uv, p.d_frame.uv);
+  add(frame.depth, p.d_frame.depth);
+  add(frame.attributes, p.d_frame.attributes);
   return sum;
 }
 
@@ -64,7 +67,8 @@ inline Slope SlopeAlong(const SlopeProblem& problem, const std::string& kind,
     const double direction = rng.Uniform(-1, 1);
     x += Complex(0, direction * kStep);
     const double term = gradient[slope.count++] * direction;
-    slope.by_gradient += term, slope.size += std::abs(term);
+    slope.by_gradient += term;
+    slope.size += std::abs(term);
   });
   slope.by_step = SlopeLoss(problem, moved).imag() / kStep;
   return slope;

@@ -69,15 +69,21 @@ struct OwnedScene {
     for (const auto& t : textures) {
       texture_views.push_back({t.texels, t.width, t.height, t.wrap, t.filter});
     }
-    SceneT<T> view;
-    view.positions = mesh.positions, view.faces = mesh.faces, view.camera = mesh.camera;
-    view.attributes = {mesh.attributes, mesh.rate}, view.channels = mesh.channels;
-    view.shading = shading;
-    view.colors = {colors, colors_rate}, view.uvs = {uvs, uvs_rate};
-    view.normals = {normals, normals_rate}, view.textures = texture_views;
-    view.surfaces = surfaces, view.face_surfaces = face_surfaces, view.lights = lights;
-    view.light_directions = light_directions, view.sh = sh;
-    return view;
+    return {.positions = mesh.positions,
+            .faces = mesh.faces,
+            .camera = mesh.camera,
+            .colors = {colors, colors_rate},
+            .uvs = {uvs, uvs_rate},
+            .normals = {normals, normals_rate},
+            .textures = texture_views,
+            .surfaces = surfaces,
+            .face_surfaces = face_surfaces,
+            .shading = shading,
+            .lights = lights,
+            .light_directions = light_directions,
+            .sh = sh,
+            .attributes = {mesh.attributes, mesh.rate},
+            .channels = mesh.channels};
   }
 };
 
@@ -88,18 +94,29 @@ void ForEachNumber(OwnedScene<T>& s, const Visit& visit) {
   const auto all = [&](const char* name, auto& values) {
     for (auto& v : values) visit(name, v);
   };
-  all("positions", s.mesh.positions), all("attributes", s.mesh.attributes);
-  all("colors", s.colors), all("uvs", s.uvs), all("normals", s.normals);
-  all("light_directions", s.light_directions), all("sh", s.sh);
+  all("positions", s.mesh.positions);
+  all("attributes", s.mesh.attributes);
+  all("colors", s.colors);
+  all("uvs", s.uvs);
+  all("normals", s.normals);
+  all("light_directions", s.light_directions);
+  all("sh", s.sh);
   for (auto& t : s.textures) all("texture", t.texels);
   for (auto& u : s.surfaces) {
-    all("base_color", u.base_color), all("ambient", u.ambient), all("diffuse", u.diffuse);
-    all("specular", u.specular), visit("shininess", u.shininess);
+    all("base_color", u.base_color);
+    all("ambient", u.ambient);
+    all("diffuse", u.diffuse);
+    all("specular", u.specular);
+    visit("shininess", u.shininess);
   }
-  for (auto& l : s.lights) all("light", l.direction), visit("intensity", l.intensity);
-  all("rotation", s.mesh.camera.rotation), all("translation", s.mesh.camera.translation);
-  visit("lens", s.mesh.camera.fx), visit("lens", s.mesh.camera.fy);
-  visit("lens", s.mesh.camera.cx), visit("lens", s.mesh.camera.cy);
+  for (auto& l : s.lights) {
+    all("light", l.direction);
+    visit("intensity", l.intensity);
+  }
+  CameraT<T>& camera = s.mesh.camera;
+  all("rotation", camera.rotation);
+  all("translation", camera.translation);
+  for (T* number : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) visit("lens", *number);
 }
 
 template <class T, class U>
@@ -109,10 +126,16 @@ OwnedScene<T> OwnedCast(const OwnedScene<U>& s) {
     return std::array<T, 3>{T(v[0]), T(v[1]), T(v[2])};
   };
   OwnedScene<T> out;
-  out.shading = s.shading, out.mesh = MeshCast<T>(s.mesh);
-  out.colors = cast(s.colors), out.uvs = cast(s.uvs), out.normals = cast(s.normals);
-  out.light_directions = cast(s.light_directions), out.sh = cast(s.sh);
-  out.colors_rate = s.colors_rate, out.uvs_rate = s.uvs_rate, out.normals_rate = s.normals_rate;
+  out.shading = s.shading;
+  out.mesh = MeshCast<T>(s.mesh);
+  out.colors = cast(s.colors);
+  out.uvs = cast(s.uvs);
+  out.normals = cast(s.normals);
+  out.light_directions = cast(s.light_directions);
+  out.sh = cast(s.sh);
+  out.colors_rate = s.colors_rate;
+  out.uvs_rate = s.uvs_rate;
+  out.normals_rate = s.normals_rate;
   for (const auto& t : s.textures) {
     out.textures.push_back({cast(t.texels), t.width, t.height, t.wrap, t.filter});
   }
@@ -137,11 +160,17 @@ struct OwnedGradients {
   }
   SceneGradientsT<T> View() {
     SceneGradientsT<T> view;
-    view.positions = d.mesh.positions, view.attributes = d.mesh.attributes;
+    view.positions = d.mesh.positions;
+    view.attributes = d.mesh.attributes;
     view.camera = &d.mesh.camera;
-    view.colors = d.colors, view.uvs = d.uvs, view.light_directions = d.light_directions;
+    view.colors = d.colors;
+    view.uvs = d.uvs;
+    view.light_directions = d.light_directions;
     if (d.shading.normals == Normals::kGiven) view.normals = d.normals;
-    view.textures = textures, view.surfaces = d.surfaces, view.lights = d.lights, view.sh = d.sh;
+    view.textures = textures;
+    view.surfaces = d.surfaces;
+    view.lights = d.lights;
+    view.sh = d.sh;
     return view;
   }
 };
@@ -167,16 +196,15 @@ struct OwnedCotangents {
   OwnedCotangents<U> Cast() const {
     const auto cast = [](const std::vector<T>& v) { return std::vector<U>(v.begin(), v.end()); };
     OwnedCotangents<U> out;
-    out.color = cast(color), out.alpha = cast(alpha), out.normals = cast(normals);
-    out.uv = cast(uv), out.depth = cast(depth), out.attributes = cast(attributes);
+    out.color = cast(color);
+    out.alpha = cast(alpha);
+    out.normals = cast(normals);
+    out.uv = cast(uv);
+    out.depth = cast(depth);
+    out.attributes = cast(attributes);
     return out;
   }
-  FrameGradientsT<T> View() const {
-    FrameGradientsT<T> view;
-    view.color = color, view.alpha = alpha, view.normals = normals, view.uv = uv;
-    view.depth = depth, view.attributes = attributes;
-    return view;
-  }
+  FrameGradientsT<T> View() const { return {color, alpha, attributes, normals, uv, depth}; }
 };
 
 }  // namespace tilegrad

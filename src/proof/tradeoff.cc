@@ -78,7 +78,8 @@ class Measurement {
  private:
   RenderOptions WithError(double error) const {
     RenderOptions options = job_.options;
-    options.alpha_rule = AlphaRule::kAllFaces, options.max_alpha_error = error;
+    options.alpha_rule = AlphaRule::kAllFaces;
+    options.max_alpha_error = error;
     return options;
   }
   Status Step(const char* stage, std::size_t done, std::size_t total) {
@@ -125,7 +126,8 @@ Status Measurement::FindIds() {
   TILEGRAD_TRY(Forward(WithError(0.1)));
   ids_.assign(frame_.face_ids.begin(), frame_.face_ids.end());
   Rng rng(1, 0);
-  d_alpha_.resize(pixels()), d_alpha_truth_.assign(pixels(), 0.0f);
+  d_alpha_.resize(pixels());
+  d_alpha_truth_.assign(pixels(), 0.0f);
   for (float& d : d_alpha_) d = static_cast<float>(rng.Uniform(-1, 1));
   truth_.rows = SpreadRows(job_, job_.scene.faces.size() / 3);
   const auto width = static_cast<std::size_t>(job_.options.width);
@@ -141,7 +143,8 @@ Status Measurement::FindIds() {
 Status Measurement::FindTruth() {
   const std::vector<double> positions(job_.scene.positions.begin(), job_.scene.positions.end());
   PipelineSceneT<double> scene;
-  scene.positions = positions, scene.faces = job_.scene.faces;
+  scene.positions = positions;
+  scene.faces = job_.scene.faces;
   scene.camera = CameraCast<double>(job_.scene.camera);
   PreparedScene<double> prepared;
   PrepareRef(scene, job_.options, &prepared);
@@ -193,7 +196,9 @@ Status Measurement::AddAccuracy(const RenderOptions& setting) {
       const auto pixel = static_cast<std::size_t>(y * job_.options.width + x);
       if (ids_[pixel] >= 0) continue;
       const double off = std::abs(static_cast<double>(frame_.alpha[pixel]) - truth_.alpha[pixel]);
-      row.largest = std::max(row.largest, off), row.mean += off, ++background;
+      row.largest = std::max(row.largest, off);
+      row.mean += off;
+      ++background;
     }
   }
   row.mean /= static_cast<double>(std::max<std::size_t>(background, 1));
@@ -226,11 +231,13 @@ Status Measurement::Time() {
       TILEGRAD_TRY(Forward(settings_[i]));
       const double between = CpuMilliseconds();
       TILEGRAD_TRY(Backward(settings_[i], d_alpha_));
-      forward[i].push_back(between - started), backward[i].push_back(CpuMilliseconds() - between);
+      forward[i].push_back(between - started);
+      backward[i].push_back(CpuMilliseconds() - between);
     }
   }
   for (std::size_t i = 0; i < out_.rows.size(); ++i) {
-    out_.rows[i].forward_ms = Median(forward[i]), out_.rows[i].backward_ms = Median(backward[i]);
+    out_.rows[i].forward_ms = Median(forward[i]);
+    out_.rows[i].backward_ms = Median(backward[i]);
   }
   return {};
 }

@@ -11,7 +11,8 @@ namespace {
 
 StudyScene SceneOf(std::string name, const Mesh& mesh, int size) {
   StudyScene out;
-  out.name = std::move(name), out.size = size;
+  out.name = std::move(name);
+  out.size = size;
   for (const glm::vec3& p : mesh.positions) {
     for (int i = 0; i < 3; ++i) out.positions.push_back(p[i]);
   }

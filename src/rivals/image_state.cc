@@ -31,7 +31,8 @@ void ForRows(const Workers::Part& part, int rows, const Task& task) {
 
 template <class T>
 void ImageStateT<T>::Project(const BatchT<T>& batch, std::size_t n) {
-  points_.resize(3 * batch.vertices()), corners_.resize(3 * batch.faces.size());
+  points_.resize(3 * batch.vertices());
+  corners_.resize(3 * batch.faces.size());
   ProjectVertices<T>(batch.cameras[n], batch.size, batch.MeshOf(batch.positions, n), points_);
   for (std::size_t c = 0; c < batch.faces.size(); ++c) {
     std::copy_n(&points_[3 * static_cast<std::size_t>(batch.faces[c])], 3, &corners_[3 * c]);
@@ -41,7 +42,8 @@ void ImageStateT<T>::Project(const BatchT<T>& batch, std::size_t n) {
 // From d_corners_ to d_positions_.
 template <class T>
 void ImageStateT<T>::ProjectAdjoint(const BatchT<T>& batch, std::size_t n) {
-  d_points_.assign(3 * batch.vertices(), T(0)), d_positions_.resize(d_points_.size());
+  d_points_.assign(3 * batch.vertices(), T(0));
+  d_positions_.resize(d_points_.size());
   for (std::size_t c = 0; c < batch.faces.size(); ++c) {
     T* const to = &d_points_[3 * static_cast<std::size_t>(batch.faces[c])];
     for (std::size_t i = 0; i < 3; ++i) to[i] += d_corners_[3 * c + i];

@@ -19,11 +19,14 @@ struct FacePlanes {
   T z_x, z_y, z_0;   // of 1/depth, and its value at corner 0
 
   explicit FacePlanes(const N3mrFaceT<T>& f) : x0(f.at.x[0]), y0(f.at.y[0]) {
-    z_x = z_y = T(0), z_0 = T(1) / f.at.z[0];
+    z_x = z_y = T(0);
+    z_0 = T(1) / f.at.z[0];
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
-      b_x[k] = (f.at.y[i] - f.at.y[j]) / f.area2, b_y[k] = (f.at.x[j] - f.at.x[i]) / f.area2;
-      z_x += b_x[k] / f.at.z[k], z_y += b_y[k] / f.at.z[k];
+      b_x[k] = (f.at.y[i] - f.at.y[j]) / f.area2;
+      b_y[k] = (f.at.x[j] - f.at.x[i]) / f.area2;
+      z_x += b_x[k] / f.at.z[k];
+      z_y += b_y[k] / f.at.z[k];
     }
   }
 };
@@ -67,7 +70,8 @@ void ListPull(const N3mrImageT<T>& image, int line_step, int step, LinePixelsT<T
       *first++ = static_cast<std::int32_t>(out->at.size());
       const auto p = static_cast<std::size_t>(line * line_step + at * step);
       if (image.owner[p] >= 0 || !(image.d_coverage[p] < 0)) continue;
-      out->at.push_back(static_cast<T>(at)), out->gain.push_back(-image.d_coverage[p]);
+      out->at.push_back(static_cast<T>(at));
+      out->gain.push_back(-image.d_coverage[p]);
     }
     *first++ = static_cast<std::int32_t>(out->at.size());
   }
@@ -170,11 +174,14 @@ template <class T>
 void SetUpN3mr(std::span<const T> corners, int size, const N3mrOptions& options,
                N3mrImageT<T>* image) {
   const std::size_t faces = corners.size() / kCornerNumbers;
-  image->size = size, image->inner = options.Inner(size);
+  image->size = size;
+  image->inner = options.Inner(size);
   const auto pixels =
       static_cast<std::size_t>(image->inner) * static_cast<std::size_t>(image->inner);
-  image->owner.resize(pixels), image->inverse_depth.resize(pixels);
-  image->coverage.resize(pixels), image->d_coverage.resize(pixels);
+  image->owner.resize(pixels);
+  image->inverse_depth.resize(pixels);
+  image->coverage.resize(pixels);
+  image->d_coverage.resize(pixels);
   image->drawn_of.assign(faces, -1);
   image->faces.clear();
   image->faces.reserve(faces);

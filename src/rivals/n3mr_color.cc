@@ -114,9 +114,12 @@ void AddExactParts(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_imag
 template <class T>
 void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes) {
   const std::size_t pixels = image.owner.size();
-  planes->values.resize(4 * pixels), planes->d_values.resize(4 * pixels);
-  planes->depth.resize(pixels), planes->d_depth.resize(pixels);
-  planes->row_sums.resize(pixels), planes->column_sums.resize(pixels);
+  planes->values.resize(4 * pixels);
+  planes->d_values.resize(4 * pixels);
+  planes->depth.resize(pixels);
+  planes->d_depth.resize(pixels);
+  planes->row_sums.resize(pixels);
+  planes->column_sums.resize(pixels);
   planes->d_columns.resize(4 * pixels);
 }
 

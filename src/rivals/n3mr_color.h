@@ -51,7 +51,8 @@ N3mrTexels<T> N3mrTexelsAt(const N3mrFaceT<T>& face, const T w[3], const T& z, i
   N3mrTexels<T> out;
   const auto s = static_cast<std::size_t>(resolution);
   for (std::size_t n = 0; n < 8; ++n) {
-    out.index[n] = 0, out.weight[n] = T(1);
+    out.index[n] = 0;
+    out.weight[n] = T(1);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t up = n >> k & 1;
       out.index[n] = out.index[n] * s + first[k] + up;

@@ -28,7 +28,9 @@ struct N3mrDrawingRef {
   N3mrDrawingRef(std::span<const T> corners, int size, const N3mrOptions& options)
       : inner(options.Inner(size)) {
     const auto pixels = static_cast<std::size_t>(inner) * static_cast<std::size_t>(inner);
-    owner.assign(pixels, -1), depth.assign(pixels, T(options.far_plane)), weights.resize(pixels);
+    owner.assign(pixels, -1);
+    depth.assign(pixels, T(options.far_plane));
+    weights.resize(pixels);
     ForN3mrFaces(corners, options, options.Scale(size),
                  [&](const N3mrFaceT<T>& face) { Draw(face, options); });
   }
@@ -46,7 +48,8 @@ struct N3mrDrawingRef {
       const T z = DepthAt(face.at, w);
       if (!(RealPart(z) > options.near_plane && RealPart(z) < RealPart(depth[p]))) continue;
       owner[p] = static_cast<std::int32_t>(faces.size()) - 1;
-      depth[p] = z, weights[p] = {w[0], w[1], w[2]};
+      depth[p] = z;
+      weights[p] = {w[0], w[1], w[2]};
     }
   }
 };

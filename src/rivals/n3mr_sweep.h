@@ -100,7 +100,8 @@ void ForSweepLines(const SweepEdge<T>& e, int inner, bool floor_lines, const Vis
     const T l = static_cast<T>(at), crossing = e.a.m + slope * (l - e.a.l);
     if (!(crossing > -1 && crossing < static_cast<T>(inner))) continue;
     SweepLine<T> line;
-    line.line = at, line.crossing = crossing;
+    line.line = at;
+    line.crossing = crossing;
     line.in = e.outward > 0 ? Floor(crossing) : Ceil(crossing);
     line.out = line.in + e.outward;
     if (std::min(line.in, line.out) < 0 || std::max(line.in, line.out) >= inner) continue;

@@ -87,7 +87,10 @@ HWY_INLINE void BackwardFaces(const SoftRasOptions& options, const SoftRasImage&
   for (std::size_t f = begin; f < end; ++f) {
     const SoftRasFace& face = image.faces[f];
     CornerSums sums;
-    for (int k = 0; k < 3; ++k) sums.x[k] = hn::Zero(d), sums.y[k] = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      sums.x[k] = hn::Zero(d);
+      sums.y[k] = hn::Zero(d);
+    }
     ForFaceVectors(face, {0, image.size}, image,
                    [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
                      const SoftLanes here = SoftFaceAt<kDistance>(face, scale, px, py);

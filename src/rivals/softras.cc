@@ -38,8 +38,10 @@ void SetBox(float reach, int size, SoftRasFace* f) {
   const float low_y = std::min({f->y[0], f->y[1], f->y[2]}) - reach;
   const float high_y = std::max({f->y[0], f->y[1], f->y[2]}) + reach;
   const PixelRange rows(-high_y, -low_y, size);
-  f->column_begin = columns.begin, f->column_end = columns.end;
-  f->row_begin = rows.begin, f->row_end = rows.end;
+  f->column_begin = columns.begin;
+  f->column_end = columns.end;
+  f->row_begin = rows.begin;
+  f->row_end = rows.end;
   // One row too many is harmless in the Euclidean distance, which cuts by itself; the box cuts the
   // barycentric one.
   while (f->row_begin < f->row_end && CentreY<float>(f->row_begin, size) > high_y) ++f->row_begin;
@@ -52,8 +54,11 @@ SoftRasFace FaceOf(const FaceCorners<float>& at, int size, const SoftRasOptions&
   if (!IsUsable(at) || !(std::abs(area2) >= static_cast<float>(kSmallestDoubledArea))) return f;
   for (int k = 0; k < 3; ++k) {
     const int next = (k + 1) % 3;
-    f.x[k] = at.x[k], f.y[k] = at.y[k], f.z[k] = at.z[k];
-    f.ex[k] = at.x[next] - at.x[k], f.ey[k] = at.y[next] - at.y[k];
+    f.x[k] = at.x[k];
+    f.y[k] = at.y[k];
+    f.z[k] = at.z[k];
+    f.ex[k] = at.x[next] - at.x[k];
+    f.ey[k] = at.y[next] - at.y[k];
     const float length = f.ex[k] * f.ex[k] + f.ey[k] * f.ey[k];
     f.inverse_length[k] = length > 0 ? 1 / length : 0;
     f.may_be_beyond |= !(at.z[k] >= static_cast<float>(options.near_plane) &&

@@ -48,8 +48,11 @@ void StartMixing(const SoftRasColorJob& job, RowRange rows, SoftRasColorImage* m
 
 void ReserveSoftRasColors(const SoftRasImage& image, SoftRasColorImage* mixed) {
   const std::size_t plane = image.kept.size();
-  mixed->nearest.resize(plane), mixed->total.resize(plane), mixed->cover.resize(plane);
-  mixed->color.resize(3 * plane), mixed->push.resize(4 * plane);
+  mixed->nearest.resize(plane);
+  mixed->total.resize(plane);
+  mixed->cover.resize(plane);
+  mixed->color.resize(3 * plane);
+  mixed->push.resize(4 * plane);
 }
 
 void SoftRasColorForward(const SoftRasColorJob& job, RowRange rows, SoftRasColorImage* mixed,

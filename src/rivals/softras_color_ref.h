@@ -114,7 +114,8 @@ std::size_t NearestCover(const SoftRasScene<T>& scene, const T& px, const T& py,
   ForColorFaces(scene, px, py, [&](const auto&, std::size_t f, const SoftFragment<T>& at) {
     const bool covers = RealPart(at.b[at.least]) >= 0;
     if (!covers || (best < scene.faces() && !(RealPart(at.z) < RealPart(nearest->z)))) return;
-    best = f, *nearest = at;
+    best = f;
+    *nearest = at;
   });
   return best;
 }

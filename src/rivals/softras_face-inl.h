@@ -70,13 +70,16 @@ HWY_INLINE void SetNearestPoint(const SoftRasFace& f, SoftVec px, SoftVec py, So
     const SoftVec squared = hn::MulAdd(rx, rx, hn::Mul(ry, ry));
     const SoftVec corner[3] = {hn::Sub(one, t), t, zero};  // of corners k, k + 1, k + 2
     if (k == 0) {
-      out->d = squared, out->rx = rx, out->ry = ry;
+      out->d = squared;
+      out->rx = rx;
+      out->ry = ry;
       for (int c = 0; c < 3; ++c) out->t[c] = corner[c];
       continue;
     }
     const SoftMask nearer = hn::Lt(squared, out->d);
     out->d = hn::IfThenElse(nearer, squared, out->d);
-    out->rx = hn::IfThenElse(nearer, rx, out->rx), out->ry = hn::IfThenElse(nearer, ry, out->ry);
+    out->rx = hn::IfThenElse(nearer, rx, out->rx);
+    out->ry = hn::IfThenElse(nearer, ry, out->ry);
     for (int c = 0; c < 3; ++c) {
       SoftVec* const w = &out->t[(k + c) % 3];
       *w = hn::IfThenElse(nearer, corner[c], *w);

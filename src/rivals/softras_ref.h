@@ -61,8 +61,12 @@ void SetNearest(const FaceCorners<T>& f, const T& px, const T& py, SoftFragment<
     if (RealPart(t) > 1) t = T(1);
     const T rx = t * ex - qx, ry = t * ey - qy, d = rx * rx + ry * ry;
     if (k > 0 && RealPart(d) >= RealPart(out->d)) continue;
-    out->d = d, out->rx = rx, out->ry = ry;
-    out->t[k] = T(1) - t, out->t[next] = t, out->t[3 - k - next] = T(0);
+    out->d = d;
+    out->rx = rx;
+    out->ry = ry;
+    out->t[k] = T(1) - t;
+    out->t[next] = t;
+    out->t[3 - k - next] = T(0);
   }
 }
 
@@ -135,7 +139,8 @@ T KeptOf(std::span<const T> corners, const T& px, const T& py, const SoftRasOpti
   SoftFragment<T> at;
   for (std::size_t f = 0; f < corners.size() / kCornerNumbers; ++f) {
     if (!MakeSoftFragment(SoftFaceRef<T>(corners, f), px, py, options, &at)) continue;
-    product *= at.miss, sum += at.probability;
+    product *= at.miss;
+    sum += at.probability;
     if (RealPart(at.probability) > 0.5) any = T(1);
   }
   return options.alpha == SoftAlpha::kProduct ? product

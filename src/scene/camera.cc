@@ -18,7 +18,8 @@ Camera64 FromAxes(const Lens& lens, glm::dvec3 x, glm::dvec3 y, glm::dvec3 z, gl
     camera.translation[r] = -glm::dot(rows[r], eye);
   }
   camera.fx = camera.fy = 0.5 * lens.height / std::tan(0.5 * glm::radians(lens.fov_y));
-  camera.cx = 0.5 * lens.width, camera.cy = 0.5 * lens.height;
+  camera.cx = 0.5 * lens.width;
+  camera.cy = 0.5 * lens.height;
   return camera;
 }
 
@@ -31,7 +32,8 @@ glm::dvec3 Scaled(glm::dvec3 v) {
 }
 
 Camera64 LookAlong(const Lens& lens, glm::dvec3 eye, glm::dvec3 backward, glm::dvec3 up) {
-  backward = Scaled(backward), up = Scaled(up);
+  backward = Scaled(backward);
+  up = Scaled(up);
   const double length = glm::length(backward);
   const glm::dvec3 z = length > 0 ? backward / length : glm::dvec3(0, 0, 1);
   glm::dvec3 x = glm::cross(up, z);

@@ -28,8 +28,10 @@ CameraT<T> CameraCast(const CameraT<U>& c) {
   CameraT<T> out;
   for (int i = 0; i < 9; ++i) out.rotation[i] = static_cast<T>(c.rotation[i]);
   for (int i = 0; i < 3; ++i) out.translation[i] = static_cast<T>(c.translation[i]);
-  out.fx = static_cast<T>(c.fx), out.fy = static_cast<T>(c.fy);
-  out.cx = static_cast<T>(c.cx), out.cy = static_cast<T>(c.cy);
+  out.fx = static_cast<T>(c.fx);
+  out.fy = static_cast<T>(c.fy);
+  out.cx = static_cast<T>(c.cx);
+  out.cy = static_cast<T>(c.cy);
   out.near_plane = static_cast<T>(c.near_plane);
   return out;
 }

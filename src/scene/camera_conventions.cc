@@ -119,8 +119,10 @@ Result<Camera64> FromOpenCv(const OpenCvCamera& from) {
   const double shift = from.centre == PixelCentre::kInteger ? 0.5 : 0.0;
   Camera64 camera;
   SetPose(WithAxes({from.rotation, from.translation}, kOpenCvAxes), &camera);
-  camera.fx = k[0], camera.cx = k[2] + shift;
-  camera.fy = k[4], camera.cy = k[5] + shift;
+  camera.fx = k[0];
+  camera.cx = k[2] + shift;
+  camera.fy = k[4];
+  camera.cy = k[5] + shift;
   return Checked(camera);
 }
 
@@ -185,8 +187,10 @@ Result<Camera64> FromOpenGl(const OpenGlCamera& from, ImageSize size) {
   const Mat4Array& m = from.model_view;
   Camera64 camera;
   SetPose({{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}}, &camera);
-  camera.fx = 0.5 * size.width * p[0], camera.cx = 0.5 * size.width * (1 - p[2]);
-  camera.fy = 0.5 * size.height * p[5], camera.cy = 0.5 * size.height * (1 + p[6]);
+  camera.fx = 0.5 * size.width * p[0];
+  camera.cx = 0.5 * size.width * (1 - p[2]);
+  camera.fy = 0.5 * size.height * p[5];
+  camera.cy = 0.5 * size.height * (1 + p[6]);
   camera.near_plane = p[11] / (p[10] - 1);
   return Checked(camera);
 }
@@ -213,8 +217,10 @@ Result<Camera64> FromKaolin(const KaolinCamera& from, ImageSize size) {
   }
   Camera64 camera;
   SetPose(PoseAt(from.rotation, from.position), &camera);
-  camera.fx = 0.5 * size.width * from.projection[0], camera.cx = 0.5 * size.width;
-  camera.fy = 0.5 * size.height * from.projection[1], camera.cy = 0.5 * size.height;
+  camera.fx = 0.5 * size.width * from.projection[0];
+  camera.cx = 0.5 * size.width;
+  camera.fy = 0.5 * size.height * from.projection[1];
+  camera.cy = 0.5 * size.height;
   return Checked(camera);
 }
 
@@ -233,7 +239,8 @@ Result<Camera64> FromPyTorch3d(const PyTorch3dCamera& from, ImageSize size) {
   const double half = 0.5 * std::min(size.width, size.height);
   Camera64 camera;
   SetPose(WithAxes({Transposed(from.r.data()), from.t}, kPyTorch3dAxes), &camera);
-  camera.fx = half * from.focal_length[0], camera.fy = half * from.focal_length[1];
+  camera.fx = half * from.focal_length[0];
+  camera.fy = half * from.focal_length[1];
   camera.cx = 0.5 * size.width - half * from.principal_point[0];
   camera.cy = 0.5 * size.height - half * from.principal_point[1];
   return Checked(camera);
@@ -256,7 +263,10 @@ Result<Camera64> FromNerf(const NerfCamera& from) {
   Camera64 camera;
   TILEGRAD_ASSIGN(const Pose pose, PoseFromCameraToWorld(from.camera_to_world, "transform_matrix"));
   SetPose(pose, &camera);
-  camera.fx = from.fl_x, camera.fy = from.fl_y, camera.cx = from.cx, camera.cy = from.cy;
+  camera.fx = from.fl_x;
+  camera.fy = from.fl_y;
+  camera.cx = from.cx;
+  camera.cy = from.cy;
   return Checked(camera);
 }
 
@@ -274,7 +284,11 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size) {
   Mat4Array node = from.node_to_world;
   for (int c = 0; c < 3; ++c) {  // scale is ignored
     const double length = std::hypot(node[c], node[4 + c], node[8 + c]);
-    if (length > 0) node[c] /= length, node[4 + c] /= length, node[8 + c] /= length;
+    if (length > 0) {
+      node[c] /= length;
+      node[4 + c] /= length;
+      node[8 + c] /= length;
+    }
   }
   Camera64 camera;
   TILEGRAD_ASSIGN(const Pose pose, PoseFromCameraToWorld(node, "the camera's node"));
@@ -283,7 +297,8 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size) {
   camera.fx = from.aspect_ratio > 0
                   ? 0.5 * size.width / (from.aspect_ratio * std::tan(0.5 * from.yfov))
                   : camera.fy;
-  camera.cx = 0.5 * size.width, camera.cy = 0.5 * size.height;
+  camera.cx = 0.5 * size.width;
+  camera.cy = 0.5 * size.height;
   camera.near_plane = from.znear;
   return Checked(camera);
 }

@@ -106,13 +106,19 @@ inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize t
   Camera64 out = camera;
   const double x = static_cast<double>(to.width) / from.width;
   const double y = static_cast<double>(to.height) / from.height;
-  out.fx *= x, out.cx *= x, out.fy *= y, out.cy *= y;
+  out.fx *= x;
+  out.cx *= x;
+  out.fy *= y;
+  out.cy *= y;
   return out;
 }
 
 // The camera of the same image with `scale` times as many pixels along each side.
 inline Camera ScaledCamera(Camera camera, float scale) {
-  camera.fx *= scale, camera.fy *= scale, camera.cx *= scale, camera.cy *= scale;
+  camera.fx *= scale;
+  camera.fy *= scale;
+  camera.cx *= scale;
+  camera.cy *= scale;
   return camera;
 }
 

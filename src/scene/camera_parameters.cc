@@ -20,8 +20,10 @@ CameraParametersT<T> ParametersCast(const CameraParametersT<U>& p) {
   const auto cast = [](U x) { return static_cast<T>(x); };
   std::transform(std::begin(p.rotation), std::end(p.rotation), out.rotation, cast);
   std::transform(std::begin(p.translation), std::end(p.translation), out.translation, cast);
-  out.fx = static_cast<T>(p.fx), out.fy = static_cast<T>(p.fy);
-  out.cx = static_cast<T>(p.cx), out.cy = static_cast<T>(p.cy);
+  out.fx = static_cast<T>(p.fx);
+  out.fy = static_cast<T>(p.fy);
+  out.cx = static_cast<T>(p.cx);
+  out.cy = static_cast<T>(p.cy);
   return out;
 }
 
@@ -84,7 +86,10 @@ CameraParametersT<T> ParametersOf(const CameraT<T>& camera) {
   CameraParametersT<T> p;
   std::copy_n(camera.rotation, 6, p.rotation);
   std::copy_n(camera.translation, 3, p.translation);
-  p.fx = camera.fx, p.fy = camera.fy, p.cx = camera.cx, p.cy = camera.cy;
+  p.fx = camera.fx;
+  p.fy = camera.fy;
+  p.cx = camera.cx;
+  p.cy = camera.cy;
   return p;
 }
 

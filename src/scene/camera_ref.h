@@ -58,7 +58,8 @@ struct GramSchmidt {
 template <class T>
 GramSchmidt<T> Orthogonalize(const T (&r)[6]) {
   GramSchmidt<T> g;
-  g.a = {r[0], r[1], r[2]}, g.b = {r[3], r[4], r[5]};
+  g.a = {r[0], r[1], r[2]};
+  g.b = {r[3], r[4], r[5]};
   g.x = Unit(g.a);
   g.u = AddScaled(g.b, -Dot(g.x, g.b), g.x);
   g.y = Unit(g.u);
@@ -73,10 +74,15 @@ CameraT<T> CameraFromParametersRef(const CameraParametersT<T>& p, T near_plane) 
   const auto g = camera_ref::Orthogonalize(p.rotation);
   CameraT<T> camera;
   for (std::size_t c = 0; c < 3; ++c) {
-    camera.rotation[c] = g.x[c], camera.rotation[3 + c] = g.y[c], camera.rotation[6 + c] = g.z[c];
+    camera.rotation[c] = g.x[c];
+    camera.rotation[3 + c] = g.y[c];
+    camera.rotation[6 + c] = g.z[c];
     camera.translation[c] = p.translation[c];
   }
-  camera.fx = p.fx, camera.fy = p.fy, camera.cx = p.cx, camera.cy = p.cy;
+  camera.fx = p.fx;
+  camera.fy = p.fy;
+  camera.cx = p.cx;
+  camera.cy = p.cy;
   camera.near_plane = near_plane;
   return camera;
 }
@@ -96,10 +102,14 @@ void CameraFromParametersAdjointRef(const CameraParametersT<T>& p, const CameraT
   d_x = AddScaled(AddScaled(d_x, -Dot(g.x, g.b), d_u), -Dot(g.x, d_u), g.b);
   const auto d_a = camera_ref::UnitAdjoint(g.a, g.x, d_x);
   for (std::size_t c = 0; c < 3; ++c) {
-    d_p->rotation[c] = d_a[c], d_p->rotation[3 + c] = d_b[c];
+    d_p->rotation[c] = d_a[c];
+    d_p->rotation[3 + c] = d_b[c];
     d_p->translation[c] = d_camera.translation[c];
   }
-  d_p->fx = d_camera.fx, d_p->fy = d_camera.fy, d_p->cx = d_camera.cx, d_p->cy = d_camera.cy;
+  d_p->fx = d_camera.fx;
+  d_p->fy = d_camera.fy;
+  d_p->cx = d_camera.cx;
+  d_p->cy = d_camera.cy;
 }
 
 }  // namespace tilegrad

@@ -49,7 +49,8 @@ Result<EditMesh> EditMesh::Make(std::vector<glm::vec3> positions, std::vector<Fa
     do {
       const Face& f = mesh.faces_[Index(face)];
       const std::int32_t next = f[(CornerOf(f, v) + 2) % 3];
-      face = mesh.FaceRunning(v, next), ++seen;
+      face = mesh.FaceRunning(v, next);
+      ++seen;
     } while (face >= 0 && face != fan[0] && seen <= fan.size());
     if (face != fan[0] || seen != fan.size())
       return InvalidArgument("the mesh is not a closed manifold at vertex {}", v);

@@ -67,7 +67,8 @@ class Extraction {
       std::size_t from = i;
       while (!inside[from]) ++from;
       if (from == i) continue;
-      std::swap(c[i], c[from]), std::swap(inside[i], inside[from]);
+      std::swap(c[i], c[from]);
+      std::swap(inside[i], inside[from]);
       odd = !odd;
     }
     if (odd && count == 1) std::swap(c[2], c[3]);
@@ -76,7 +77,8 @@ class Extraction {
     if (count == 3) AddFace(Between(c[0], c[3]), Between(c[1], c[3]), Between(c[2], c[3]));
     if (count != 2) return;
     const std::int32_t a = Between(c[0], c[2]), b = Between(c[0], c[3]), d = Between(c[1], c[3]);
-    AddFace(a, b, d), AddFace(a, d, Between(c[1], c[2]));
+    AddFace(a, b, d);
+    AddFace(a, d, Between(c[1], c[2]));
   }
 
   void AddFace(std::int32_t a, std::int32_t b, std::int32_t c) { mesh_.faces.push_back({a, b, c}); }

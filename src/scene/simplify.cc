@@ -27,10 +27,16 @@ struct Quadric {
 
   void AddPlane(const glm::dvec3& unit, const glm::dvec3& on, double w) {
     const double d = glm::dot(unit, on);
-    a += w * glm::outerProduct(unit, unit), b += w * d * unit, c += w * d * d, weight += w;
+    a += w * glm::outerProduct(unit, unit);
+    b += w * d * unit;
+    c += w * d * d;
+    weight += w;
   }
   Quadric& operator+=(const Quadric& q) {
-    a += q.a, b += q.b, c += q.c, weight += q.weight;
+    a += q.a;
+    b += q.b;
+    c += q.c;
+    weight += q.weight;
     return *this;
   }
   double At(const glm::dvec3& p) const {
@@ -62,7 +68,8 @@ class Simplification {
     if (!stamps_.empty()) origin_ = mesh_.Position(0);
     for (std::int32_t f = 0; f < static_cast<std::int32_t>(mesh_.faces().size()); ++f) {
       if (!mesh_.IsFaceAlive(f)) continue;
-      AddPlaneOf(mesh_.faces()[Index(f)]), ++faces_;
+      AddPlaneOf(mesh_.faces()[Index(f)]);
+      ++faces_;
     }
     for (const auto& [a, b] : mesh_.Edges()) Push(a, b);
   }
@@ -141,7 +148,8 @@ class Simplification {
     mesh_.Collapse(c.a, c.b, place);
     quadrics_[Index(c.a)] += quadrics_[Index(c.b)];
     faces_ -= 2;
-    ++stamps_[Index(c.a)], ++stamps_[Index(c.b)];
+    ++stamps_[Index(c.a)];
+    ++stamps_[Index(c.b)];
     for (const std::int32_t f : mesh_.FacesAt(c.a)) {
       const Face& face = mesh_.faces()[Index(f)];
       for (std::size_t k = 0; k < 3; ++k)

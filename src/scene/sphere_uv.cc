@@ -36,7 +36,8 @@ void Unwrap(std::array<CornerUv, 3>* corners) {
   for (CornerUv& c : *corners) {
     if (c.pole) continue;
     if (largest - c.u > 0.5f) c.u += 1;
-    sum += c.u, ++others;
+    sum += c.u;
+    ++others;
   }
   for (CornerUv& c : *corners) {
     if (c.pole && others > 0) c.u = sum / static_cast<float>(others);
@@ -73,7 +74,10 @@ SurfacePoint PointAt(const Mesh& sphere, const std::vector<FaceCone>& cones, con
     const glm::dvec3 w = cones[f].WeightsAt(d);
     const double least =
         std::min({w.x, w.y, w.z}) / (std::abs(w.x) + std::abs(w.y) + std::abs(w.z));
-    if (least > inside) inside = least, best = f;
+    if (least > inside) {
+      inside = least;
+      best = f;
+    }
   }
   const glm::dvec3 w = glm::max(cones[best].WeightsAt(d), glm::dvec3(0));
   const double sum = w.x + w.y + w.z;

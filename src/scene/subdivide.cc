@@ -43,10 +43,12 @@ std::vector<glm::vec2> SplitCorners(const std::vector<glm::vec2>& uvs) {
 
 Mesh Subdivided(const Mesh& mesh) {
   Mesh out;
-  out.positions = mesh.positions, out.colors = mesh.colors;
+  out.positions = mesh.positions;
+  out.colors = mesh.colors;
   if (mesh.materials.size() == 1) {
     out.corner_uvs = SplitCorners(mesh.corner_uvs);
-    out.materials = mesh.materials, out.textures = mesh.textures;
+    out.materials = mesh.materials;
+    out.textures = mesh.textures;
   }
   out.faces = SplitFaces(mesh.faces, [&](std::int32_t a, std::int32_t b) {
     const auto i = static_cast<std::size_t>(a), j = static_cast<std::size_t>(b);

@@ -42,7 +42,10 @@ void CollectEdges(const std::vector<Side>& sides, Topology& out) {
 // since a < b.
 void CollectNeighbors(std::size_t vertices, Topology& out) {
   out.offsets.assign(vertices + 1, 0);
-  for (const Edge& e : out.edges) ++out.offsets[e.a + 1], ++out.offsets[e.b + 1];
+  for (const Edge& e : out.edges) {
+    ++out.offsets[e.a + 1];
+    ++out.offsets[e.b + 1];
+  }
   for (std::size_t v = 0; v < vertices; ++v) out.offsets[v + 1] += out.offsets[v];
   out.neighbors.resize(2 * out.edges.size());
   std::vector<std::int32_t> next(out.offsets.begin(), out.offsets.end() - 1);

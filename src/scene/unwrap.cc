@@ -52,8 +52,10 @@ std::vector<std::array<std::int32_t, 3>> NeighborsOf(const Mesh& mesh) {
       if (n < 0) return void(n = other);
     }
   };
-  for (const Edge& e : BuildTopology(mesh.faces, mesh.positions.size()).edges)
-    add(e.face0, e.face1), add(e.face1, e.face0);
+  for (const Edge& e : BuildTopology(mesh.faces, mesh.positions.size()).edges) {
+    add(e.face0, e.face1);
+    add(e.face1, e.face0);
+  }
   return out;
 }
 
@@ -163,12 +165,15 @@ class Unwrapping {
         continue;
       }
       chart.faces.push_back(face);
-      for (const glm::dvec2& p : corners)
-        chart.low = glm::min(chart.low, p), chart.high = glm::max(chart.high, p);
+      for (const glm::dvec2& p : corners) {
+        chart.low = glm::min(chart.low, p);
+        chart.high = glm::max(chart.high, p);
+      }
       for (const std::int32_t n : neighbors_[static_cast<std::size_t>(face)]) {
         const auto i = static_cast<std::size_t>(n);
         if (n < 0 || chart_of_[i] >= 0 || labels_[i] != chart.label) continue;
-        chart_of_[i] = number, open.push_back(n);
+        chart_of_[i] = number;
+        open.push_back(n);
       }
     }
     charts_.push_back(std::move(chart));
@@ -223,9 +228,12 @@ class Unwrapping {
       if (at == shelves.end()) {
         if (c.width > options_.width || top + c.height > options_.height) return false;
         shelves.push_back({top, c.height});
-        top += c.height, at = shelves.end() - 1;
+        top += c.height;
+        at = shelves.end() - 1;
       }
-      c.x = at->x, c.y = at->y, at->x += c.width;
+      c.x = at->x;
+      c.y = at->y;
+      at->x += c.width;
     }
     return true;
   }
@@ -248,10 +256,12 @@ class Unwrapping {
 
   UnwrapQuality Quality() const {
     UnwrapQuality q;
-    q.charts = static_cast<int>(charts_.size()), q.texels_per_unit = scale_;
+    q.charts = static_cast<int>(charts_.size());
+    q.texels_per_unit = scale_;
     double area = 0, flat = 0, length = 0, seams = 0;
     for (std::size_t f = 0; f < labels_.size(); ++f) {
-      area += areas_[f], flat += areas_[f] * Cosine(f, labels_[f]);
+      area += areas_[f];
+      flat += areas_[f] * Cosine(f, labels_[f]);
       q.most_stretch = std::max(q.most_stretch, 1 / Cosine(f, labels_[f]));
     }
     q.mean_stretch = area / flat;

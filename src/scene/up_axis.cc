@@ -39,8 +39,16 @@ Camera CameraOfFile(UpAxis up, Camera camera) {
   for (int i = 0; i < 3; ++i) {
     float* r = camera.rotation + 3 * i;
     const float x = r[0], y = r[1], z = r[2];
-    if (up == UpAxis::kZ) r[0] = x, r[1] = -z, r[2] = y;
-    if (up == UpAxis::kX) r[0] = y, r[1] = -x, r[2] = z;
+    if (up == UpAxis::kZ) {
+      r[0] = x;
+      r[1] = -z;
+      r[2] = y;
+    }
+    if (up == UpAxis::kX) {
+      r[0] = y;
+      r[1] = -x;
+      r[2] = z;
+    }
   }
   return camera;
 }

@@ -89,7 +89,8 @@ CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance) {
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = T(weak_ref::kAxisSigns[i / 3]) * r[i];
   out.translation[2] = -distance;
   out.fx = out.fy = camera.scale * distance;
-  out.cx = camera.translation[0], out.cy = camera.translation[1];
+  out.cx = camera.translation[0];
+  out.cy = camera.translation[1];
   return out;
 }
 

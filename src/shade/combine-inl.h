@@ -66,8 +66,10 @@ struct FactorSums {
 
   HWY_INLINE FactorSums() { base = ambient = diffuse = specular = hn::Zero(RunTag()); }
   HWY_INLINE void AddTo(std::size_t c, ColorFactorsT<double>* out) const {
-    out->base[c] += SumOf(base), out->ambient[c] += SumOf(ambient);
-    out->diffuse[c] += SumOf(diffuse), out->specular[c] += SumOf(specular);
+    out->base[c] += SumOf(base);
+    out->ambient[c] += SumOf(ambient);
+    out->diffuse[c] += SumOf(diffuse);
+    out->specular[c] += SumOf(specular);
   }
 };
 

@@ -68,7 +68,8 @@ void SmoothNormalsRef(const TriangleMeshT<T>& mesh, std::span<UnitVector<T>> uni
     const T scale = NormalScaleRef(mesh, f);
     for (std::size_t k = 0; k < 3; ++k) {
       auto& sum = units[static_cast<std::size_t>(mesh.faces[3 * f + k])];
-      AddScaled(T(1), n, sum.unit), sum.inverse_length += scale;  // borrowed until the sum is there
+      AddScaled(T(1), n, sum.unit);
+      sum.inverse_length += scale;  // borrowed until the sum is there
     }
   }
   for (auto& u : units) u = DirectionOfSumRef(u.unit, u.inverse_length);

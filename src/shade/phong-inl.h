@@ -32,7 +32,9 @@ HWY_INLINE PhongLanes ReflectLanes(const PhongInput& input, const Run3& light, s
   const RunTag d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), least = hn::Set(d, kLeastReflection);
   PhongLanes out;
-  out.normal = LoadRun3(input.normal, i), out.eye = LoadRun3(input.eye, i), out.light = light;
+  out.normal = LoadRun3(input.normal, i);
+  out.eye = LoadRun3(input.eye, i);
+  out.light = light;
   const auto cosine = Dot(out.normal, light);
   out.cosine_inside = hn::And(hn::Ge(cosine, zero), hn::Le(cosine, one));
   out.cosine = hn::Min(hn::Max(cosine, zero), one);

@@ -38,10 +38,14 @@ HWY_INLINE Run3 LoadRun3(const RunPlane* p, std::size_t i) {
   return {LoadRun(p[0], i), LoadRun(p[1], i), LoadRun(p[2], i)};
 }
 HWY_INLINE void StoreRun3(const Run3& v, RunPlane* p, std::size_t i) {
-  StoreRun(v.x, &p[0], i), StoreRun(v.y, &p[1], i), StoreRun(v.z, &p[2], i);
+  StoreRun(v.x, &p[0], i);
+  StoreRun(v.y, &p[1], i);
+  StoreRun(v.z, &p[2], i);
 }
 HWY_INLINE void AddRun3(const Run3& v, RunPlane* p, std::size_t i) {
-  AddRun(v.x, &p[0], i), AddRun(v.y, &p[1], i), AddRun(v.z, &p[2], i);
+  AddRun(v.x, &p[0], i);
+  AddRun(v.y, &p[1], i);
+  AddRun(v.z, &p[2], i);
 }
 
 HWY_INLINE RunVec Dot(const Run3& a, const Run3& b) {

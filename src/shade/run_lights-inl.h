@@ -43,8 +43,10 @@ struct LightSums {
 
   HWY_INLINE LightSums() : direction(ZeroRun3()), intensity(hn::Zero(RunTag())) {}
   HWY_INLINE void AddTo(LightT<double>* light) const {
-    light->direction[0] += SumOf(direction.x), light->direction[1] += SumOf(direction.y);
-    light->direction[2] += SumOf(direction.z), light->intensity += SumOf(intensity);
+    light->direction[0] += SumOf(direction.x);
+    light->direction[1] += SumOf(direction.y);
+    light->direction[2] += SumOf(direction.z);
+    light->intensity += SumOf(intensity);
   }
 };
 

@@ -82,8 +82,10 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const Texture
   const auto low = hn::ConvertTo(di, cell);
   if (nearest) {
     const auto index = ClampIndex(low, most);
-    hn::Store(index, di, out->low + i), hn::Store(index, di, out->high + i);
-    hn::Store(hn::Zero(d), d, out->weight + i), hn::Store(hn::Zero(d), d, out->slope + i);
+    hn::Store(index, di, out->low + i);
+    hn::Store(index, di, out->high + i);
+    hn::Store(hn::Zero(d), d, out->weight + i);
+    hn::Store(hn::Zero(d), d, out->slope + i);
     return;
   }
   hn::Store(WrapLaneIndex(low, most, way), di, out->low + i);
@@ -241,7 +243,8 @@ HWY_INLINE TexelShare MakeShare(const FootprintRun& at, std::size_t level, const
   out.x1 = static_cast<std::uint16_t>(at.column.high[p]);
   out.y0 = static_cast<std::uint16_t>(at.row.low[p]);
   out.y1 = static_cast<std::uint16_t>(at.row.high[p]);
-  out.a = at.column.weight[p], out.b = at.row.weight[p];
+  out.a = at.column.weight[p];
+  out.b = at.row.weight[p];
   for (std::size_t c = 0; c < 3; ++c) out.d_color[c] = scale * d_color[c].at[p];
   out.level = static_cast<std::uint32_t>(level);
   return out;
@@ -315,7 +318,8 @@ void SampleRunAdjoint(std::size_t count, const TextureInput& input, const RunPla
   if (d_uv != nullptr) {
     const RunTag d;
     for (std::size_t i = 0; i < 4 * WholeVectors(count); i += hn::Lanes(d)) {
-      hn::Store(hn::Zero(d), d, pull.a + i), hn::Store(hn::Zero(d), d, pull.b + i);
+      hn::Store(hn::Zero(d), d, pull.a + i);
+      hn::Store(hn::Zero(d), d, pull.b + i);
     }
   }
   PullMixed(count, input, d_color, {d_uv == nullptr ? nullptr : &pull, shares});

@@ -7,7 +7,8 @@ namespace tilegrad::shade {
 
 void TexturePyramid::Build(const TextureView& texture) {
   view_ = texture;
-  sizes_.clear(), levels_.clear();
+  sizes_.clear();
+  levels_.clear();
   LevelSize size{texture.width, texture.height, 0};
   const int count = LevelCount(texture.width, texture.height, texture.filter);
   for (int l = 0; l < count; ++l, size = NextLevel(size)) sizes_.push_back(size);
@@ -41,10 +42,12 @@ void TextureGradient::Scatter(std::span<const TexelShare> shares, const RowShare
       float* const right = d_texels_.data() + 4 * (first + s.x1);
       for (std::size_t c = 0; c < 3; ++c) {
         const float d = weight * s.d_color[c];
-        left[c] += (1 - s.a) * d, right[c] += s.a * d;
+        left[c] += (1 - s.a) * d;
+        right[c] += s.a * d;
       }
     };
-    add(s.y0, 1 - s.b), add(s.y1, s.b);
+    add(s.y0, 1 - s.b);
+    add(s.y1, s.b);
   }
 }
 

@@ -32,7 +32,10 @@ inline LevelSize NextLevel(const LevelSize& l) {
 inline int LevelCount(int width, int height, Filter filter) {
   int count = 1;
   if (filter != Filter::kTrilinear) return count;
-  for (; width > 1 || height > 1; ++count) width /= 2, height /= 2;
+  for (; width > 1 || height > 1; ++count) {
+    width /= 2;
+    height /= 2;
+  }
   return count;
 }
 

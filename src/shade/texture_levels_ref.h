@@ -45,7 +45,8 @@ struct PyramidRef {
   // A level as a texture over `all`, which is `texels` or an array of their gradients.
   TextureViewT<T> Level(std::size_t l) const {
     TextureViewT<T> out = texture;
-    out.width = sizes[l].width, out.height = sizes[l].height;
+    out.width = sizes[l].width;
+    out.height = sizes[l].height;
     out.texels = std::span(texels).subspan(First(l), Size(l));
     return out;
   }
@@ -111,7 +112,8 @@ void SampleAdjointRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
         pyramid.Level(l), u, v, d, d_uv,
         d_texels.empty() ? d_texels : d_texels.subspan(pyramid.First(l), pyramid.Size(l)));
   };
-  add(mix.fine, T(1) - T(mix.share)), add(mix.coarse, T(mix.share));
+  add(mix.fine, T(1) - T(mix.share));
+  add(mix.coarse, T(mix.share));
 }
 
 }  // namespace tilegrad::shade

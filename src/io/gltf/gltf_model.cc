@@ -93,7 +93,9 @@ Status GltfAccessor::ApplySparse(const tinygltf::Model& model, const tinygltf::A
     if (!Has(model.bufferViews, view))
       return DataLoss("{}: buffer view {} does not exist", what, view);
     tinygltf::Accessor part;
-    part.bufferView = view, part.componentType = type, part.type = components;
+    part.bufferView = view;
+    part.componentType = type;
+    part.type = components;
     part.byteOffset = static_cast<std::size_t>(offset);  // one below 0 is beyond any view
     part.count = static_cast<std::size_t>(sparse.count);
     return OpenDense(model, part, what);
@@ -112,7 +114,9 @@ Status GltfAccessor::ApplySparse(const tinygltf::Model& model, const tinygltf::A
     if (to >= count_) return DataLoss("{}: index {} is {} of {} elements", what, i, to, count_);
     std::memcpy(own->data() + to * element(), values.bytes_.data() + i * values.stride_, element());
   }
-  stride_ = element(), bytes_ = *own, own_ = std::move(own);
+  stride_ = element();
+  bytes_ = *own;
+  own_ = std::move(own);
   return {};
 }
 

@@ -88,20 +88,24 @@ std::size_t MatArray::places() const {
 
 MatArray MatArray::Numbers(std::vector<std::size_t> dims, std::span<const double> values) {
   MatArray out;
-  out.dims = std::move(dims), out.numbers = MatNumbers(values);
+  out.dims = std::move(dims);
+  out.numbers = MatNumbers(values);
   return out;
 }
 
 MatArray MatArray::Mask(std::size_t rows, std::size_t columns, std::vector<std::uint8_t> values) {
   MatArray out;
-  out.logical = true, out.dims = {rows, columns};
+  out.logical = true;
+  out.dims = {rows, columns};
   out.numbers = MatNumbers(MatType::kUint8, std::move(values));
   return out;
 }
 
 MatArray MatArray::Text(std::string_view text) {
   MatArray out;
-  out.kind = MatKind::kText, out.dims = {1, text.size()}, out.text = text;
+  out.kind = MatKind::kText;
+  out.dims = {1, text.size()};
+  out.text = text;
   return out;
 }
 
@@ -109,7 +113,8 @@ MatArray MatArray::Structs(std::vector<std::string> fields, std::vector<MatArray
   MatArray out;
   out.kind = MatKind::kStruct;
   out.dims = {1, fields.empty() ? 0 : elements.size() / fields.size()};
-  out.fields = std::move(fields), out.elements = std::move(elements);
+  out.fields = std::move(fields);
+  out.elements = std::move(elements);
   return out;
 }
 

@@ -99,7 +99,10 @@ Bytes WriteHeader() {
   Bytes header(128, ' ');
   std::ranges::copy(kText, header.begin());
   std::fill(header.begin() + 116, header.begin() + 124, std::uint8_t{0});
-  header[124] = 0, header[125] = 1, header[126] = 'I', header[127] = 'M';
+  header[124] = 0;
+  header[125] = 1;
+  header[126] = 'I';
+  header[127] = 'M';
   return header;
 }
 

@@ -78,10 +78,13 @@ class PanelCopier {
       hn::StoreU(hn::LoadU(Tag(), from_ + v), Tag(), to_ + v);
     }
     if (++panel_ < panels_) {
-      from_ += kTileColumns, to_ += next_panel_;
+      from_ += kTileColumns;
+      to_ += next_panel_;
     } else {
-      from_ += next_row_from_, to_ += next_row_to_;
-      panel_ = 0, --rows_left_;
+      from_ += next_row_from_;
+      to_ += next_row_to_;
+      panel_ = 0;
+      --rows_left_;
     }
   }
 
@@ -105,7 +108,11 @@ class BlockFetcher {
     for (std::size_t i = 0; i < share_ && rows_left_ > 0; ++i) {
       PrefetchLineToL2(row_ + at_);
       at_ += kLineFloats;
-      if (at_ >= steps_) at_ = 0, row_ += ld_, --rows_left_;
+      if (at_ >= steps_) {
+        at_ = 0;
+        row_ += ld_;
+        --rows_left_;
+      }
     }
   }
 

@@ -148,7 +148,10 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
     constexpr bool kBusy = requires { columns.task; };
     if constexpr (kSparesRegister && !kBusy) {
-      for (; steps >= 2; steps -= 2) MultiplyStep(rows, columns), MultiplyStep(rows, columns);
+      for (; steps >= 2; steps -= 2) {
+        MultiplyStep(rows, columns);
+        MultiplyStep(rows, columns);
+      }
       if (steps > 0) MultiplyStep(rows, columns);
     } else {
       while (steps > 0) {

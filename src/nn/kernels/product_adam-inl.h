@@ -89,7 +89,11 @@ class GroupUpdater {
       rule.Update(LoadSome(DF(), gradient_ + i, lanes), p + i, m + i, v + i, lanes);
     }
     column_ = end;
-    if (column_ == columns_) column_ = 0, ++row_, gradient_ += plan_->group_ld();
+    if (column_ == columns_) {
+      column_ = 0;
+      ++row_;
+      gradient_ += plan_->group_ld();
+    }
   }
 
   const ProductAdamPlan* plan_ = nullptr;
@@ -105,7 +109,9 @@ inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Rang
   const ColumnBlock& block = columns.block();
   const Panels& rows = plan.gemm.rows;
   GemmProblem<float> out;
-  out.n = block.end - block.begin, out.c = group, out.ldc = plan.group_ld();
+  out.n = block.end - block.begin;
+  out.c = group;
+  out.ldc = plan.group_ld();
   for (std::size_t j = 0; j < block.panels(); ++j) {
     for (std::size_t panel = panels.begin; panel < panels.end; ++panel) {
       const std::size_t row = rows.begin(panel);

@@ -93,8 +93,10 @@ struct LaneColors {
         r3 = hn::MulAdd(w, hn::Set(d, cell[3]), r3);
       }
       const Vec w = y.At(j);
-      sum[0] = hn::MulAdd(w, r0, sum[0]), sum[1] = hn::MulAdd(w, r1, sum[1]);
-      sum[2] = hn::MulAdd(w, r2, sum[2]), sum[3] = hn::MulAdd(w, r3, sum[3]);
+      sum[0] = hn::MulAdd(w, r0, sum[0]);
+      sum[1] = hn::MulAdd(w, r1, sum[1]);
+      sum[2] = hn::MulAdd(w, r2, sum[2]);
+      sum[3] = hn::MulAdd(w, r3, sum[3]);
     }
     sum[3] = hn::Add(sum[3], hn::Set(d, static_cast<float>(kNothing)));
   }

@@ -16,7 +16,8 @@ Critic::Critic(Context& context, const CriticShape& shape, Rng& rng) {
         {.conv = {.in = in, .out = out, .kernel = 4, .options = {2, 1, shape.padding_mode}},
          .activation = &LeakyRelu02},
         rng);
-    in = out, out *= 2;
+    in = out;
+    out *= 2;
   }
   AddConvBlock(levels_.emplace_back(), "score", context,
                {.conv = {.in = in, .out = 1, .options = {1, 1, shape.padding_mode}}}, rng);

@@ -44,10 +44,13 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
     return InvalidArgument("conv2d: this operation pads with zeros only");
   }
   Conv2dShape s;
-  s.batch = size(e.x[0]), s.in_channels = size(e.x[1]);
-  s.in_height = size(e.x[2]), s.in_width = size(e.x[3]);
+  s.batch = size(e.x[0]);
+  s.in_channels = size(e.x[1]);
+  s.in_height = size(e.x[2]);
+  s.in_width = size(e.x[3]);
   s.out_channels = size(e.weight[0]);
-  s.kernel_height = size(e.weight[2]), s.kernel_width = size(e.weight[3]);
+  s.kernel_height = size(e.weight[2]);
+  s.kernel_width = size(e.weight[3]);
   s.padding = static_cast<std::size_t>(options.padding);
   // A step beyond the padded image leaves one pixel, as any longer one does; the kernels' tables
   // grow with the square of the stride.

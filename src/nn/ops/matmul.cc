@@ -28,12 +28,17 @@ Tensor Product(const Var& a, const Var& b, const Var& bias, const MatmulOptions&
   Tensor c = context.Empty({static_cast<std::int64_t>(m), static_cast<std::int64_t>(n)}, a.dtype());
   WithFloatType(a.dtype(), [&]<class T>(T) {
     GemmProblem<T> problem;
-    problem.m = m, problem.n = n, problem.k = k;
-    problem.a = a.value().data<T>(), problem.lda = extent(a, 1);
-    problem.b = b.value().data<T>(), problem.ldb = extent(b, 1);
+    problem.m = m;
+    problem.n = n;
+    problem.k = k;
+    problem.a = a.value().data<T>();
+    problem.lda = extent(a, 1);
+    problem.b = b.value().data<T>();
+    problem.ldb = extent(b, 1);
     problem.transpose_a = options.transpose_a;
     problem.transpose_b = options.transpose_b;
-    problem.c = c.data<T>(), problem.ldc = n;
+    problem.c = c.data<T>();
+    problem.ldc = n;
     problem.bias = bias.valid() ? bias.value().data<T>() : nullptr;
     Multiply(problem, context);
   });

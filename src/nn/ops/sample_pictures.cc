@@ -74,7 +74,8 @@ struct PictureSampling {
         d_x += d * ((T(1) - y.share) * (p[x.step] - p[0]) + y.share * (q[x.step] - q[0]));
         d_y += d * (lower - upper);
       }
-      d_at[i] = d_x * x.slope, d_at[places() + i] = d_y * y.slope;
+      d_at[i] = d_x * x.slope;
+      d_at[places() + i] = d_y * y.slope;
     });
   }
 };

@@ -67,7 +67,8 @@ Status CheckBound(const CheckContext& context, const BoundScene& scene, double r
   const PipelineScene views[] = {scene.mesh.View()};
   TILEGRAD_TRY(renderer.Render(views, scene.options, {.attributes = false}, &frame));
   std::vector<double> spent = {frame.alpha_error_bound};
-  context.Take("alpha", frame.alpha), context.Take("alpha_error_bound", spent);
+  context.Take("alpha", frame.alpha);
+  context.Take("alpha_error_bound", spent);
   if (!(spent[0] <= scene.options.max_alpha_error + 1e-28)) {  // n 2^-126 if none is allowed
     return InternalError("alpha_error_bound is {:.3g}", spent[0]);
   }

@@ -44,7 +44,11 @@ Status Gauge::Add(std::string_view what, std::size_t index, double got, double w
     return InternalError("{}[{}] is {:.9g}, expected {:.9g}: off by {:.1e}, allowed {:.1e}", what,
                          index, got, want, off, allowed);
   }
-  if (off > share_ * allowed) share_ = off / allowed, off_ = off, allowed_ = allowed;
+  if (off > share_ * allowed) {
+    share_ = off / allowed;
+    off_ = off;
+    allowed_ = allowed;
+  }
   return {};
 }
 

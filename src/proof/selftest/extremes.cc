@@ -40,7 +40,8 @@ Status CheckFinite(const CheckContext& context, OwnedScene<float> scene, double 
   options.delta = delta;
   Outputs request;
   OwnedCotangents<float> d_frame;
-  d_frame.color.assign(3 * 64 * 64, 1.0f), d_frame.alpha.assign(64 * 64, 1.0f);
+  d_frame.color.assign(3 * 64 * 64, 1.0f);
+  d_frame.alpha.assign(64 * 64, 1.0f);
   OwnedRendering<float> out;
   TILEGRAD_TRY(RenderOwned(scene, options, request, d_frame, context.workers, &out));
   TILEGRAD_TRY(ExpectFinite(context, "color", out.frame.color));

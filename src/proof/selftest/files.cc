@@ -88,7 +88,8 @@ struct Corners {
 Status ExpectMesh(const CheckContext& context, const Mesh& got, const Mesh& want, double uv_error) {
   Corners read(got);
   const Corners written(want);
-  context.Take("positions", read.positions), context.Take("uvs", read.uvs);
+  context.Take("positions", read.positions);
+  context.Take("uvs", read.uvs);
   TILEGRAD_TRY(ExpectSameBits("positions", read.positions, written.positions));
   return Gauge().Expect("uvs", read.uvs, written.uvs, uv_error);
 }

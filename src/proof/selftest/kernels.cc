@@ -23,10 +23,17 @@ template <class T>
 nn::GemmProblem<T> ProblemOf(const ProductCase& c, const std::vector<T>& a, const std::vector<T>& b,
                              std::vector<T>* out) {
   nn::GemmProblem<T> p;
-  p.m = c.m, p.n = c.n, p.k = c.k;
-  p.a = a.data(), p.lda = c.transpose_a ? c.m : c.k, p.transpose_a = c.transpose_a;
-  p.b = b.data(), p.ldb = c.transpose_b ? c.k : c.n, p.transpose_b = c.transpose_b;
-  p.c = out->data(), p.ldc = c.n;
+  p.m = c.m;
+  p.n = c.n;
+  p.k = c.k;
+  p.a = a.data();
+  p.lda = c.transpose_a ? c.m : c.k;
+  p.transpose_a = c.transpose_a;
+  p.b = b.data();
+  p.ldb = c.transpose_b ? c.k : c.n;
+  p.transpose_b = c.transpose_b;
+  p.c = out->data();
+  p.ldc = c.n;
   return p;
 }
 
@@ -67,7 +74,9 @@ std::string Describe(const nn::Conv2dShape& s) {
 }
 
 void Take(const CheckContext& context, nn::Conv2dResults* r) {
-  context.Take("y", r->y), context.Take("d_x", r->d_x), context.Take("d_weight", r->d_weight);
+  context.Take("y", r->y);
+  context.Take("d_x", r->d_x);
+  context.Take("d_weight", r->d_weight);
 }
 
 // Padded and strided; few channels, tails, and a kernel as large as the image.

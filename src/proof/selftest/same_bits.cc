@@ -58,8 +58,11 @@ OwnedCotangents<float> Repeated(const OwnedCotangents<float>& one, std::size_t c
   const auto repeat = [&](const std::vector<float>& from, std::vector<float>* to) {
     for (std::size_t n = 0; n < count; ++n) to->insert(to->end(), from.begin(), from.end());
   };
-  repeat(one.color, &out.color), repeat(one.alpha, &out.alpha), repeat(one.depth, &out.depth);
-  repeat(one.normals, &out.normals), repeat(one.uv, &out.uv);
+  repeat(one.color, &out.color);
+  repeat(one.alpha, &out.alpha);
+  repeat(one.depth, &out.depth);
+  repeat(one.normals, &out.normals);
+  repeat(one.uv, &out.uv);
   return out;
 }
 

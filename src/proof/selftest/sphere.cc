@@ -22,9 +22,12 @@ bool HasGradient(Lighting lighting, const std::string& kind) {
 
 template <class Frame>
 void TakeImages(const CheckContext& context, Frame* frame) {
-  context.Take("face_ids", frame->face_ids), context.Take("color", frame->color);
-  context.Take("alpha", frame->alpha), context.Take("depth", frame->depth);
-  context.Take("normals", frame->normals), context.Take("uv", frame->uv);
+  context.Take("face_ids", frame->face_ids);
+  context.Take("color", frame->color);
+  context.Take("alpha", frame->alpha);
+  context.Take("depth", frame->depth);
+  context.Take("normals", frame->normals);
+  context.Take("uv", frame->uv);
 }
 
 template <class T>
@@ -110,7 +113,8 @@ Status CheckSlope(const SlopeProblem& problem, const std::string& kind,
 }
 
 Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) {
-  shape.level = 1, shape.width = shape.height = 16;
+  shape.level = 1;
+  shape.width = shape.height = 16;
   const RenderOptions options = SphereOptions(shape);
   const auto scene = MakeSphere(shape);
   auto scene64 = OwnedCast<double>(scene);

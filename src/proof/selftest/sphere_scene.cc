@@ -32,7 +32,7 @@ CameraT<float> SideCamera(const SphereShape& shape) {
   std::transform(kAxes, kAxes + 9, camera.rotation, [](double x) { return static_cast<float>(x); });
   camera.translation[2] = -3;
   camera.fx = camera.fy = 1.25f * static_cast<float>(std::min(shape.width, shape.height));
-  camera.cx = 0.5f * static_cast<float>(shape.width),
+  camera.cx = 0.5f * static_cast<float>(shape.width);
   camera.cy = 0.5f * static_cast<float>(shape.height);
   camera.near_plane = shape.near_plane;
   return camera;
@@ -76,7 +76,8 @@ void AddSurfaces(Rng* rng, OwnedScene<float>* scene) {
 
 void AddLight(const SphereShape& shape, Rng* rng, OwnedScene<float>* scene) {
   scene->shading.lighting = shape.lighting;
-  scene->shading.normals = shape.normals, scene->shading.two_sided = true;
+  scene->shading.normals = shape.normals;
+  scene->shading.two_sided = true;
   if (shape.lighting == Lighting::kSphericalHarmonics) scene->sh = RandomNumbers(9, 0.1, 0.5, rng);
   if (!UsesLights(scene->shading)) return;
   scene->lights = {{{0.3f, 0.5f, 1.0f}, 0.8f}, {{-1.0f, 0.7f, 0.9f}, 0.4f}};
@@ -103,8 +104,10 @@ Outputs ImagesWithGradients() {
 
 RenderOptions SphereOptions(const SphereShape& shape) {
   RenderOptions options;
-  options.width = shape.width, options.height = shape.height;
-  options.delta = 1e-2, options.max_alpha_error = 1e-7;
+  options.width = shape.width;
+  options.height = shape.height;
+  options.delta = 1e-2;
+  options.max_alpha_error = 1e-7;
   return options;
 }
 

@@ -70,7 +70,8 @@ OwnedScene<T> TriangleScene() {
   for (const auto& c : kColors) {
     scene.colors.insert(scene.colors.end(), {T(c[0]), T(c[1]), T(c[2])});
   }
-  scene.mesh.faces = {0, 1, 2}, scene.mesh.channels = 0;
+  scene.mesh.faces = {0, 1, 2};
+  scene.mesh.channels = 0;
   return scene;
 }
 
@@ -78,7 +79,8 @@ template <class T>
 Result<FrameImagesT<T>> RenderTriangle(const Workers& workers) {
   auto scene = TriangleScene<T>();
   RenderOptions options;
-  options.width = options.height = kSize, options.delta = kDelta;
+  options.width = options.height = kSize;
+  options.delta = kDelta;
   Outputs request;
   request.depth = true;
   FrameImagesT<T> frame;
@@ -154,7 +156,8 @@ SeenColors SeenInPerspective() {
 template <class T>
 Result<Finding> ColorAndDepth(const CheckContext& context) {
   TILEGRAD_ASSIGN(auto frame, RenderTriangle<T>(context.workers));
-  context.Take("color", frame.color), context.Take("depth", frame.depth);
+  context.Take("color", frame.color);
+  context.Take("depth", frame.depth);
   const SeenColors want = SeenInPerspective();
   const double allowed = std::is_same_v<T, float> ? 4.6e-5 : 1e-13;
   Gauge gauge;

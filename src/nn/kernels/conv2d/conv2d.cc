@@ -62,7 +62,8 @@ Conv2dShape Flattened(Conv2dShape shape) {
   constexpr std::size_t kLongestRow = 512;
   if (shape.kernel_area() == 1 && shape.stride == 1 && shape.padding == 0 &&
       shape.in_pixels() <= kLongestRow) {
-    shape.in_width = shape.in_pixels(), shape.in_height = 1;
+    shape.in_width = shape.in_pixels();
+    shape.in_height = 1;
   }
   return shape;
 }

@@ -68,8 +68,10 @@ void WinogradForwardTarget(const Conv2dShape& s, const float* x, const float* we
 // need not be whole images.
 inline Conv2dShape TransposeOf(const Conv2dShape& s) {
   Conv2dShape t = s;
-  t.in_channels = s.out_channels, t.out_channels = s.in_channels;
-  t.in_height = s.out_height(), t.in_width = s.out_width();
+  t.in_channels = s.out_channels;
+  t.out_channels = s.in_channels;
+  t.in_height = s.out_height();
+  t.in_width = s.out_width();
   t.padding = s.kernel_height - 1 - s.padding;
   return t;
 }

@@ -92,7 +92,10 @@ inline void SplitPairs(const float* pairs, std::size_t count, float* even, float
       hn::StoreU(v0, d, even + t);
       hn::StoreU(v1, d, odd + t);
     }
-    for (; t < count; ++t) even[t] = pairs[2 * t], odd[t] = pairs[2 * t + 1];
+    for (; t < count; ++t) {
+      even[t] = pairs[2 * t];
+      odd[t] = pairs[2 * t + 1];
+    }
   });
 }
 
@@ -102,7 +105,10 @@ inline void JoinPairs(const float* even, const float* odd, std::size_t count, fl
     for (; t + hn::Lanes(d) <= count; t += hn::Lanes(d)) {
       hn::StoreInterleaved2(hn::LoadU(d, even + t), hn::LoadU(d, odd + t), d, pairs + 2 * t);
     }
-    for (; t < count; ++t) pairs[2 * t] = even[t], pairs[2 * t + 1] = odd[t];
+    for (; t < count; ++t) {
+      pairs[2 * t] = even[t];
+      pairs[2 * t + 1] = odd[t];
+    }
   });
 }
 
