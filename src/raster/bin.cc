@@ -43,7 +43,8 @@ void PlaceChunks(std::size_t bins, BinListBuffers* buffers) {
     buffers->begin[t] = total;
     for (std::size_t at = t; at < buffers->cursor.size(); at += bins) {
       const std::int32_t count = buffers->cursor[at];
-      buffers->cursor[at] = total, total += count;
+      buffers->cursor[at] = total;
+      total += count;
     }
   }
   buffers->begin[bins] = total;

@@ -80,7 +80,9 @@ HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, const CornerIndices& 
   for (int k = 0; k < 3; ++k) {
     Lane v[4];
     LoadVertices(mesh, vertices.at[k], v);
-    out.x[k] = v[0], out.y[k] = v[1], out.inverse_depth[k] = v[2];
+    out.x[k] = v[0];
+    out.y[k] = v[1];
+    out.inverse_depth[k] = v[2];
   }
   return out;
 }
@@ -100,8 +102,10 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   const auto inverse = hn::IfThenElseZero(solid, hn::Div(hn::Set(d, 1.0f), area));
   const auto x = hn::Sub(origin_x, c.x[0]), y = hn::Sub(origin_y, c.y[0]);
   const auto third = hn::IfThenZeroElse(solid, hn::Set(d, 1.0f / 3.0f));
-  out[1].dx = hn::Mul(y2, inverse), out[1].dy = hn::Neg(hn::Mul(x2, inverse));
-  out[2].dx = hn::Neg(hn::Mul(y1, inverse)), out[2].dy = hn::Mul(x1, inverse);
+  out[1].dx = hn::Mul(y2, inverse);
+  out[1].dy = hn::Neg(hn::Mul(x2, inverse));
+  out[2].dx = hn::Neg(hn::Mul(y1, inverse));
+  out[2].dy = hn::Mul(x1, inverse);
   for (int k = 1; k < 3; ++k) {
     out[k].value = hn::MulAdd(out[k].dx, x, hn::MulAdd(out[k].dy, y, third));
   }
@@ -135,11 +139,14 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   HWY_ALIGN float x[3][kMostFaceLanes], y[3][kMostFaceLanes];
   HWY_ALIGN float origin[2][kMostFaceLanes];
   HWY_ALIGN WeightLanes lanes[3];
-  hn::Store(origin_x, d, origin[0]), hn::Store(origin_y, d, origin[1]);
+  hn::Store(origin_x, d, origin[0]);
+  hn::Store(origin_y, d, origin[1]);
   for (int k = 0; k < 3; ++k) {
-    hn::Store(c.x[k], d, x[k]), hn::Store(c.y[k], d, y[k]);
+    hn::Store(c.x[k], d, x[k]);
+    hn::Store(c.y[k], d, y[k]);
     hn::Store(out[k].value, d, lanes[k].value);
-    hn::Store(out[k].dx, d, lanes[k].dx), hn::Store(out[k].dy, d, lanes[k].dy);
+    hn::Store(out[k].dx, d, lanes[k].dx);
+    hn::Store(out[k].dy, d, lanes[k].dy);
   }
   std::uint8_t bits[8] = {};
   hn::StoreMaskBits(d, steep, bits);

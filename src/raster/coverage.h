@@ -79,7 +79,8 @@ SnappedFace SnapFace(const ScreenMeshT<T>& mesh, std::size_t face) {
   SnappedFace out;
   for (int k = 0; k < 3; ++k) {
     const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
-    out.x[k] = Snap(mesh.x[v]), out.y[k] = Snap(mesh.y[v]);
+    out.x[k] = Snap(mesh.x[v]);
+    out.y[k] = Snap(mesh.y[v]);
   }
   return out;
 }
@@ -88,7 +89,10 @@ SnappedFace SnapFace(const ScreenMeshT<T>& mesh, std::size_t face) {
 template <class T>
 SnappedFace SnapFaceClockwise(const ScreenMeshT<T>& mesh, std::size_t face) {
   SnappedFace out = SnapFace(mesh, face);
-  if (out.AreaSign() < 0) std::swap(out.x[1], out.x[2]), std::swap(out.y[1], out.y[2]);
+  if (out.AreaSign() < 0) {
+    std::swap(out.x[1], out.x[2]);
+    std::swap(out.y[1], out.y[2]);
+  }
   return out;
 }
 

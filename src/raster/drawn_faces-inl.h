@@ -43,7 +43,9 @@ HWY_INLINE ShapeCorners LoadShapeCorners(const ScreenMesh& mesh, std::size_t f, 
     }
     FaceVec v[4];
     LoadVertices(mesh, vertices, v);
-    out.x[k] = v[0], out.y[k] = v[1], out.z[k] = v[2];
+    out.x[k] = v[0];
+    out.y[k] = v[1];
+    out.z[k] = v[2];
   }
   return out;
 }
@@ -109,7 +111,8 @@ HWY_INLINE void WindClockwise(FaceInt area, SnappedLanes* s) {
   const auto swap = hn::Lt(area, hn::Zero(FaceIntTag()));
   for (auto* a : {s->x, s->y}) {
     const auto first = a[1];
-    a[1] = hn::IfThenElse(swap, a[2], first), a[2] = hn::IfThenElse(swap, first, a[2]);
+    a[1] = hn::IfThenElse(swap, a[2], first);
+    a[2] = hn::IfThenElse(swap, first, a[2]);
   }
 }
 
@@ -133,7 +136,8 @@ HWY_INLINE void SetEdges(SnappedLanes s, FaceInt column, FaceInt row, FaceWords*
     const auto at = hn::Sub(hn::Mul(dy, s.x[k]), hn::Mul(dx, s.y[k]));
     const auto exact = hn::Add(at, hn::IfThenZeroElse(left_or_top, hn::Set(di, -1)));
     out->word[kEdgeWord + k] = hn::ShiftRight<kSubpixelBits>(exact);
-    out->word[kEdgeWord + 3 + k] = hn::Neg(dy), out->word[kEdgeWord + 6 + k] = dx;
+    out->word[kEdgeWord + 3 + k] = hn::Neg(dy);
+    out->word[kEdgeWord + 6 + k] = dx;
   }
 }
 
@@ -143,14 +147,17 @@ HWY_INLINE void OrderLanes(ShapeCorners* c, int i, int j) {
       hn::Or(hn::Lt(c->x[i], c->x[j]), hn::And(hn::Eq(c->x[i], c->x[j]), hn::Le(c->y[i], c->y[j])));
   for (auto* a : {c->x, c->y, c->z}) {
     const auto first = a[i];
-    a[i] = hn::IfThenElse(ordered, first, a[j]), a[j] = hn::IfThenElse(ordered, a[j], first);
+    a[i] = hn::IfThenElse(ordered, first, a[j]);
+    a[j] = hn::IfThenElse(ordered, a[j], first);
   }
 }
 
 // NarrowDepthPlane of face_plane.h, in the same order of operations.
 HWY_INLINE void SetDepth(ShapeCorners c, FaceWords* out) {
   const FaceTag d;
-  OrderLanes(&c, 0, 1), OrderLanes(&c, 1, 2), OrderLanes(&c, 0, 1);
+  OrderLanes(&c, 0, 1);
+  OrderLanes(&c, 1, 2);
+  OrderLanes(&c, 0, 1);
   const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
   const auto x2 = hn::Sub(c.x[2], c.x[0]), y2 = hn::Sub(c.y[2], c.y[0]);
   const auto x3 = hn::Sub(x2, x1), y3 = hn::Sub(y2, y1);
@@ -239,9 +246,11 @@ struct ShapeLanes {
 HWY_INLINE ShapeLanes ShapesOf(const ShapeCorners& c) {
   ShapeLanes out;
   for (int k = 0; k < 3; ++k) {
-    out.corners.x[k] = SnapLanes(c.x[k]), out.corners.y[k] = SnapLanes(c.y[k]);
+    out.corners.x[k] = SnapLanes(c.x[k]);
+    out.corners.y[k] = SnapLanes(c.y[k]);
   }
-  out.x = RangeOf(out.corners.x), out.y = RangeOf(out.corners.y);
+  out.x = RangeOf(out.corners.x);
+  out.y = RangeOf(out.corners.y);
   out.small = hn::And(IsSmall(out.x), IsSmall(out.y));
   out.area = AreaLanes(out.corners);
   return out;
@@ -288,7 +297,8 @@ HWY_INLINE FaceInt CoveredOf(const FaceWords& words) {
   static_assert(kStamp == 4);
   FaceInt across[3], down[3], row_edge[3];
   for (int k = 0; k < 3; ++k) {
-    across[k] = words.word[kEdgeWord + 3 + k], down[k] = words.word[kEdgeWord + 6 + k];
+    across[k] = words.word[kEdgeWord + 3 + k];
+    down[k] = words.word[kEdgeWord + 6 + k];
     const auto both = hn::Add(across[k], down[k]);
     row_edge[k] = hn::Add(words.word[kEdgeWord + k], hn::Add(both, hn::Add(both, both)));
   }
@@ -370,7 +380,8 @@ HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t c
       hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), v), d,
                 to->at(f / kPacketFaces, number) + f % kPacketFaces);
     };
-    store(c.x[k], k), store(c.y[k], 3 + k);
+    store(c.x[k], k);
+    store(c.y[k], 3 + k);
   }
 }
 

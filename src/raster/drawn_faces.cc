@@ -36,7 +36,10 @@ void SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> 
   constexpr std::size_t kChunk = DrawnFaces::kChunk;
   const std::size_t n = mesh.faces();
   if (out.drawn != nullptr) {
-    if (out.drawn->storage.size() < n) out.drawn->storage.resize(n), out.drawn->bins.resize(n);
+    if (out.drawn->storage.size() < n) {
+      out.drawn->storage.resize(n);
+      out.drawn->bins.resize(n);
+    }
     out.drawn->counts.assign((n + kChunk - 1) / kChunk, 0);
   }
   if (out.corners != nullptr) out.corners->Resize(n);

@@ -69,8 +69,10 @@ template <class D>
 HWY_INLINE void Transpose(D d, hn::Vec<D> (&q)[4]) {
   const auto a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
   const auto e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
-  q[0] = hn::InterleaveLower(d, a, b), q[1] = hn::InterleaveUpper(d, a, b);
-  q[2] = hn::InterleaveLower(d, e, f), q[3] = hn::InterleaveUpper(d, e, f);
+  q[0] = hn::InterleaveLower(d, a, b);
+  q[1] = hn::InterleaveUpper(d, a, b);
+  q[2] = hn::InterleaveLower(d, e, f);
+  q[3] = hn::InterleaveUpper(d, e, f);
 }
 
 #if !HWY_HAVE_SCALABLE

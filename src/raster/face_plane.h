@@ -54,7 +54,9 @@ ScreenCorners<T> CornersOf(const ScreenMeshT<T>& mesh, std::size_t face) {
   ScreenCorners<T> out;
   for (int k = 0; k < 3; ++k) {
     const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
-    out.x[k] = mesh.x[v], out.y[k] = mesh.y[v], out.z[k] = mesh.inverse_depth[v];
+    out.x[k] = mesh.x[v];
+    out.y[k] = mesh.y[v];
+    out.z[k] = mesh.inverse_depth[v];
   }
   return out;
 }
@@ -64,7 +66,9 @@ template <class T>
 ScreenCorners<double> Wide(const ScreenCorners<T>& c) {
   ScreenCorners<double> out;
   for (int k = 0; k < 3; ++k) {
-    out.x[k] = RealPart(c.x[k]), out.y[k] = RealPart(c.y[k]), out.z[k] = RealPart(c.z[k]);
+    out.x[k] = RealPart(c.x[k]);
+    out.y[k] = RealPart(c.y[k]);
+    out.z[k] = RealPart(c.z[k]);
   }
   return out;
 }
@@ -80,9 +84,12 @@ FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
     return plane;
   }
   const T inverse = T(1) / area;
-  plane.gx[1] = y2 * inverse, plane.gy[1] = -x2 * inverse;
-  plane.gx[2] = -y1 * inverse, plane.gy[2] = x1 * inverse;
-  plane.gx[0] = -(plane.gx[1] + plane.gx[2]), plane.gy[0] = -(plane.gy[1] + plane.gy[2]);
+  plane.gx[1] = y2 * inverse;
+  plane.gy[1] = -x2 * inverse;
+  plane.gx[2] = -y1 * inverse;
+  plane.gy[2] = x1 * inverse;
+  plane.gx[0] = -(plane.gx[1] + plane.gx[2]);
+  plane.gy[0] = -(plane.gy[1] + plane.gy[2]);
   return plane;
 }
 
@@ -110,7 +117,9 @@ void SwapUnlessOrdered(ScreenCorners<T>* c, int i, int j) {
   const auto before = [](const T& p, const T& q) { return RealPart(p) < RealPart(q); };
   const bool same_x = !before(c->x[i], c->x[j]) && !before(c->x[j], c->x[i]);
   if (same_x ? !before(c->y[j], c->y[i]) : before(c->x[i], c->x[j])) return;
-  std::swap(c->x[i], c->x[j]), std::swap(c->y[i], c->y[j]), std::swap(c->z[i], c->z[j]);
+  std::swap(c->x[i], c->x[j]);
+  std::swap(c->y[i], c->y[j]);
+  std::swap(c->z[i], c->z[j]);
 }
 
 // Corners in an order that does not depend on where a face starts and how it is wound: coinciding
@@ -119,7 +128,9 @@ void SwapUnlessOrdered(ScreenCorners<T>* c, int i, int j) {
 template <class T>
 ScreenCorners<T> OrderedCorners(const ScreenMeshT<T>& mesh, std::size_t face) {
   ScreenCorners<T> c = CornersOf(mesh, face);
-  SwapUnlessOrdered(&c, 0, 1), SwapUnlessOrdered(&c, 1, 2), SwapUnlessOrdered(&c, 0, 1);
+  SwapUnlessOrdered(&c, 0, 1);
+  SwapUnlessOrdered(&c, 1, 2);
+  SwapUnlessOrdered(&c, 0, 1);
   return c;
 }
 
@@ -129,7 +140,8 @@ DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
   DepthPlane<T> plane{weights.x0, weights.y0, T(0), T(0), T(0), c.z[0], c.z[0]};
   for (int k = 0; k < 3; ++k) {
     plane.base += weights.base[k] * c.z[k];
-    plane.gx += weights.gx[k] * c.z[k], plane.gy += weights.gy[k] * c.z[k];
+    plane.gx += weights.gx[k] * c.z[k];
+    plane.gy += weights.gy[k] * c.z[k];
     if (RealPart(c.z[k]) < RealPart(plane.low)) plane.low = c.z[k];
     if (RealPart(c.z[k]) > RealPart(plane.high)) plane.high = c.z[k];
   }

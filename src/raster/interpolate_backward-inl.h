@@ -131,13 +131,18 @@ HWY_INLINE void AddPair(const PixelShare& a, const PixelShare& b, float* moments
   float* to_a = moments + 4 * a.slot;
   float* to_b = moments + 4 * b.slot;
   const Quad sum = hn::Add(hn::Load(d, to_b), hn::Add(again, b.f));
-  hn::Store(hn::Add(hn::Load(d, to_a), a.f), d, to_a), hn::Store(sum, d, to_b);
-  to_a += 4 * stride, to_b += 4 * stride;
+  hn::Store(hn::Add(hn::Load(d, to_a), a.f), d, to_a);
+  hn::Store(sum, d, to_b);
+  to_a += 4 * stride;
+  to_b += 4 * stride;
   const Quad sum_x = hn::MulAdd(again, a.x, hn::MulAdd(b.f, b.x, hn::Load(d, to_b)));
-  hn::Store(hn::MulAdd(a.f, a.x, hn::Load(d, to_a)), d, to_a), hn::Store(sum_x, d, to_b);
-  to_a += 4 * stride, to_b += 4 * stride;
+  hn::Store(hn::MulAdd(a.f, a.x, hn::Load(d, to_a)), d, to_a);
+  hn::Store(sum_x, d, to_b);
+  to_a += 4 * stride;
+  to_b += 4 * stride;
   const Quad sum_y = hn::MulAdd(again, a.y, hn::MulAdd(b.f, b.y, hn::Load(d, to_b)));
-  hn::Store(hn::MulAdd(a.f, a.y, hn::Load(d, to_a)), d, to_a), hn::Store(sum_y, d, to_b);
+  hn::Store(hn::MulAdd(a.f, a.y, hn::Load(d, to_a)), d, to_a);
+  hn::Store(sum_y, d, to_b);
 }
 
 template <bool kPerspective>

@@ -57,7 +57,10 @@ template <class T>
 void BarycentricRefBackward(const ScreenMeshT<T>& mesh, const FacePlane<T>& plane, std::size_t face,
                             const T b[3], const T d_b[3], const ScreenGradientsT<T>& d_mesh) {
   T gx = T(0), gy = T(0);
-  for (int k = 0; k < 3; ++k) gx += d_b[k] * plane.gx[k], gy += d_b[k] * plane.gy[k];
+  for (int k = 0; k < 3; ++k) {
+    gx += d_b[k] * plane.gx[k];
+    gy += d_b[k] * plane.gy[k];
+  }
   for (int m = 0; m < 3; ++m) {
     const auto v = static_cast<std::size_t>(mesh.vertex(face, m));
     d_mesh.d_x[v] -= b[m] * gx;

@@ -85,7 +85,9 @@ template <class T>
 void AppendFace(const FaceSource<T>& source, std::int32_t source_face, std::int32_t a,
                 std::int32_t b, std::int32_t c, std::uint8_t reject, ScreenMeshBuffersT<T>* out) {
   const std::size_t face = out->v0.size();
-  out->v0.push_back(a), out->v1.push_back(b), out->v2.push_back(c);
+  out->v0.push_back(a);
+  out->v1.push_back(b);
+  out->v2.push_back(c);
   out->source_face.push_back(source_face);
   const std::int32_t v[3] = {a, b, c};
   if (HasOverflow(*out, v)) reject |= kFaceOverflow;
@@ -155,8 +157,12 @@ void AppendCutFace(const FaceSource<T>& source, std::int32_t face, ScreenMeshBuf
 template <class T>
 void AssembleFaces(const FaceSource<T>& source, ScreenMeshBuffersT<T>* out) {
   out->whole = nullptr;
-  out->v0.clear(), out->v1.clear(), out->v2.clear();
-  out->source_face.clear(), out->reject.clear(), out->clipped.clear();
+  out->v0.clear();
+  out->v1.clear();
+  out->v2.clear();
+  out->source_face.clear();
+  out->reject.clear();
+  out->clipped.clear();
   for (std::size_t f = 0; f < source.faces.size() / 3; ++f) {
     const std::int32_t* v = &source.faces[3 * f];
     const auto id = static_cast<std::int32_t>(f);
@@ -258,7 +264,10 @@ void ClipAttributesBackward(const ScreenMeshT<T>& mesh, std::span<const std::int
         for (std::size_t c = 0; c < channels; ++c) {
           const T d = d_out[row * channels + c];
           const std::size_t a = from.a * channels + c, b = from.b * channels + c;
-          if (!d_in.empty()) d_in[a] += (T(1) - from.t) * d, d_in[b] += from.t * d;
+          if (!d_in.empty()) {
+            d_in[a] += (T(1) - from.t) * d;
+            d_in[b] += from.t * d;
+          }
           if (clip >= 0 && !d_clip_t.empty()) {
             d_clip_t[static_cast<std::size_t>(clip)] += d * (in.values[b] - in.values[a]);
           }

@@ -60,8 +60,10 @@ HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* po
       hn::IfThenElseZero(visible, hn::MulAdd(hn::Set(d, camera.fx), u, hn::Set(d, camera.cx)));
   const auto sy =
       hn::IfThenElseZero(visible, hn::NegMulAdd(hn::Set(d, camera.fy), v, hn::Set(d, camera.cy)));
-  hn::StoreU(sx, d, to.x), hn::StoreU(sy, d, to.y);
-  hn::StoreU(p.depth, d, to.depth), hn::StoreU(inverse, d, to.inverse_depth);
+  hn::StoreU(sx, d, to.x);
+  hn::StoreU(sy, d, to.y);
+  hn::StoreU(p.depth, d, to.depth);
+  hn::StoreU(inverse, d, to.inverse_depth);
   hn::StoreInterleaved4(sx, sy, inverse, p.depth, d, to.packed);
   // v - v is NaN, and not zero, for what is not finite.
   const auto zero = hn::Add(hn::Sub(sx, sx), hn::Add(hn::Sub(sy, sy), hn::Sub(p.depth, p.depth)));
@@ -108,12 +110,15 @@ void SplitSomeFaces(std::span<const std::int32_t> faces, std::size_t begin, std:
   for (; f + lanes <= end; f += lanes) {
     hn::Vec<decltype(di)> v[3];
     hn::LoadInterleaved3(di, &faces[3 * f], v[0], v[1], v[2]);
-    hn::StoreU(v[0], di, &out->v0[f]), hn::StoreU(v[1], di, &out->v1[f]);
+    hn::StoreU(v[0], di, &out->v0[f]);
+    hn::StoreU(v[1], di, &out->v1[f]);
     hn::StoreU(v[2], di, &out->v2[f]);
     hn::StoreU(simd::CountFrom(di, static_cast<std::int32_t>(f)), di, &out->source_face[f]);
   }
   for (; f < end; ++f) {
-    out->v0[f] = faces[3 * f], out->v1[f] = faces[3 * f + 1], out->v2[f] = faces[3 * f + 2];
+    out->v0[f] = faces[3 * f];
+    out->v1[f] = faces[3 * f + 1];
+    out->v2[f] = faces[3 * f + 2];
     out->source_face[f] = static_cast<std::int32_t>(f);
   }
 }
@@ -135,8 +140,11 @@ HWY_INLINE void StoreCameraSums(ProjectTag d, const CameraSums& sums, Camera* ca
   const auto total = [&](ProjectVec v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
   for (int i = 0; i < 9; ++i) camera->rotation[i] = total(sums.rotation[i]);
   for (int i = 0; i < 3; ++i) camera->translation[i] = total(sums.translation[i]);
-  camera->fx = total(sums.fx), camera->fy = total(sums.fy);
-  camera->cx = total(sums.cx), camera->cy = total(sums.cy), camera->near_plane = 0;
+  camera->fx = total(sums.fx);
+  camera->fy = total(sums.fy);
+  camera->cx = total(sums.cx);
+  camera->cy = total(sums.cy);
+  camera->near_plane = 0;
 }
 
 // One vector of vertices of the adjoint: d_screen [Lanes][d_x, d_y, d_inverse_depth, -]. Writes
@@ -170,8 +178,10 @@ HWY_INLINE void ProjectLanesBackward(ProjectTag d, const Camera& camera, const f
     }
     sums->translation[r] = hn::Add(sums->translation[r], d_camera[r]);
   }
-  sums->fx = hn::MulAdd(u, d_x, sums->fx), sums->cx = hn::Add(sums->cx, d_x);
-  sums->fy = hn::NegMulAdd(v, d_y, sums->fy), sums->cy = hn::Add(sums->cy, d_y);
+  sums->fx = hn::MulAdd(u, d_x, sums->fx);
+  sums->cx = hn::Add(sums->cx, d_x);
+  sums->fy = hn::NegMulAdd(v, d_y, sums->fy);
+  sums->cy = hn::Add(sums->cy, d_y);
 }
 
 // The adjoint where nothing was cut and every vertex is visible. d_screen [V][4].

@@ -79,7 +79,8 @@ void Project(const FaceSource<float>& source, int width, int height, ScreenMeshB
   out->packed.resize(n);
   out->source_vertices = static_cast<std::int32_t>(n);
   out->source_faces = static_cast<std::int32_t>(source.faces.size() / 3);
-  out->width = width, out->height = height;
+  out->width = width;
+  out->height = height;
   if (ProjectSource(source, out, workers)) {
     AssembleWholeFaces(source, out, workers);
   } else {

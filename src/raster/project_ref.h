@@ -33,7 +33,8 @@ void ProjectRef(const FaceSource<T>& source, int width, int height, ScreenMeshBu
   ProjectVerticesRef(source, out);
   out->source_vertices = static_cast<std::int32_t>(source.positions.size() / 3);
   out->source_faces = static_cast<std::int32_t>(source.faces.size() / 3);
-  out->width = width, out->height = height;
+  out->width = width;
+  out->height = height;
   AssembleFaces(source, out);
 }
 
@@ -48,8 +49,10 @@ void PerspectiveBackward(const CameraPoint<T>& p, T d_x, T d_y, T d_inverse_dept
   d_p->x += d_u * inverse;
   d_p->y += d_v * inverse;
   d_p->depth += -(d_u * u + d_v * v + d_inverse_depth * inverse) * inverse;
-  d_camera->fx += u * d_x, d_camera->cx += d_x;
-  d_camera->fy += -(v * d_y), d_camera->cy += d_y;
+  d_camera->fx += u * d_x;
+  d_camera->cx += d_x;
+  d_camera->fy += -(v * d_y);
+  d_camera->cy += d_y;
 }
 
 // Adjoint of a vertex made by clipping.
@@ -76,9 +79,12 @@ void ClipVertexBackward(const FaceSource<T>& source, const ClipVertexT<T>& clip,
   const T d_t = d_vertex.d_clip_t + d_p.x * (b.x - a.x) + d_p.y * (b.y - a.y);
   const T scale = d_t / (b.depth - a.depth);  // t = (near - depth_a) / (depth_b - depth_a)
   CameraPoint<T>&d_a = d_points[i], &d_b = d_points[j];
-  d_a.x += (T(1) - t) * d_p.x, d_b.x += t * d_p.x;
-  d_a.y += (T(1) - t) * d_p.y, d_b.y += t * d_p.y;
-  d_a.depth += -((T(1) - t) * scale), d_b.depth += -(t * scale);
+  d_a.x += (T(1) - t) * d_p.x;
+  d_b.x += t * d_p.x;
+  d_a.y += (T(1) - t) * d_p.y;
+  d_b.y += t * d_p.y;
+  d_a.depth += -((T(1) - t) * scale);
+  d_b.depth += -(t * scale);
 }
 
 // Adjoint of ToCamera: adds to d_position[3] and d_camera's rotation and translation.

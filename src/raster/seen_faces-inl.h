@@ -28,7 +28,8 @@ HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen
   const auto next = static_cast<std::int32_t>(seen->count);
   *slot = (next & fresh) | (found & ~fresh);
   seen->face[seen->count] = face;
-  seen->origin_x[seen->count] = x, seen->origin_y[seen->count] = y;
+  seen->origin_x[seen->count] = x;
+  seen->origin_y[seen->count] = y;
   seen->count += static_cast<std::size_t>(-fresh);
 }
 

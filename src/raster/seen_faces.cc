@@ -35,7 +35,8 @@ void NumberFaces(const FaceRows& rows, std::size_t mesh_faces, SeenFaces* out) {
   if (out->faces() == 0) return;
   const auto copy_first = [&](std::size_t to) {
     out->face[to] = out->face[1];
-    out->origin_x[to] = out->origin_x[1], out->origin_y[to] = out->origin_y[1];
+    out->origin_x[to] = out->origin_x[1];
+    out->origin_y[to] = out->origin_y[1];
   };
   copy_first(0);
   for (std::size_t s = out->count; s < out->stride(); ++s) copy_first(s);

@@ -66,7 +66,8 @@ struct TwoRows {
   template <class T, class V>
   HWY_INLINE static void Store(V v, T* to) {
     const hn::FixedTag<T, kStamp> d;
-    hn::StoreU(hn::LowerHalf(d, v), d, to), hn::StoreU(hn::UpperHalf(d, v), d, to + kBinSize);
+    hn::StoreU(hn::LowerHalf(d, v), d, to);
+    hn::StoreU(hn::UpperHalf(d, v), d, to + kBinSize);
   }
 };
 using StampLayout = TwoRows;
@@ -258,7 +259,8 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
           face.depth.At(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
       if (!(z > at.inverse_depth[pixel])) continue;
       if (kLayer == Layer::kPeel && !(z < at.behind[pixel])) continue;
-      at.inverse_depth[pixel] = z, at.face[pixel] = face.face;
+      at.inverse_depth[pixel] = z;
+      at.face[pixel] = face.face;
     }
   }
 }
@@ -274,7 +276,8 @@ HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const 
     return false;
   }
   const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
-  rows.begin = setup.row_begin, rows.end = setup.row_end;
+  rows.begin = setup.row_begin;
+  rows.end = setup.row_end;
   for (int at = HWY_MIN(setup.column_begin, kTileSize - lanes); at < setup.column_end;
        at += lanes) {
     rows.column = HWY_MIN(at, kTileSize - lanes);
@@ -333,7 +336,8 @@ HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const
       return list.faces[static_cast<std::size_t>(list.indices[at])];
     };
     const DrawnFace& ahead = record(HWY_MIN(i + kAhead, list.indices.size() - 1));
-    PrefetchLine(&ahead), PrefetchLine(&ahead.depth.high);
+    PrefetchLine(&ahead);
+    PrefetchLine(&ahead.depth.high);
     const DrawnFace& face = record(i);
     if (face.depth.high <= floors.bin) continue;
     if (face.pixels > 0) {

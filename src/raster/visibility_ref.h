@@ -48,7 +48,10 @@ void VisibilityRef(const ScreenMeshT<T>& mesh, int row_begin, int row_end,
       for (const auto& setup : setups) {
         if (!Covers(setup.shape, j, i)) continue;
         const auto z = RealPart(setup.depth.At(T(j) + T(0.5), T(i) + T(0.5)));
-        if (z > nearest) nearest = z, best = setup.face;
+        if (z > nearest) {
+          nearest = z;
+          best = setup.face;
+        }
       }
       face[static_cast<std::size_t>(i) * mesh.width + j] = best;
     }

@@ -19,15 +19,20 @@ namespace {
 
 GradientWishes WishesOf(const FrameGradients& d_frame, std::span<const SceneGradients> d_scenes) {
   GradientWishes w;
-  w.d_color = !d_frame.color.empty(), w.d_normals = !d_frame.normals.empty();
-  w.d_uv = !d_frame.uv.empty(), w.d_depth = !d_frame.depth.empty();
-  w.d_user = !d_frame.attributes.empty(), w.d_alpha = !d_frame.alpha.empty();
+  w.d_color = !d_frame.color.empty();
+  w.d_normals = !d_frame.normals.empty();
+  w.d_uv = !d_frame.uv.empty();
+  w.d_depth = !d_frame.depth.empty();
+  w.d_user = !d_frame.attributes.empty();
+  w.d_alpha = !d_frame.alpha.empty();
   for (const SceneGradients& d : d_scenes) {
     ForEachStream(Scene(), d, [&](const SceneStream<float>& stream) {
       w.streams[static_cast<std::size_t>(stream.what)] |= !stream.gradient.empty();
     });
     w.camera |= d.camera != nullptr;
-    w.surfaces |= !d.surfaces.empty(), w.lights |= !d.lights.empty(), w.sh |= !d.sh.empty();
+    w.surfaces |= !d.surfaces.empty();
+    w.lights |= !d.lights.empty();
+    w.sh |= !d.sh.empty();
     for (const auto& texture : d.textures) w.textures |= !texture.empty();
   }
   return w;
@@ -112,7 +117,9 @@ Status Engine::Impl::Render(std::span<const Scene> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes));
   forward = PlanForward(parts, request);
-  staged = forward.staged() && !scenes.empty(), was_backward = false, merge_ms = 0;
+  staged = forward.staged() && !scenes.empty();
+  was_backward = false;
+  merge_ms = 0;
   inputs.Begin(scenes, staged && forward.steps.texture);
   if (staged) {
     inputs.Pack(scenes, {forward.varyings, forward.varyings[Varying::kNormal]});
@@ -137,7 +144,8 @@ Status Engine::Impl::Backward(std::span<const Scene> scenes, const RenderOptions
   TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes));
   TILEGRAD_TRY(ValidateBackward<float>(scenes, options, d_frame, d_scenes));
   backward = PlanBackward(parts, WishesOf(d_frame, d_scenes));
-  staged = backward.staged() && !scenes.empty(), was_backward = true;
+  staged = backward.staged() && !scenes.empty();
+  was_backward = true;
   inputs.Begin(scenes, staged && backward.steps.texture);
   if (staged) {
     const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];

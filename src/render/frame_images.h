@@ -21,11 +21,18 @@ using FrameImages = FrameImagesT<float>;
 template <class T>
 ImagesT<T> ImagesOf(const FrameImagesT<T>& frame) {
   ImagesT<T> out;
-  out.count = frame.images, out.height = frame.height, out.width = frame.width;
+  out.count = frame.images;
+  out.height = frame.height;
+  out.width = frame.width;
   out.channels = frame.channels;
-  out.face_ids = frame.face_ids, out.color = frame.color, out.alpha = frame.alpha;
-  out.attributes = frame.attributes, out.depth = frame.depth, out.normals = frame.normals;
-  out.uv = frame.uv, out.barycentrics = frame.barycentrics;
+  out.face_ids = frame.face_ids;
+  out.color = frame.color;
+  out.alpha = frame.alpha;
+  out.attributes = frame.attributes;
+  out.depth = frame.depth;
+  out.normals = frame.normals;
+  out.uv = frame.uv;
+  out.barycentrics = frame.barycentrics;
   out.alpha_error_bound = frame.alpha_error_bound;
   return out;
 }

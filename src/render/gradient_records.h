@@ -18,8 +18,10 @@ class GradientRecords {
   // What the caller wants, with records of its own in place of the caller's.
   SceneGradientsT<T> Begin(const SceneGradientsT<T>& wanted) {
     SceneGradientsT<T> own = wanted;
-    surfaces_.resize(wanted.surfaces.size()), lights_.resize(wanted.lights.size());
-    own.surfaces = surfaces_, own.lights = lights_;
+    surfaces_.resize(wanted.surfaces.size());
+    lights_.resize(wanted.lights.size());
+    own.surfaces = surfaces_;
+    own.lights = lights_;
     own.camera = wanted.camera == nullptr ? nullptr : &camera_;
     return own;
   }

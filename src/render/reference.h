@@ -37,7 +37,8 @@ RefPixel<T> InterpolatePixelRef(const RefScene<T>& s, const RenderOptions& optio
   out.face = static_cast<std::size_t>(face);
   out.index = static_cast<std::size_t>(i) * static_cast<std::size_t>(options.width) +
               static_cast<std::size_t>(j);
-  out.px = T(j) + T(0.5), out.py = T(i) + T(0.5);
+  out.px = T(j) + T(0.5);
+  out.py = T(i) + T(0.5);
   out.plane = raster::MakeFacePlane(s.prepared.mesh, out.face);
   out.weights = raster::PixelWeightsRef(s.prepared.mesh, out.plane, out.face, options.interpolation,
                                         out.px, out.py);
@@ -110,7 +111,9 @@ void ShadePixelIntoFrame(const RefScene<T>& s, const RenderOptions& options, con
       image[c * plane + at.index] = values[c];
     }
   };
-  write(frame->color, v.color), write(frame->normals, v.normal.unit), write(frame->uv, p.uv);
+  write(frame->color, v.color);
+  write(frame->normals, v.normal.unit);
+  write(frame->uv, p.uv);
   const auto user = static_cast<std::size_t>(s.set.first(Varying::kUser));
   write(frame->attributes, std::span<const T>(at.values).subspan(user));
   if (!frame->depth.empty()) {
@@ -181,11 +184,14 @@ void ShadePixelBackward(const RefScene<T>& s, const RenderOptions& options,
   shade::Vec3<T> d_color, d_normal;
   std::array<T, 2> d_uv;
   std::array<T, 1> d_depth;
-  read(d_frame.color, d_color), read(d_frame.normals, d_normal), read(d_frame.uv, d_uv);
+  read(d_frame.color, d_color);
+  read(d_frame.normals, d_normal);
+  read(d_frame.uv, d_uv);
   read(d_frame.depth, d_depth);
   const ShadePixel<T> p = ShadePixelOf(s, options, at);
   ShadePixel<T> d_p;
-  d_p.color = {}, d_p.uv = d_uv;
+  d_p.color = {};
+  d_p.uv = d_uv;
   PixelShaderRef<T>(s.scene->shading, s.uniforms, s.pyramids)
       .Backward(p, d_color, d_normal, &d_p, &d->uniforms);
   for (std::size_t c = 0; c < 3; ++c) {

@@ -89,7 +89,8 @@ class OwnGradients {
     ForEachPlainArray(d_, take);
     std::copy(wanted.textures.begin(), wanted.textures.end(), textures_.begin());
     for (auto& texture : textures_) take("textures", texture);
-    d_.textures = textures_, d_.camera = &camera_;
+    d_.textures = textures_;
+    d_.camera = &camera_;
   }
   OwnGradients(const OwnGradients&) = delete;
   OwnGradients& operator=(const OwnGradients&) = delete;

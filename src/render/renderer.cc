@@ -51,7 +51,8 @@ struct FrameT<T>::Impl {
         list.assign(view.begin(), view.end());
         view = list;
       };
-      keep(lists[n].textures, scenes[n].textures), keep(lists[n].surfaces, scenes[n].surfaces);
+      keep(lists[n].textures, scenes[n].textures);
+      keep(lists[n].surfaces, scenes[n].surfaces);
       keep(lists[n].lights, scenes[n].lights);
     }
   }

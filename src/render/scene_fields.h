@@ -106,14 +106,17 @@ template <class Visit, class... Cameras>
 void ForEachCameraPart(const Visit& visit, Cameras&... camera) {
   visit("rotation", std::span(camera.rotation)...);
   visit("translation", std::span(camera.translation)...);
-  visit("fx", std::span(&camera.fx, 1)...), visit("fy", std::span(&camera.fy, 1)...);
-  visit("cx", std::span(&camera.cx, 1)...), visit("cy", std::span(&camera.cy, 1)...);
+  visit("fx", std::span(&camera.fx, 1)...);
+  visit("fy", std::span(&camera.fy, 1)...);
+  visit("cx", std::span(&camera.cx, 1)...);
+  visit("cy", std::span(&camera.cy, 1)...);
 }
 
 template <class Visit, class... Surfaces>
 void ForEachSurfacePart(const Visit& visit, Surfaces&... surface) {
   visit("base_color", std::span(surface.base_color)...);
-  visit("ambient", std::span(surface.ambient)...), visit("diffuse", std::span(surface.diffuse)...);
+  visit("ambient", std::span(surface.ambient)...);
+  visit("diffuse", std::span(surface.diffuse)...);
   visit("specular", std::span(surface.specular)...);
   visit("shininess", std::span(&surface.shininess, 1)...);
 }
@@ -142,9 +145,12 @@ void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {
 // that have them as members: Outputs, ImagesT, FrameImagesT, FrameGradientsT, structs of C.
 template <class Visit, class... Records>
 void ForEachImage(int channels, const Visit& visit, Records&... record) {
-  visit("color", 3, record.color...), visit("alpha", 1, record.alpha...);
-  visit("attributes", channels, record.attributes...), visit("depth", 1, record.depth...);
-  visit("normals", 3, record.normals...), visit("uv", 2, record.uv...);
+  visit("color", 3, record.color...);
+  visit("alpha", 1, record.alpha...);
+  visit("attributes", channels, record.attributes...);
+  visit("depth", 1, record.depth...);
+  visit("normals", 3, record.normals...);
+  visit("uv", 2, record.uv...);
 }
 
 // For all images, of what is not a gradient.

@@ -202,9 +202,11 @@ SceneParts PartsOf(const SceneT<T>& s) {
   out.shading = s.shading;
   ForEachStream(s, {}, [&](const SceneStream<T>& stream) {
     const auto v = static_cast<std::size_t>(stream.what);
-    out.has[v] = !stream.values.empty(), out.rates[v] = stream.rate;
+    out.has[v] = !stream.values.empty();
+    out.rates[v] = stream.rate;
   });
-  out.textures = !s.textures.empty(), out.surfaces = !s.surfaces.empty();
+  out.textures = !s.textures.empty();
+  out.surfaces = !s.surfaces.empty();
   out.user_channels = s.channels;
   for (const TextureT<T>& texture : s.textures) {
     out.bilinear |= texture.filter != Filter::kNearest;
@@ -258,7 +260,8 @@ Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
     if (const Status status = CheckAgreement(parts, own, scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
     }
-    parts.bilinear |= own.bilinear, parts.trilinear |= own.trilinear;
+    parts.bilinear |= own.bilinear;
+    parts.trilinear |= own.trilinear;
   }
   parts.may_overflow = large;
   return parts;

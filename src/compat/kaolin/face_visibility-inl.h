@@ -84,7 +84,10 @@ HWY_INLINE void DrawColumns(D d, const FaceInLanes<D>& face, const T* x, hn::Vec
   const hn::RebindToSigned<D> di;
   const auto px = hn::LoadU(d, x);
   hn::Vec<D> dx[3], dy[3], w[3];
-  for (int k = 0; k < 3; ++k) dx[k] = hn::Sub(face.x[k], px), dy[k] = hn::Sub(face.y[k], py);
+  for (int k = 0; k < 3; ++k) {
+    dx[k] = hn::Sub(face.x[k], px);
+    dy[k] = hn::Sub(face.y[k], py);
+  }
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
     w[k] = hn::Sub(hn::Mul(dx[a], dy[b]), hn::Mul(dy[a], dx[b]));
@@ -114,11 +117,14 @@ HWY_INLINE FaceInLanes<D> SpreadFace(D d, const ProjectedFacesT<T>& faces, std::
   FaceInLanes<D> out;
   const OrderedFace<T> face(faces, f);
   for (std::size_t k = 0; k < 3; ++k) {
-    out.x[k] = hn::Set(d, face.xy[2 * k]), out.y[k] = hn::Set(d, face.xy[2 * k + 1]);
+    out.x[k] = hn::Set(d, face.xy[2 * k]);
+    out.y[k] = hn::Set(d, face.xy[2 * k + 1]);
     out.z[k] = hn::Set(d, face.z[k]);
   }
-  out.low = hn::Set(d, face.low), out.high = hn::Set(d, face.high);
-  out.right = hn::Set(d, right), out.eps = hn::Set(d, eps);
+  out.low = hn::Set(d, face.low);
+  out.high = hn::Set(d, face.high);
+  out.right = hn::Set(d, right);
+  out.eps = hn::Set(d, eps);
   out.id = hn::Set(di, static_cast<hn::TFromD<hn::RebindToSigned<D>>>(f));
   return out;
 }

@@ -50,7 +50,9 @@ struct OrderedFace {
     }
     std::sort(corners.begin(), corners.end());
     for (std::size_t k = 0; k < 3; ++k) {
-      xy[2 * k] = corners[k][0], xy[2 * k + 1] = corners[k][1], z[k] = corners[k][2];
+      xy[2 * k] = corners[k][0];
+      xy[2 * k + 1] = corners[k][1];
+      z[k] = corners[k][2];
     }
     std::tie(low, high) = std::minmax({z[0], z[1], z[2]});
   }

@@ -36,7 +36,10 @@ std::int32_t FaceSeenRef(const ProjectedFacesT<T>& faces, const T& px, const T& 
     const auto w = ScreenWeights(face.xy, px, py, eps);
     const T sum = (w[0] * face.z[0] + w[1] * face.z[1]) + w[2] * face.z[2];
     const T z = std::min(std::max(sum, face.low), face.high);
-    if (z > nearest) nearest = z, best = static_cast<std::int32_t>(f);
+    if (z > nearest) {
+      nearest = z;
+      best = static_cast<std::int32_t>(f);
+    }
   }
   return best;
 }

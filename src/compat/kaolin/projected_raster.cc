@@ -99,7 +99,8 @@ void CornersFromFeatures(const FaceAdjoint<T>& face, double eps, std::span<const
   std::copy_n(face.corners, 6, v);
   for (int k = 0; k < 3; ++k) {  // grad W_k, which is dS/dv_k too
     const int a = (k + 1) % 3, b = (k + 2) % 3;
-    gx[k] = v[2 * a + 1] - v[2 * b + 1], gy[k] = v[2 * b] - v[2 * a];
+    gx[k] = v[2 * a + 1] - v[2 * b + 1];
+    gy[k] = v[2 * b] - v[2 * a];
   }
   const double area = gy[2] * gx[1] - gx[2] * gy[1];
   if (area == 0) return;
@@ -110,7 +111,8 @@ void CornersFromFeatures(const FaceAdjoint<T>& face, double eps, std::span<const
     double slope_x = 0, slope_y = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto f = static_cast<double>(face.features[k * face.channels + c]);
-      slope_x += f * gx[k] / area, slope_y += f * gy[k] / area;
+      slope_x += f * gx[k] / area;
+      slope_y += f * gy[k] / area;
       moved += f * sums[k * face.channels + c];
     }
     for (std::size_t m = 0; m < 3; ++m) {

@@ -50,20 +50,25 @@ struct SoftImage {
  private:
   void Place(const ProjectedFacesT<float>& faces, const ImageSize& size) {
     const std::size_t count = faces.count();
-    buffers.width = size.width, buffers.height = size.height;
-    buffers.packed.resize(3 * count), buffers.reject.assign(count, raster::kFaceDrawn);
+    buffers.width = size.width;
+    buffers.height = size.height;
+    buffers.packed.resize(3 * count);
+    buffers.reject.assign(count, raster::kFaceDrawn);
     for (auto* array : {&buffers.x, &buffers.y}) array->resize(3 * count);
     for (auto* corner : {&buffers.v0, &buffers.v1, &buffers.v2}) corner->resize(count);
     for (std::size_t i = 0; i < 3 * count; ++i) {
       const float x = (faces.xy[2 * i] + 1) * 0.5f * static_cast<float>(size.width);
       const float y = (1 - faces.xy[2 * i + 1]) * 0.5f * static_cast<float>(size.height);
-      buffers.x[i] = x, buffers.y[i] = y;
+      buffers.x[i] = x;
+      buffers.y[i] = y;
       buffers.packed[i] = {x, y, 1, 1};
       if (!std::isfinite(x) || !std::isfinite(y)) buffers.reject[i / 3] = raster::kFaceOverflow;
     }
     for (std::size_t f = 0; f < count; ++f) {
       const auto first = static_cast<std::int32_t>(3 * f);
-      buffers.v0[f] = first, buffers.v1[f] = first + 1, buffers.v2[f] = first + 2;
+      buffers.v0[f] = first;
+      buffers.v1[f] = first + 1;
+      buffers.v2[f] = first + 2;
     }
   }
 };
@@ -102,7 +107,8 @@ void AddFaceGradients(std::span<const raster::SoftFaceGradient> gradients, const
   for (const raster::SoftFaceGradient& d : gradients) {
     float* to = d_xy + 6 * static_cast<std::size_t>(d.face);
     for (int k = 0; k < 3; ++k) {
-      to[2 * k] += d.d_corner[k][0] * x, to[2 * k + 1] += d.d_corner[k][1] * y;
+      to[2 * k] += d.d_corner[k][0] * x;
+      to[2 * k + 1] += d.d_corner[k][1] * y;
     }
   }
 }
@@ -151,7 +157,10 @@ std::vector<raster::NdcFace<T>> NdcFacesOf(const ProjectedFacesT<T>& faces) {
   std::vector<raster::NdcFace<T>> out(faces.count());
   for (std::size_t f = 0; f < out.size(); ++f) {
     const T* v = faces.corners(f);
-    for (int k = 0; k < 3; ++k) out[f].x[k] = v[2 * k], out[f].y[k] = v[2 * k + 1];
+    for (int k = 0; k < 3; ++k) {
+      out[f].x[k] = v[2 * k];
+      out[f].y[k] = v[2 * k + 1];
+    }
   }
   return out;
 }
@@ -188,7 +197,8 @@ void AddTile(const NearFacesT<T>& tile, T* d_xy) {
   for (std::size_t i = 0; i < tile.faces.size(); ++i) {
     T* to = d_xy + 6 * tile.source[i];
     for (int k = 0; k < 3; ++k) {
-      to[2 * k] += tile.faces[i].x[k], to[2 * k + 1] += tile.faces[i].y[k];
+      to[2 * k] += tile.faces[i].x[k];
+      to[2 * k + 1] += tile.faces[i].y[k];
     }
   }
 }

@@ -68,7 +68,10 @@ class Silhouettes {
   // Bit k: no face of the ring of the edge from corner k on goes on beyond it.
   template <class T>
   std::uint8_t Of(const AntialiasInput<T>& input, std::size_t image, std::int32_t face) {
-    if (image_ != image) image_ = image, edges_.assign(input.faces.size() / 3, kUnknown);
+    if (image_ != image) {
+      image_ = image;
+      edges_.assign(input.faces.size() / 3, kUnknown);
+    }
     std::uint8_t& edges = edges_[static_cast<std::size_t>(face)];
     if (edges == kUnknown) {
       edges = 0;

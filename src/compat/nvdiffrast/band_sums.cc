@@ -26,7 +26,8 @@ BandSums::Adder::~Adder() {
 
 void BandSums::Adder::Clear() {
   for (const std::size_t row : rows_) slots_[row] = 0;
-  rows_.clear(), sums_.clear();
+  rows_.clear();
+  sums_.clear();
 }
 
 void BandSums::Adder::MeetRow(std::size_t row) {

@@ -57,7 +57,8 @@ template <class S>
 Products<S> MakeProducts(const ClipCorners<S>& c, const PixelCentre& at) {
   Products<S> out;
   for (int k = 0; k < 3; ++k) {
-    out.px[k] = c.x[k] - at.x * c.w[k], out.py[k] = c.y[k] - at.y * c.w[k];
+    out.px[k] = c.x[k] - at.x * c.w[k];
+    out.py[k] = c.y[k] - at.y * c.w[k];
   }
   out.sum = out.sum_x = out.sum_y = S(0);
   for (int k = 0; k < 3; ++k) {
@@ -65,7 +66,9 @@ Products<S> MakeProducts(const ClipCorners<S>& c, const PixelCentre& at) {
     out.a[k] = out.px[i] * out.py[j] - out.py[i] * out.px[j];
     out.ax[k] = out.py[i] * c.w[j] - c.w[i] * out.py[j];
     out.ay[k] = c.w[i] * out.px[j] - out.px[i] * c.w[j];
-    out.sum += out.a[k], out.sum_x += out.ax[k], out.sum_y += out.ay[k];
+    out.sum += out.a[k];
+    out.sum_x += out.ax[k];
+    out.sum_y += out.ay[k];
   }
   return out;
 }
@@ -90,7 +93,8 @@ template <class S>
 Barycentrics<S> Quotients(const Products<S>& p, const PixelSize& size) {
   const S inverse = S(1) / p.sum;
   Barycentrics<S> out;
-  out.u = p.a[0] * inverse, out.v = p.a[1] * inverse;
+  out.u = p.a[0] * inverse;
+  out.v = p.a[1] * inverse;
   out.du_dx = (p.ax[0] - out.u * p.sum_x) * inverse * size.x;
   out.du_dy = (p.ay[0] - out.u * p.sum_y) * inverse * size.y;
   out.dv_dx = (p.ax[1] - out.v * p.sum_x) * inverse * size.x;
@@ -139,13 +143,20 @@ void BarycentricsAdjoint(const ClipCorners<S>& c, const PixelCentre& at, const P
     const S gx = d.d_slopes[2 * k] * size.x * inverse;
     const S gy = d.d_slopes[2 * k + 1] * size.y * inverse;
     const S g = (d_weight[k] - gx * p.sum_x - gy * p.sum_y) * inverse;
-    d_a[k] += g, d_ax[k] += gx, d_ay[k] += gy;
-    d_sum_x -= gx * weight[k], d_sum_y -= gy * weight[k];
+    d_a[k] += g;
+    d_ax[k] += gx;
+    d_ay[k] += gy;
+    d_sum_x -= gx * weight[k];
+    d_sum_y -= gy * weight[k];
     d_sum -=
         g * weight[k] +
         (d.d_slopes[2 * k] * slopes[2 * k] + d.d_slopes[2 * k + 1] * slopes[2 * k + 1]) * inverse;
   }
-  for (int k = 0; k < 3; ++k) d_a[k] += d_sum, d_ax[k] += d_sum_x, d_ay[k] += d_sum_y;
+  for (int k = 0; k < 3; ++k) {
+    d_a[k] += d_sum;
+    d_ax[k] += d_sum_x;
+    d_ay[k] += d_sum_y;
+  }
   S d_px[3] = {}, d_py[3] = {}, d_w[3] = {};
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -157,7 +168,8 @@ void BarycentricsAdjoint(const ClipCorners<S>& c, const PixelCentre& at, const P
     d_w[j] += d_ax[k] * p.py[i] - d_ay[k] * p.px[i];
   }
   for (int k = 0; k < 3; ++k) {
-    d_corners->x[k] += d_px[k], d_corners->y[k] += d_py[k];
+    d_corners->x[k] += d_px[k];
+    d_corners->y[k] += d_py[k];
     d_corners->w[k] += d_w[k] - at.x * d_px[k] - at.y * d_py[k];
   }
 }

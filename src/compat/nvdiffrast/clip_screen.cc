@@ -103,7 +103,9 @@ class ScreenWriter {
     return static_cast<std::int32_t>(out_.packed.size() - 1);
   }
   void AppendFace(std::int32_t a, std::int32_t b, std::int32_t c, std::size_t source) {
-    out_.v0.push_back(a), out_.v1.push_back(b), out_.v2.push_back(c);
+    out_.v0.push_back(a);
+    out_.v1.push_back(b);
+    out_.v2.push_back(c);
     out_.source_face.push_back(static_cast<std::int32_t>(source));
     out_.reject.push_back(raster::kFaceDrawn);
   }
@@ -125,7 +127,10 @@ class ScreenWriter {
     for (auto* array : {&out_.x, &out_.y, &out_.depth, &out_.inverse_depth}) array->resize(n);
     for (std::size_t v = 0; v < n; ++v) {
       const auto& p = out_.packed[v];
-      out_.x[v] = p.x, out_.y[v] = p.y, out_.inverse_depth[v] = p.inverse_depth, out_.depth[v] = 0;
+      out_.x[v] = p.x;
+      out_.y[v] = p.y;
+      out_.inverse_depth[v] = p.inverse_depth;
+      out_.depth[v] = 0;
     }
   }
 
@@ -143,10 +148,16 @@ ClipPoint PointAt(const VertexRows<T>& positions, std::size_t image, std::int32_
 
 void Clear(const PixelGrid& grid, ClipScreen* out) {
   raster::ScreenMeshBuffers& mesh = out->mesh;
-  mesh.packed.clear(), out->outside.clear();
-  mesh.v0.clear(), mesh.v1.clear(), mesh.v2.clear();
-  mesh.source_face.clear(), mesh.reject.clear(), mesh.clipped.clear();
-  mesh.width = grid.width, mesh.height = grid.height;
+  mesh.packed.clear();
+  out->outside.clear();
+  mesh.v0.clear();
+  mesh.v1.clear();
+  mesh.v2.clear();
+  mesh.source_face.clear();
+  mesh.reject.clear();
+  mesh.clipped.clear();
+  mesh.width = grid.width;
+  mesh.height = grid.height;
 }
 
 // The planes that all corners, or any, lie beyond.
@@ -157,7 +168,8 @@ Beyond BeyondOf(const AlignedVector<std::uint8_t>& outside, const std::int32_t (
   Beyond out;
   for (const std::int32_t vertex : v) {
     const std::uint8_t code = outside[static_cast<std::size_t>(vertex)];
-    out.all &= code, out.any |= code;
+    out.all &= code;
+    out.any |= code;
   }
   return out;
 }

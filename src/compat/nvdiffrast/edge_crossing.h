@@ -57,7 +57,8 @@ void PointOnWayAdjoint(const PixelStep& step, const WayPoint<S>& d_way, S* d_p) 
   S d_from[2];
   d_from[step.axis] = d_way.q * static_cast<double>(step.direction) * step.scale[step.axis];
   d_from[1 - step.axis] = d_way.r * step.scale[1 - step.axis];
-  d_p[0] += d_from[0], d_p[1] += d_from[1];
+  d_p[0] += d_from[0];
+  d_p[1] += d_from[1];
   d_p[3] += d_way.w - step.from.x * d_from[0] - step.from.y * d_from[1];
 }
 

@@ -38,7 +38,8 @@ HWY_INLINE void InterpolatePixels(const BandAtHand& band, std::size_t begin, std
     const std::int32_t face = numbers.At(p);
     if (face == 0) {
       const std::size_t count = numbers.EmptyUntil(p + 1, end) - p;
-      WriteZeros(to, to + count * n), WriteZeros(to_da, to_da + count * da);
+      WriteZeros(to, to + count * n);
+      WriteZeros(to_da, to_da + count * da);
       p += count - 1;
       continue;
     }
@@ -74,18 +75,22 @@ class RunSums {
   }
   HWY_INLINE void AddValues(std::size_t c, const WeightQuads& w, Quad g) {
     const std::size_t row = K::kKnown ? 1 : values_, i = c / 4;
-    Add(i, w.u, g), Add(row + i, w.v, g), Add(2 * row + i, w.w, g);
+    Add(i, w.u, g);
+    Add(row + i, w.v, g);
+    Add(2 * row + i, w.w, g);
   }
   HWY_INLINE void AddSlopes(std::size_t number, const SlopeQuads& w, Quad g) {
     const std::size_t first = K::kKnown ? 3 : 3 * values_, i = number / 4;
     const std::size_t row = K::kKnown ? (K::kSums - 3) / 2 : slopes_;
-    Add(first + i, w.u, g), Add(first + row + i, w.v, g);
+    Add(first + i, w.u, g);
+    Add(first + row + i, w.v, g);
   }
   // The next pixel shows a face, counted from 1; 0 at the end.
   HWY_INLINE void Begin(std::int32_t face) {
     if ((face == face_ && ++pixels_ < kMostRun) || faces_ == nullptr) return;
     if (face_ != 0) Flush();
-    face_ = face, pixels_ = 0;
+    face_ = face;
+    pixels_ = 0;
   }
 
  private:
@@ -194,7 +199,8 @@ HWY_INLINE void PullPixels(const BandAtHand& band, std::size_t begin, std::size_
                        hn::ConcatUpperUpper(tag, slope_pull.v, slope_pull.u)),
                tag, d.rast_db + 4 * p);
   }
-  *at = numbers, *run = sums;
+  *at = numbers;
+  *run = sums;
 }
 
 // Calls work.operator()<Known>().

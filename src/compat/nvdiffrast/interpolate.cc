@@ -46,7 +46,8 @@ struct SlopedRows {
       const float* from = &input.attributes.values[row * input.attributes.channels];
       for (const std::int32_t channel : diff) values.push_back(from[channel]);
     }
-    rows.values = values, rows.channels = diff.size();
+    rows.values = values;
+    rows.channels = diff.size();
   }
 };
 

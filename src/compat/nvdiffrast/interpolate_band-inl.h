@@ -143,7 +143,8 @@ struct WeightQuads {
 
   HWY_INLINE explicit WeightQuads(const float* rast) {
     const QuadTag d;
-    u = hn::Set(d, rast[0]), v = hn::Set(d, rast[1]);
+    u = hn::Set(d, rast[0]);
+    v = hn::Set(d, rast[1]);
     w = hn::Sub(hn::Sub(hn::Set(d, 1.0f), u), v);
   }
 };
@@ -155,7 +156,8 @@ struct SlopeQuads {
   HWY_INLINE explicit SlopeQuads(const float* rast_db) {
     const QuadTag d;
     const Quad db = hn::LoadU(d, rast_db);
-    u = hn::ConcatLowerLower(d, db, db), v = hn::ConcatUpperUpper(d, db, db);
+    u = hn::ConcatLowerLower(d, db, db);
+    v = hn::ConcatUpperUpper(d, db, db);
   }
 };
 

@@ -27,13 +27,17 @@ PixelFace<T> FaceAt(const InterpolateInput<T>& input, std::size_t image, std::si
   PixelFace<T> out;
   for (int k = 0; k < 3; ++k) {
     const std::int32_t v = input.faces[3 * static_cast<std::size_t>(FaceOf(rast)) + k];
-    out.rows[k] = input.attributes.row(image, v), out.corner[k] = input.attributes.at(image, v);
+    out.rows[k] = input.attributes.row(image, v);
+    out.corner[k] = input.attributes.at(image, v);
   }
   const double u = static_cast<double>(rast[0]), v = static_cast<double>(rast[1]);
-  out.weight[0] = u, out.weight[1] = v, out.weight[2] = 1 - u - v;
+  out.weight[0] = u;
+  out.weight[1] = v;
+  out.weight[2] = 1 - u - v;
   for (int i = 0; i < 2 && !input.rast_db.empty(); ++i) {
     const T* db = &input.rast_db[4 * pixel];
-    out.slope[0][i] = static_cast<double>(db[i]), out.slope[1][i] = static_cast<double>(db[2 + i]);
+    out.slope[0][i] = static_cast<double>(db[i]);
+    out.slope[1][i] = static_cast<double>(db[2 + i]);
     out.slope[2][i] = -(out.slope[0][i] + out.slope[1][i]);
   }
   return out;
@@ -137,7 +141,8 @@ void InterpolatePixel(const InterpolateInput<T>& input, std::size_t image, std::
   const std::size_t channels = input.attributes.channels, da = 2 * input.diff_attrs.size();
   T *to = out.out.data() + pixel * channels, *to_da = out.out_da.data() + pixel * da;
   if (FaceOf(&input.rast[4 * pixel]) < 0) {
-    std::fill(to, to + channels, T(0)), std::fill(to_da, to_da + da, T(0));
+    std::fill(to, to + channels, T(0));
+    std::fill(to_da, to_da + da, T(0));
   } else {
     WritePixel(input, FaceAt(input, image, pixel), to, to_da);
   }

@@ -97,7 +97,8 @@ void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
   const T* from = d_coarse.texels.data();
   T* to = d_fine.data();
   const auto pull = [&](std::size_t c, std::size_t a, std::size_t b) {
-    to[a] += share * from[c], to[b] += share * from[c];
+    to[a] += share * from[c];
+    to[b] += share * from[c];
   };
   workers.ForRanges(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
                     [&](std::size_t begin, std::size_t end, std::size_t) {

@@ -18,8 +18,10 @@ namespace {
 template <class T>
 void WritePixel(const Barycentrics<double>& b, std::int32_t face, T* rast, T* rast_db) {
   const double u = std::clamp(b.u, 0.0, 1.0);
-  rast[0] = static_cast<T>(u), rast[1] = static_cast<T>(std::clamp(b.v, 0.0, 1.0 - u));
-  rast[2] = static_cast<T>(std::clamp(b.depth, -1.0, 1.0)), rast[3] = static_cast<T>(face + 1);
+  rast[0] = static_cast<T>(u);
+  rast[1] = static_cast<T>(std::clamp(b.v, 0.0, 1.0 - u));
+  rast[2] = static_cast<T>(std::clamp(b.depth, -1.0, 1.0));
+  rast[3] = static_cast<T>(face + 1);
   if (rast_db == nullptr) return;
   const double slopes[4] = {b.du_dx, b.du_dy, b.dv_dx, b.dv_dy};
   for (int i = 0; i < 4; ++i) rast_db[i] = static_cast<T>(slopes[i]);

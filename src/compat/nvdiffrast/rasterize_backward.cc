@@ -30,7 +30,10 @@ class FacePull {
   ~FacePull() { Flush(); }
 
   ClipCorners<double>* Of(std::int32_t face) {
-    if (face != face_) Flush(), face_ = face;
+    if (face != face_) {
+      Flush();
+      face_ = face;
+    }
     return &sum_;
   }
 
@@ -40,7 +43,9 @@ class FacePull {
     const std::int32_t* v = &input_.faces[3 * static_cast<std::size_t>(face_)];
     for (int k = 0; k < 3; ++k) {
       double* to = adder_->Row(input_.positions.row(image_, v[k]));
-      to[0] += sum_.x[k], to[1] += sum_.y[k], to[3] += sum_.w[k];  // z pulls nothing
+      to[0] += sum_.x[k];
+      to[1] += sum_.y[k];
+      to[3] += sum_.w[k];  // z pulls nothing
     }
     sum_ = {};
   }

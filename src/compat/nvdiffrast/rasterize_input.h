@@ -20,8 +20,10 @@ ClipCorners<double> CornersOf(const RasterizeInput<T>& input, std::size_t image,
   ClipCorners<double> out;
   for (int k = 0; k < 3; ++k) {
     const T* p = input.positions.at(image, input.faces[3 * static_cast<std::size_t>(face) + k]);
-    out.x[k] = static_cast<double>(p[0]), out.y[k] = static_cast<double>(p[1]);
-    out.z[k] = static_cast<double>(p[2]), out.w[k] = static_cast<double>(p[3]);
+    out.x[k] = static_cast<double>(p[0]);
+    out.y[k] = static_cast<double>(p[1]);
+    out.z[k] = static_cast<double>(p[2]);
+    out.w[k] = static_cast<double>(p[3]);
   }
   return out;
 }
@@ -33,7 +35,10 @@ class LastFace {
   LastFace(const RasterizeInput<T>& input, std::size_t image) : input_(input), image_(image) {}
 
   const ClipCorners<double>& operator()(std::int32_t face) {
-    if (face != face_) corners_ = CornersOf(input_, image_, face), face_ = face;
+    if (face != face_) {
+      corners_ = CornersOf(input_, image_, face);
+      face_ = face;
+    }
     return corners_;
   }
 

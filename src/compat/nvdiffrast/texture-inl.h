@@ -154,7 +154,8 @@ HWY_INLINE CoordinateCotangents PullCoordinates(const TextureInput<float>& input
   if (cube) {
     CubeAdjointLanes(point, d_st, d_slopes, out.uv, out.uv_da);
   } else {
-    std::copy(d_st, d_st + 2, out.uv), std::copy(d_slopes, d_slopes + 4, out.uv_da);
+    std::copy(d_st, d_st + 2, out.uv);
+    std::copy(d_slopes, d_slopes + 4, out.uv_da);
   }
   for (RunVec& v : out.uv) v = hn::IfThenElseZero(point.valid, v);
   for (RunVec& v : out.uv_da) v = hn::IfThenElseZero(point.valid, v);

@@ -47,10 +47,12 @@ struct RunCoordinates {
       if (count % hn::Lanes(RunTag()) == 0) return at;
       std::memset(free, 0, kRun * numbers * sizeof(float));
       std::memcpy(free, at, count * numbers * sizeof(float));
-      at = free, free += kRun * numbers;
+      at = free;
+      free += kRun * numbers;
       return at;
     };
-    uv = place(input.uv, n), uv_da = place(input.uv_da, 2 * n),
+    uv = place(input.uv, n);
+    uv_da = place(input.uv_da, 2 * n);
     bias = place(input.mip_level_bias, 1);
   }
 };
@@ -129,7 +131,8 @@ HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLan
   const FaceFrame frame(*out, r[0], r[1], r[2]);
   const RunVec half = hn::Set(d, 0.5f);
   out->major = frame.major;
-  out->ratio[0] = hn::Div(frame.s, frame.major), out->ratio[1] = hn::Div(frame.t, frame.major);
+  out->ratio[0] = hn::Div(frame.s, frame.major);
+  out->ratio[1] = hn::Div(frame.t, frame.major);
   for (int k = 0; k < 2; ++k) out->st[k] = hn::MulAdd(half, out->ratio[k], half);
   if (at.uv_da == nullptr) return;
   RunVec x[2], y[2], z[2];
@@ -138,7 +141,8 @@ HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLan
     for (std::size_t k = 0; k < 6; ++k) planes[k][p] = at.uv_da[6 * (i + p) + k];
   }
   for (int k = 0; k < 2; ++k) {
-    x[k] = hn::Load(d, planes[k]), y[k] = hn::Load(d, planes[2 + k]),
+    x[k] = hn::Load(d, planes[k]);
+    y[k] = hn::Load(d, planes[2 + k]);
     z[k] = hn::Load(d, planes[4 + k]);
     const FaceFrame by(*out, x[k], y[k], z[k]);
     const RunVec scale = hn::Div(half, frame.major);
@@ -192,7 +196,8 @@ struct FootprintLanes {
     const RunVec a = hn::MulAdd(j[0], j[0], hn::Mul(j[2], j[2]));
     const RunVec b = hn::MulAdd(j[1], j[1], hn::Mul(j[3], j[3]));
     const RunVec one_half = hn::Set(d, 0.5f);
-    half = hn::Mul(one_half, hn::Sub(a, b)), c = hn::MulAdd(j[0], j[1], hn::Mul(j[2], j[3]));
+    half = hn::Mul(one_half, hn::Sub(a, b));
+    c = hn::MulAdd(j[0], j[1], hn::Mul(j[2], j[3]));
     root = hn::Sqrt(hn::MulAdd(half, half, hn::Mul(c, c)));
     square = hn::MulAdd(one_half, hn::Add(a, b), root);
   }
@@ -235,7 +240,8 @@ HWY_INLINE void LevelAdjointLanes(const FootprintLanes& f, RunVec d_level, RunVe
   for (int i = 0; i < 4; i += 2) {
     const RunVec x = hn::MulAdd(hn::Mul(two, f.j[i]), d_a, hn::Mul(f.j[i + 1], d_c));
     const RunVec y = hn::MulAdd(hn::Mul(two, f.j[i + 1]), d_b, hn::Mul(f.j[i], d_c));
-    d_slopes[i] = hn::Mul(x, f.scale[i / 2]), d_slopes[i + 1] = hn::Mul(y, f.scale[i / 2]);
+    d_slopes[i] = hn::Mul(x, f.scale[i / 2]);
+    d_slopes[i + 1] = hn::Mul(y, f.scale[i / 2]);
   }
 }
 
@@ -250,7 +256,8 @@ HWY_INLINE void CubeAdjointLanes(const PointLanes& p, const RunVec (&d_st)[2],
     RunVec d_p = hn::Mul(half, d_st[k]);
     for (int i = 0; i < 2; ++i) {
       const RunVec g = hn::Mul(d_slopes[2 * k + i], hn::Mul(half, inverse));
-      by_axis[k][i] = g, by_major[i] = hn::NegMulAdd(g, p.ratio[k], by_major[i]);
+      by_axis[k][i] = g;
+      by_major[i] = hn::NegMulAdd(g, p.ratio[k], by_major[i]);
       d_p = hn::NegMulAdd(g, p.d_major[i], d_p);
       d_major = hn::NegMulAdd(hn::Add(g, g), p.slopes[2 * k + i], d_major);
     }

@@ -25,7 +25,8 @@ struct CubeRatio {
 };
 CubeRatio RatioOf(const TextureCoordinates& at, const CubeAxis& axis, const CubeAxis& major) {
   CubeRatio out;
-  out.major = Along(major, at.uv), out.p = Along(axis, at.uv) / out.major;
+  out.major = Along(major, at.uv);
+  out.p = Along(axis, at.uv) / out.major;
   for (int i = 0; i < 2; ++i) {
     const double d_axis = axis.sign * at.uv_da[2 * axis.index + i];
     const double d_major = major.sign * at.uv_da[2 * major.index + i];
@@ -76,8 +77,10 @@ struct Footprint {
       : scale{static_cast<double>(size.width), static_cast<double>(size.height)} {
     for (int i = 0; i < 4; ++i) j[i] = slopes[i] * scale[i / 2];
     const double a = j[0] * j[0] + j[2] * j[2], b = j[1] * j[1] + j[3] * j[3];
-    half = 0.5 * (a - b), c = j[0] * j[1] + j[2] * j[3];
-    root = std::sqrt(half * half + c * c), square = 0.5 * (a + b) + root;
+    half = 0.5 * (a - b);
+    c = j[0] * j[1] + j[2] * j[3];
+    root = std::sqrt(half * half + c * c);
+    square = 0.5 * (a + b) + root;
   }
 };
 

@@ -54,7 +54,9 @@ struct LevelLanesOf {
                           const PointLanes& point) {
     const RunTag d;
     const RunVec zero = hn::Zero(d);
-    fine = hn::Zero(RunIntTag()), mix = zero, mixes = hn::Lt(zero, zero);
+    fine = hn::Zero(RunIntTag());
+    mix = zero;
+    mixes = hn::Lt(zero, zero);
     if (!UsesLevels(input.filter)) return;
     RunVec level = zero;
     if (at.uv_da != nullptr) level = LevelLanes(FootprintLanes(point.slopes, input.levels[0].size));
@@ -95,7 +97,7 @@ struct AxisLanes {
     RunMask inside = hn::And(hn::Gt(x, hn::Set(d, -1.0f)), hn::Lt(x, size));
     if (input.boundary == TextureBoundary::kClamp) {
       inside = hn::And(hn::Gt(x, zero), hn::Lt(x, hn::ConvertTo(d, last)));
-      x = hn::Min(hn::Max(x, zero), hn::ConvertTo(d, last)),
+      x = hn::Min(hn::Max(x, zero), hn::ConvertTo(d, last));
       slope = hn::IfThenElseZero(inside, slope);
     } else {
       x = hn::Min(hn::Max(x, hn::Set(d, -1.0f)), size);
@@ -115,10 +117,12 @@ struct AxisLanes {
       low = hn::IfThenElse(hn::Lt(low, zero), last, low);
       high = hn::IfThenElse(hn::Gt(high, last), zero, high);
     } else if (boundary == TextureBoundary::kClamp) {
-      low = hn::Max(low, zero), high = hn::IfThenElse(inside, hn::Min(high, last), low);
+      low = hn::Max(low, zero);
+      high = hn::IfThenElse(inside, hn::Min(high, last), low);
       weight = hn::IfThenElseZero(hn::RebindMask(RunTag(), inside), weight);
     } else if (boundary == TextureBoundary::kZero) {
-      low = hn::IfThenElse(inside, low, n), high = hn::IfThenElse(inside, high, n);
+      low = hn::IfThenElse(inside, low, n);
+      high = hn::IfThenElse(inside, high, n);
     }
   }
 };
@@ -147,8 +151,11 @@ inline HWY_NOINLINE void CrossEdges(const MipSize& size, const AxisLanes& x, con
   HWY_ALIGN std::int32_t columns[2][16], rows[2][16], faces[16];
   const RunIntTag di;
   face = hn::IfThenElse(cross, face, hn::Set(di, -1));
-  hn::Store(x.low, di, columns[0]), hn::Store(x.high, di, columns[1]);
-  hn::Store(y.low, di, rows[0]), hn::Store(y.high, di, rows[1]), hn::Store(face, di, faces);
+  hn::Store(x.low, di, columns[0]);
+  hn::Store(x.high, di, columns[1]);
+  hn::Store(y.low, di, rows[0]);
+  hn::Store(y.high, di, rows[1]);
+  hn::Store(face, di, faces);
   for (std::size_t p = 0; p < hn::Lanes(di); ++p) {
     if (faces[p] < 0) continue;
     const int side = HWY_MAX(1, size.width >> HWY_MAX(out->level[i + p], 0));
@@ -192,8 +199,10 @@ HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& poin
   const RunVec b1 = hn::Mul(share, y.weight), b0 = hn::Sub(share, b1);
   const RunVec w1 = hn::Mul(x.weight, b0), w3 = hn::Mul(x.weight, b1);
   hn::StoreInterleaved4(hn::Sub(b0, w1), w1, hn::Sub(b1, w3), w3, d, out->weight[i]);
-  hn::Store(x.weight, d, out->a + i), hn::Store(y.weight, d, out->b + i);
-  hn::Store(x.slope, d, out->slope_a + i), hn::Store(y.slope, d, out->slope_b + i);
+  hn::Store(x.weight, d, out->a + i);
+  hn::Store(y.weight, d, out->b + i);
+  hn::Store(x.slope, d, out->slope_a + i);
+  hn::Store(y.slope, d, out->slope_b + i);
   const auto cross = hn::And(there, hn::Lt(least, hn::Zero(di)));
   if (input.boundary != TextureBoundary::kCube || hn::AllFalse(di, cross)) return;
   CrossEdges(base, x, y, point.face, cross, i, out);

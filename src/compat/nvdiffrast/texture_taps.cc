@@ -94,7 +94,10 @@ void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
   const AxisTaps y = nearest ? NearestTap(point.st[1], size.height, boundary)
                              : LinearTaps(point.st[1], size.height, boundary);
   out->count = nearest ? 1 : 4;
-  out->a = x.weight, out->b = y.weight, out->slope_a = x.slope, out->slope_b = y.slope;
+  out->a = x.weight;
+  out->b = y.weight;
+  out->slope_a = x.slope;
+  out->slope_b = y.slope;
   for (int k = 0; k < out->count; ++k) {
     out->texel[k] = TexelAt(k % 2 == 0 ? x.low : x.high, k / 2 == 0 ? y.low : y.high, point.face,
                             size, boundary);

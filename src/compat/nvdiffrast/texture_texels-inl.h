@@ -108,7 +108,8 @@ class CellSums {
       }
     }
     for (Quad& s : sum_) s = hn::Zero(d);
-    level_ = -1, pixels_ = 0;
+    level_ = -1;
+    pixels_ = 0;
   }
 
  private:

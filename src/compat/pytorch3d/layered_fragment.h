@@ -56,7 +56,8 @@ FragmentWeights<T> WeightsOf(const T* v, const T& px, const T& py, const Fragmen
   out.b = CornerAreas(xy, px, py);
   out.area = T(kFragmentEps) - ((out.b[0] + out.b[1]) + out.b[2]);
   for (T& b : out.b) b = -b / out.area;
-  out.w = out.b, out.sum = T(1);
+  out.w = out.b;
+  out.sum = T(1);
   if (rule.perspective_correct) {
     for (std::size_t k = 0; k < 3; ++k) {
       out.w[k] = out.b[k] * v[3 * ((k + 1) % 3) + 2] * v[3 * ((k + 2) % 3) + 2];
@@ -64,7 +65,8 @@ FragmentWeights<T> WeightsOf(const T* v, const T& px, const T& py, const Fragmen
     out.sum = out.w[0] + out.w[1] + out.w[2];
     for (T& w : out.w) w /= AtLeast(out.sum, kFragmentEps);
   }
-  out.c = out.w, out.clipped_sum = T(1);
+  out.c = out.w;
+  out.clipped_sum = T(1);
   if (rule.clip_barycentrics) {
     for (T& c : out.c) c = AtLeast(c, 0);
     out.clipped_sum = out.c[0] + out.c[1] + out.c[2];
@@ -142,8 +144,10 @@ void BarycentricsBackward(const T* v, const T& px, const T& py, const FragmentWe
   for (std::size_t k = 0; k < 3; ++k) {
     const T d_area = (d_b[k] - along) / at.area;  // of A_k
     const std::size_t l = 3 * ((k + 1) % 3), m = 3 * ((k + 2) % 3);
-    d_v[l] -= d_area * (v[m + 1] - py), d_v[l + 1] += d_area * (v[m] - px);
-    d_v[m] += d_area * (v[l + 1] - py), d_v[m + 1] -= d_area * (v[l] - px);
+    d_v[l] -= d_area * (v[m + 1] - py);
+    d_v[l + 1] += d_area * (v[m] - px);
+    d_v[m] += d_area * (v[l + 1] - py);
+    d_v[m + 1] -= d_area * (v[l] - px);
   }
 }
 
@@ -167,7 +171,8 @@ void FragmentBackward(const T* v, const T& px, const T& py, const FragmentRule& 
     d = NormalizeBackward(at.w, at.sum, kFragmentEps, d);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t l = 3 * ((k + 1) % 3) + 2, m = 3 * ((k + 2) % 3) + 2;
-      d_v[l] += d[k] * at.b[k] * v[m], d_v[m] += d[k] * at.b[k] * v[l];
+      d_v[l] += d[k] * at.b[k] * v[m];
+      d_v[m] += d[k] * at.b[k] * v[l];
       d[k] *= v[l] * v[m];
     }
   }
@@ -175,8 +180,10 @@ void FragmentBackward(const T* v, const T& px, const T& py, const FragmentRule& 
   const BoundaryPoint<T> near = NearestOnBoundary(v, px, py);
   const T push = T(IsInside(at) ? 2 : -2) * d_dist;
   const std::size_t a = 3 * near.from, b = 3 * ((near.from + 1) % 3);
-  d_v[a] += push * (T(1) - near.t) * near.rx, d_v[a + 1] += push * (T(1) - near.t) * near.ry;
-  d_v[b] += push * near.t * near.rx, d_v[b + 1] += push * near.t * near.ry;
+  d_v[a] += push * (T(1) - near.t) * near.rx;
+  d_v[a + 1] += push * (T(1) - near.t) * near.ry;
+  d_v[b] += push * near.t * near.rx;
+  d_v[b + 1] += push * near.t * near.ry;
 }
 
 }  // namespace tilegrad::compat::pytorch3d

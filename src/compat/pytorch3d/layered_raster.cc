@@ -55,7 +55,9 @@ struct Lists {
 
   void Reset(std::size_t pixels, std::size_t k) {
     layers = k;
-    z.resize(pixels * k), face.resize(pixels * k), count.assign(pixels, 0);
+    z.resize(pixels * k);
+    face.resize(pixels * k);
+    count.assign(pixels, 0);
   }
   // Faces come in the order of their indices, so a later one goes behind its equals.
   void Insert(std::size_t pixel, std::int64_t id, const T& depth) {
@@ -68,8 +70,12 @@ struct Lists {
       ++count[pixel];
     }
     std::int64_t* const ids = face.data() + pixel * layers;
-    for (; at > 0 && depth < begin[at - 1]; --at) begin[at] = begin[at - 1], ids[at] = ids[at - 1];
-    begin[at] = depth, ids[at] = id;
+    for (; at > 0 && depth < begin[at - 1]; --at) {
+      begin[at] = begin[at - 1];
+      ids[at] = ids[at - 1];
+    }
+    begin[at] = depth;
+    ids[at] = id;
   }
 };
 
@@ -123,7 +129,9 @@ void WriteBand(std::span<const T> face_vertices, const Centres<T>& centres,
       if (!empty) {
         at = FragmentOf(face_vertices.data() + 9 * id, px, py, options.rule);
       }
-      out.pix_to_face[to] = id, out.zbuf[to] = at.z, out.dists[to] = at.dist;
+      out.pix_to_face[to] = id;
+      out.zbuf[to] = at.z;
+      out.dists[to] = at.dist;
       std::copy(at.bary.begin(), at.bary.end(), out.barycentrics.data() + 3 * to);
     }
   }

@@ -66,7 +66,8 @@ class TileBackward {
     if (nodes_.count == 0) return;
     reach_ = GradientReachOf(plan_, nodes_.faces);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
-      weak_[b] = scratch_->blocks[b].bits, scratch_->blocks[b].live = dark_[b];
+      weak_[b] = scratch_->blocks[b].bits;
+      scratch_->blocks[b].live = dark_[b];
     }
     std::size_t next = 0;
     Fill(&next);
@@ -139,7 +140,8 @@ class TileBackward {
       bits |= std::uint64_t{BitsOf(d, has_push)} << x;
       dark |= std::uint64_t{BitsOf(d, hn::Lt(p, zero))} << x;
     }
-    bits &= row, dark_[b] |= (bits & dark) << to;
+    bits &= row;
+    dark_[b] |= (bits & dark) << to;
     return bits << to;
   }
 
@@ -149,7 +151,11 @@ class TileBackward {
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (weak_[b] == 0) continue;
       FindMembers(b);
-      if (dark_[b] != 0) StartProducts(b), MultiplyProducts(b), DarkGradients(b);
+      if (dark_[b] != 0) {
+        StartProducts(b);
+        MultiplyProducts(b);
+        DarkGradients(b);
+      }
       AddWeakGradients(b);
     }
     EmitSums();
@@ -164,7 +170,10 @@ class TileBackward {
       Fill(&next);
       ClearSums();
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
-        if (weak_[b] != 0) FindMembers(b), AddWeakGradients(b);
+        if (weak_[b] != 0) {
+          FindMembers(b);
+          AddWeakGradients(b);
+        }
       }
       EmitSums();
     }
@@ -185,7 +194,10 @@ class TileBackward {
     for (std::size_t next = 0; next < nodes_.count && AnyLive(blocks);) {
       Fill(&next);
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
-        if (blocks[b].live != 0) FindMembers(b), MultiplyProducts(b);
+        if (blocks[b].live != 0) {
+          FindMembers(b);
+          MultiplyProducts(b);
+        }
       }
     }
   }
@@ -199,7 +211,10 @@ class TileBackward {
   void MultiplyProducts(std::size_t b) {
     SoftBlock& block = scratch_->blocks[b];
     PartialAlpha far(&block, scratch_);
-    far.AddVertices(), far.Merge(), far.AddSegments(), far.Merge();
+    far.AddVertices();
+    far.Merge();
+    far.AddSegments();
+    far.Merge();
     AppendNear(block, near_product_[b], &scratch_->near[b], scratch_);
     // The square: a face's gradient may be as large as the root of the product
     // (docs/numerics.md).
@@ -235,7 +250,8 @@ class TileBackward {
   void AddWeakGradients(std::size_t b) {
     const WeakFaces faces{
         scratch_->blocks[b], scratch_->lists, push_[b], {scratch_->sums}, &scratch_->work};
-    faces.Vertices(weak_[b]), faces.Segments(weak_[b]);
+    faces.Vertices(weak_[b]);
+    faces.Segments(weak_[b]);
     faces.Boundaries(weak_[b] & ~dark_[b]);
   }
 

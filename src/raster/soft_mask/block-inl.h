@@ -87,9 +87,11 @@ class TilePixels {
       const int rows = HWY_MIN(rect.y1 - y0, static_cast<int>(kBlockSize));
       for (int y = 0; y < rows; ++y) {
         const std::uint64_t row = row_at(y0 + y);
-        left |= (row & 0xff) << y * kBlockSize, right |= row >> kBlockSize << y * kBlockSize;
+        left |= (row & 0xff) << y * kBlockSize;
+        right |= row >> kBlockSize << y * kBlockSize;
       }
-      bits_[b] = left, bits_[b + 1] = right;
+      bits_[b] = left;
+      bits_[b + 1] = right;
     }
   }
 
@@ -142,7 +144,8 @@ HWY_INLINE PixelRect BoxOf(const SoftBlock& block) {
 // Everything that follows from block.bits, of which `rect` is the bounding box.
 HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const PixelRect& rect, SoftBlock* block) {
   const SoftBox& unit = block->box = CentresOf(rect, plan);
-  block->live = block->bits, block->whole = 0;
+  block->live = block->bits;
+  block->whole = 0;
   block->centre_x = 0.5f * static_cast<float>(rect.x0 + rect.x1);
   block->centre_y = 0.5f * static_cast<float>(rect.y0 + rect.y1);
   block->half_x = 0.5f * static_cast<float>(rect.x1 - 1 - rect.x0) * unit.unit_x;
@@ -167,7 +170,8 @@ HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const PixelRect& rect, 
     block.width = std::clamp(rect.x1 - block.x0, 0, static_cast<int>(kBlockSize));
     block.height = std::clamp(rect.y1 - block.y0, 0, static_cast<int>(kBlockSize));
     block.bits = block.width == 0 ? 0 : bits_of(block, b);
-    block.live = 0, block.clear = true;
+    block.live = 0;
+    block.clear = true;
     if (block.bits == 0) continue;
     const PixelRect own = BoxOf(block);
     PlaceBlock(plan, own, &block);
@@ -193,10 +197,13 @@ HWY_INLINE void FillPixels(T value, T* to) {
 // Alpha of a block over no faces: 0 for the pixels to compute.
 HWY_INLINE void ClearAlpha(SoftBlock* block) {
   block->clear = false;
-  FillPixels(0.0, block->alpha), FillPixels(1.0, block->product), FillPixels(1.0f, block->least);
+  FillPixels(0.0, block->alpha);
+  FillPixels(1.0, block->product);
+  FillPixels(1.0f, block->least);
   for (std::uint64_t others = ~block->bits; others != 0; others &= others - 1) {
     const int i = std::countr_zero(others);
-    block->alpha[i] = 1, block->product[i] = 0;
+    block->alpha[i] = 1;
+    block->product[i] = 0;
   }
 }
 

@@ -98,7 +98,8 @@ HWY_INLINE void SetUpDiagonals(SoftTag d, SoftFaceArrays* faces) {
     for (std::size_t k = 0; k < 3; ++k) {
       const SoftVec x = hn::Load(d, faces->v[SoftFaceArrays::kX + k] + i);
       const SoftVec y = hn::Load(d, faces->v[SoftFaceArrays::kY + k] + i);
-      sum[k] = hn::Add(x, y), difference[k] = hn::Sub(x, y);
+      sum[k] = hn::Add(x, y);
+      difference[k] = hn::Sub(x, y);
     }
     const auto store = [&](const SoftVec(&v)[3], SoftFaceArrays::Array least,
                            SoftFaceArrays::Array most) HWY_ATTR {
@@ -148,7 +149,8 @@ inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chun
     AppendNode(d, tree, static_cast<std::size_t>(nodes[(*next)++]), box, z, chunk);
   }
   SetUpDirections(d, box.unit_x, box.unit_y, &chunk->shorts);
-  SetUpDiagonals(d, &chunk->shorts), ForgetDiagonals(d, &chunk->longs);
+  SetUpDiagonals(d, &chunk->shorts);
+  ForgetDiagonals(d, &chunk->longs);
 }
 
 // Faces seen from the middle of a block's background: corners, and for each edge where that point
@@ -249,8 +251,12 @@ HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size
                           HWY_ATTR { return hn::Load(d, lanes.v[LongFaces::kEdges + 6 * k + a]); };
     f.x[k] = hn::Load(d, lanes.v[LongFaces::kX + k]);
     f.y[k] = hn::Load(d, lanes.v[LongFaces::kY + k]);
-    f.tx[k] = edge(0), f.ty[k] = edge(1), f.side[k] = edge(2);
-    f.first[k] = edge(3), f.last[k] = edge(4), f.inverse[k] = edge(5);
+    f.tx[k] = edge(0);
+    f.ty[k] = edge(1);
+    f.side[k] = edge(2);
+    f.first[k] = edge(3);
+    f.last[k] = edge(4);
+    f.inverse[k] = edge(5);
   }
   f.turn = TurnOf(d, f.tx, f.ty, f.inverse);
   return f;

@@ -42,7 +42,8 @@ HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
 // vector store.
 HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, std::size_t at,
                            SoftList* to) {
-  compact.Store(slot, to->slot + at), compact.Store(part, to->part + at);
+  compact.Store(slot, to->slot + at);
+  compact.Store(part, to->part + at);
   to->count = at + compact.count();
 }
 
@@ -60,8 +61,11 @@ HWY_INLINE void AppendEdges(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMas
   const std::size_t at = to->count;
   const auto append = [&](SoftLists::Edge a, const SoftVec(&v)[3])
                           HWY_ATTR { compact.Store(Pick(v, only[0], only[1]), to->v[a] + at); };
-  append(SoftLists::kTx, f.tx), append(SoftLists::kTy, f.ty), append(SoftLists::kSide, f.side);
-  append(SoftLists::kFirst, f.first), append(SoftLists::kLast, f.last);
+  append(SoftLists::kTx, f.tx);
+  append(SoftLists::kTy, f.ty);
+  append(SoftLists::kSide, f.side);
+  append(SoftLists::kFirst, f.first);
+  append(SoftLists::kLast, f.last);
   append(SoftLists::kInverse, f.inverse);
   AppendTags(slot, PartOf(only[0], only[1]), compact, at, to);
 }
@@ -122,7 +126,8 @@ HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& 
                                     hn::Mul(hn::Abs(f.tx[k]), hn::Set(d, block.half_y)));
     const SoftVec least = hn::Add(half, hn::Set(d, search.rounding));
     const SoftVec inner = hn::CopySign(f.side[k], hn::Xor(f.side[k], f.turn));
-    behind[k] = hn::Lt(least, inner), ahead[k] = hn::Lt(inner, hn::Neg(least));
+    behind[k] = hn::Lt(least, inner);
+    ahead[k] = hn::Lt(inner, hn::Neg(least));
   }
   const SoftMask sure = hn::Ne(f.turn, hn::Zero(d));
   const SoftMask outside = hn::And(sure, hn::Or(hn::Or(ahead[0], ahead[1]), ahead[2]));
@@ -237,7 +242,8 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
   };
   append(chunk.shorts, 0, [&](std::size_t i) HWY_ATTR {
     FaceEdges f;
-    LoadCorners(d, chunk.shorts, i, search.block, &f), ShortEdges(d, chunk.shorts, i, &f);
+    LoadCorners(d, chunk.shorts, i, search.block, &f);
+    ShortEdges(d, chunk.shorts, i, &f);
     return f;
   });
   append(chunk.longs, kChunkRoom,

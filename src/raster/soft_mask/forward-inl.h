@@ -218,7 +218,8 @@ HWY_INLINE void WriteTransmittance(const SoftMaskPlan& plan, const SoftBlock& bl
       hn::Store(Transmittance(plan, product, hn::Load(d_written, block.least + from + x)),
                 d_written, row + x);
     }
-    CopyRow(row, size, to), to += size;
+    CopyRow(row, size, to);
+    to += size;
   });
 }
 
@@ -249,7 +250,10 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
       if (blocks[b].clear) ClearAlpha(&blocks[b]);
       blocks[b].whole += scratch->lists.whole;
       PartialAlpha partial(&blocks[b], scratch);
-      partial.AddVertices(), partial.AddSegments(), partial.AddBoundaries(), partial.Merge();
+      partial.AddVertices();
+      partial.AddSegments();
+      partial.AddBoundaries();
+      partial.Merge();
       if (next < nodes.count) StopPixels(plan, stop, &blocks[b]);
     }
   }

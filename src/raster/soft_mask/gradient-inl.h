@@ -53,7 +53,8 @@ HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
   const SoftVec base = hn::Max(a, hn::Set(d, 0x1p-30f));
   SoftVec power = hn::Mul(base, base), odds = hn::MulAdd(a, a, a);
   for (int i = 1; i < kFactors; ++i) {
-    odds = hn::MulAdd(odds, power, odds), power = hn::Mul(power, power);
+    odds = hn::MulAdd(odds, power, odds);
+    power = hn::Mul(power, power);
   }
   return odds;
 }
@@ -84,7 +85,8 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
   for (std::size_t k = 0; k < 3; ++k) {
     const EdgeMembers& edge = faces.edge[k];
     const EdgeOffset o = edge.At(d, block, pixel);
-    z[k] = SquaredLength(o), second[k] = hn::Mul(o.along, edge.inverse);
+    z[k] = SquaredLength(o);
+    second[k] = hn::Mul(o.along, edge.inverse);
     x[k] = hn::NegMulAdd(o.side, edge.ty, hn::Mul(o.beyond, edge.tx));
     y[k] = hn::MulAdd(o.side, edge.tx, hn::Mul(o.beyond, edge.ty));
   }
@@ -103,7 +105,8 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
 class NearestOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
-    hn::Store(n.offset_x, d, v_[0][i]), hn::Store(n.offset_y, d, v_[1][i]);
+    hn::Store(n.offset_x, d, v_[0][i]);
+    hn::Store(n.offset_y, d, v_[1][i]);
     hn::Store(n.second, d, v_[2][i]);
     hn::Store(hn::VecFromMask(d, n.on1), d, v_[3][i]);
     hn::Store(hn::VecFromMask(d, n.on2), d, v_[4][i]);
@@ -121,7 +124,8 @@ class NearestOfPixels {
 class OffsetsOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const EdgeOffset& o) {
-    hn::Store(o.side, d, v_[0][i]), hn::Store(o.beyond, d, v_[1][i]);
+    hn::Store(o.side, d, v_[0][i]);
+    hn::Store(o.beyond, d, v_[1][i]);
     hn::Store(o.along, d, v_[2][i]);
   }
   HWY_INLINE EdgeOffset At(SoftTag d, std::size_t i) const {
@@ -140,7 +144,8 @@ struct FarPixels {
     const auto beyond = [&](float least) HWY_ATTR {
       return std::uint64_t{hn::AllTrue(d, hn::Ge(z, hn::Set(d, least)))} << i;
     };
-    small |= beyond(kSmallZ), medium |= beyond(kMediumZ);
+    small |= beyond(kSmallZ);
+    medium |= beyond(kMediumZ);
   }
 };
 
@@ -159,7 +164,8 @@ struct CornerSums {
                               hn::IfThenElse(n.on2, zero, hn::IfThenElse(n.on1, a, b)),
                               hn::IfThenElse(n.on2, a, hn::IfThenElse(n.on1, b, zero))};
     for (std::size_t k = 0; k < 3; ++k) {
-      x[k] = hn::MulAdd(share[k], gx, x[k]), y[k] = hn::MulAdd(share[k], gy, y[k]);
+      x[k] = hn::MulAdd(share[k], gx, x[k]);
+      y[k] = hn::MulAdd(share[k], gy, y[k]);
     }
   }
 };
@@ -178,7 +184,8 @@ HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const 
   ForPixels(bits, [&](std::size_t i) HWY_ATTR {
     SoftVec z;
     nearest.Store(d, i, NearestOf(d, faces, block, i, &z));
-    hn::Store(z, d, pushes[i]), far.Note(d, i, z);
+    hn::Store(z, d, pushes[i]);
+    far.Note(d, i, z);
   });
   push_all(far, pushes);
   CornerSums sums(d);
@@ -222,10 +229,12 @@ struct ChunkSums {
   HWY_INLINE void Add(SoftTag d, const SoftList& list, std::size_t m, std::int32_t next,
                       SoftVec d_x, SoftVec d_y) const {
     alignas(64) float x[kSoftLanes], y[kSoftLanes];
-    hn::Store(d_x, d, x), hn::Store(d_y, d, y);
+    hn::Store(d_x, d, x);
+    hn::Store(d_y, d, y);
     for (std::size_t i = 0; i < hn::Lanes(d) && m + i < list.count; ++i) {
       float* to = v[list.slot[m + i]] + 2 * ((list.part[m + i] + next) % 3);
-      to[0] += x[i], to[1] += y[i];
+      to[0] += x[i];
+      to[1] += y[i];
     }
   }
 };
@@ -256,7 +265,8 @@ struct WeakFaces {
           ForPixels(columns, [&](std::size_t x) HWY_ATTR {
             const SoftVec influence = hn::Mul(members.columns.power[x], of_row);
             const SoftVec w = hn::Mul(odds(influence), hn::Set(d, row_push[x]));
-            d_x = hn::MulAdd(w, members.columns.offsets[x], d_x), pushed = hn::Add(pushed, w);
+            d_x = hn::MulAdd(w, members.columns.offsets[x], d_x);
+            pushed = hn::Add(pushed, w);
           });
           d_y = hn::MulAdd(pushed, members.rows.offsets[row], d_y);
         });
@@ -284,7 +294,9 @@ struct WeakFaces {
       ForPixels(bits, [&](std::size_t i) HWY_ATTR {
         const EdgeOffset o = edge.At(d, block, i);
         const SoftVec z = SquaredLength(o);
-        offsets.Store(d, i, o), hn::Store(z, d, pushes[i]), far.Note(d, i, z);
+        offsets.Store(d, i, o);
+        hn::Store(z, d, pushes[i]);
+        far.Note(d, i, z);
       });
       PushAll(bits, far, pushes);
       // Of push along n and t, and of both times the share of the second corner.
@@ -294,7 +306,8 @@ struct WeakFaces {
         const SoftVec w = hn::Load(d, pushes[i]);
         const SoftVec second = hn::Min(hn::Mul(o.along, edge.inverse), hn::Set(d, 1.0f));
         const SoftVec s = hn::Mul(w, o.side), b = hn::Mul(w, o.beyond);
-        side = hn::Add(side, s), beyond = hn::Add(beyond, b);
+        side = hn::Add(side, s);
+        beyond = hn::Add(beyond, b);
         second_side = hn::MulAdd(s, second, second_side);
         second_beyond = hn::MulAdd(b, second, second_beyond);
       });
@@ -350,7 +363,8 @@ inline void AppendNear(const SoftBlock& block, float* product, AlignedVector<Sof
     if (bits == 0) continue;
     NotePairs(d, bits, &scratch->work);
     SoftNearFaces& faces = near->emplace_back();
-    faces.count = std::min(hn::Lanes(d), list.count - m), faces.bits = bits;
+    faces.count = std::min(hn::Lanes(d), list.count - m);
+    faces.bits = bits;
     for (std::size_t i = 0; i < faces.count; ++i) {
       const auto slot = static_cast<std::size_t>(list.slot[m + i]);
       faces.face[i] =

@@ -48,7 +48,8 @@ HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftLists& lists, const SoftL
 // Counts the pairs of members from m on and `pixels`, and the powers: one per pair.
 HWY_INLINE void NotePairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
   const auto pairs = static_cast<std::int64_t>(hn::Lanes(d)) * std::popcount(pixels);
-  work->pairs += pairs, work->powers += pairs;
+  work->pairs += pairs;
+  work->powers += pairs;
 }
 // The same for corners: one power per column and row.
 HWY_INLINE void NoteVertexPairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
@@ -70,7 +71,10 @@ struct AxisInfluence {
       const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
       const SoftVec offset = hn::Sub(hn::Set(d, at[i]), vertex);
       power[i] = simd::Exp2Neg(d, hn::Mul(offset, offset)).power;
-      if constexpr (kWithOffsets) offsets[i] = offset, largest = hn::Max(largest, power[i]);
+      if constexpr (kWithOffsets) {
+        offsets[i] = offset;
+        largest = hn::Max(largest, power[i]);
+      }
     }
     most = largest;
   }
@@ -124,7 +128,8 @@ struct EdgeMembers {
     const SoftVec step = hn::MulAdd(tx, x, hn::Mul(ty, y));
     // Not before the first corner, even where rounding puts the last one there.
     const SoftVec nearest = hn::Max(hn::Min(step, last), first);
-    o.beyond = hn::Sub(step, nearest), o.along = hn::Sub(nearest, first);
+    o.beyond = hn::Sub(step, nearest);
+    o.along = hn::Sub(nearest, first);
     return o;
   }
 };
@@ -154,12 +159,15 @@ struct LaneProducts {
   SoftVec all, others;
 
   HWY_INLINE LaneProducts(SoftTag d, SoftVec v) {
-    others = Neighbour(d, v), all = hn::Mul(v, others);
+    others = Neighbour(d, v);
+    all = hn::Mul(v, others);
     const SoftVec pairs = NextPair(d, all);
-    others = hn::Mul(others, pairs), all = hn::Mul(all, pairs);
+    others = hn::Mul(others, pairs);
+    all = hn::Mul(all, pairs);
     if constexpr (hn::MaxLanes(d) > 4) {
       const SoftVec quartets = NextQuartet(d, all);
-      others = hn::Mul(others, quartets), all = hn::Mul(all, quartets);
+      others = hn::Mul(others, quartets);
+      all = hn::Mul(all, quartets);
     }
   }
 };

@@ -55,7 +55,8 @@ inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const
   const SoftTag d;
   const SoftBox box = CentresOf(rect, plan);
   const std::size_t count = tree.groups.count;
-  near->boxes.Resize(count), near->count = 0;
+  near->boxes.Resize(count);
+  near->count = 0;
   if (near->group.size() < count) near->group.resize(count);
   for (std::size_t g = 0; g < count; g += hn::Lanes(d)) {
     std::uint32_t bits = NearBits(d, tree.groups, g, count, box, GroupLimit(plan));
@@ -98,7 +99,8 @@ HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPla
   const SoftNearGroups& groups = scratch->groups;
   SoftNodesAt& found = scratch->found;
   if (found.node.size() < tree.nodes.count) {
-    found.node.resize(tree.nodes.count), found.z.resize(tree.nodes.count);
+    found.node.resize(tree.nodes.count);
+    found.z.resize(tree.nodes.count);
   }
   std::size_t count = 0;
   for (std::size_t g = 0; g < groups.count; g += hn::Lanes(d)) {
@@ -124,11 +126,14 @@ struct SoftHistogram {
   HWY_INLINE SoftHistogram(const SoftBoxes& boxes, const SoftNodesAt& found, std::size_t count,
                            int end_z, double near_faces)
       : end(end_z), beyond(near_faces) {
-    std::fill_n(faces, end, 0.0f), std::fill_n(nodes, end, 0);
+    std::fill_n(faces, end, 0.0f);
+    std::fill_n(nodes, end, 0);
     const float* in = boxes.array(SoftBoxes::kFaces);
     for (std::size_t i = 0; i < count; ++i) {
       const float more = in[found.node[i]];
-      faces[found.z[i]] += more, ++nodes[found.z[i]], beyond -= static_cast<double>(more);
+      faces[found.z[i]] += more;
+      ++nodes[found.z[i]];
+      beyond -= static_cast<double>(more);
     }
   }
   // Drops the farthest as long as `budget` lasts; returns the first whole z that is dropped, and
@@ -140,7 +145,8 @@ struct SoftHistogram {
       influence *= 2;
       const double more = static_cast<double>(faces[from - 1]) * influence;
       if (cost + more > budget) break;
-      cost += more, --from;
+      cost += more;
+      --from;
     }
     *dropped += cost;
     return from;
@@ -166,7 +172,8 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
   std::size_t begin[kEndZ + 1];
   for (int z = 0; z < end; ++z) {
     out.faces += static_cast<std::size_t>(histogram.faces[z]);
-    begin[z] = out.count, out.count += static_cast<std::size_t>(histogram.nodes[z]);
+    begin[z] = out.count;
+    out.count += static_cast<std::size_t>(histogram.nodes[z]);
   }
   begin[end] = out.count;  // those that are dropped go behind the others: no branch
   if (scratch->nodes.size() < count) scratch->nodes.resize(count);

@@ -61,8 +61,11 @@ void TryPaperEdge(const NdcFace<T>& face, int k, const T& px, const T& py, doubl
   const T cross = qx * ey - qy * ex;
   const T d2 = cross * cross / length;
   if (!(RealPart(d2) < RealPart(best->squared_distance))) return;
-  best->from = k, best->to = n, best->tau = tau;
-  best->rx = cross * ey / length, best->ry = -cross * ex / length;
+  best->from = k;
+  best->to = n;
+  best->tau = tau;
+  best->rx = cross * ey / length;
+  best->ry = -cross * ex / length;
   best->squared_distance = d2;
 }
 
@@ -72,8 +75,11 @@ void TryPaperCorner(const NdcFace<T>& face, int k, const T& px, const T& py,
   const T rx = px - face.x[k], ry = py - face.y[k];
   const T d2 = rx * rx + ry * ry;
   if (!(RealPart(d2) < RealPart(best->squared_distance))) return;
-  best->from = best->to = k, best->tau = T(0);
-  best->rx = rx, best->ry = ry, best->squared_distance = d2;
+  best->from = best->to = k;
+  best->tau = T(0);
+  best->rx = rx;
+  best->ry = ry;
+  best->squared_distance = d2;
 }
 
 template <class T>
@@ -85,7 +91,8 @@ std::vector<PaperCandidate<T>> PaperCandidates(std::span<const NdcFace<T>> faces
     if (out.size() >= static_cast<std::size_t>(std::max(rule.max_faces, 0))) break;
     if (!InPaperBox(faces[f], px, py, rule.box)) continue;
     PaperCandidate<T> c;
-    c.face = f, c.squared_distance = T(rule.farthest);
+    c.face = f;
+    c.squared_distance = T(rule.farthest);
     for (int k = 0; k < 3; ++k) TryPaperEdge(faces[f], k, px, py, rule.eps, &c);
     for (int k = 0; k < 3; ++k) TryPaperCorner(faces[f], k, px, py, &c);
     c.influence = exp(-c.squared_distance * T(rule.inverse_delta));
@@ -118,8 +125,10 @@ void PaperAlphaRefBackward(std::span<const NdcFace<T>> faces, const T& px, const
     const PaperCandidate<T>& c = candidates[n];
     const T push = d_alpha * prefix * suffix[n + 1] * c.influence * T(rule.inverse_delta) * T(2);
     NdcFace<T>& d = d_faces[c.face];
-    d.x[c.from] += push * (T(1) - c.tau) * c.rx, d.y[c.from] += push * (T(1) - c.tau) * c.ry;
-    d.x[c.to] += push * c.tau * c.rx, d.y[c.to] += push * c.tau * c.ry;
+    d.x[c.from] += push * (T(1) - c.tau) * c.rx;
+    d.y[c.from] += push * (T(1) - c.tau) * c.ry;
+    d.x[c.to] += push * c.tau * c.rx;
+    d.y[c.to] += push * c.tau * c.ry;
     prefix *= T(1) - c.influence;
   }
 }

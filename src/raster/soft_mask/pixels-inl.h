@@ -74,7 +74,8 @@ struct PixelRange {
       const SoftVec clamped = hn::Min(hn::Max(index, hn::Zero(d)), hn::Set(d, axis.count));
       return hn::BitCast(SoftByteTag(), hn::Add(clamped, hn::Set(d, kLarge)));
     };
-    begin = nearest(low, axis.low), end = nearest(high, axis.high);
+    begin = nearest(low, axis.low);
+    end = nearest(high, axis.high);
   }
 };
 
@@ -87,7 +88,8 @@ struct PixelBytes {
   constexpr PixelBytes() {
     for (std::uint8_t i = 0; i < 16; ++i) {
       below[i] = static_cast<std::uint8_t>(i < 8 ? (1 << i) - 1 : 0xff);
-      row[i] = i % 8, above[i] = static_cast<std::uint8_t>(7 - i % 8);
+      row[i] = i % 8;
+      above[i] = static_cast<std::uint8_t>(7 - i % 8);
       for (std::uint8_t half = 0; half < 2; ++half) {
         spread[half][i] = static_cast<std::uint8_t>(4 * (2 * half + i / 8));
       }
@@ -135,14 +137,17 @@ struct FacePixels {
   HWY_INLINE explicit FacePixels(const PixelOctagon& octagon) {
     const SoftBitsTag d;
     const SoftBits low = octagon.PixelsOfHalf(0), high = octagon.PixelsOfHalf(1);
-    first = low, second = high;
+    first = low;
+    second = high;
     if constexpr (hn::MaxLanes(SoftTag()) > 4) {  // each block of a vector has its halves
-      first = hn::ConcatLowerLower(d, high, low), second = hn::ConcatUpperUpper(d, high, low);
+      first = hn::ConcatLowerLower(d, high, low);
+      second = hn::ConcatUpperUpper(d, high, low);
     }
   }
   HWY_INLINE void Store(std::uint64_t* to) const {
     const SoftBitsTag d;
-    hn::Store(first, d, to), hn::Store(second, d, to + hn::Lanes(d));
+    hn::Store(first, d, to);
+    hn::Store(second, d, to + hn::Lanes(d));
   }
   // Bits of the faces that none of `pixels` sees.
   HWY_INLINE std::uint32_t UnseenBy(std::uint64_t pixels) const {

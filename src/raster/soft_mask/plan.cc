@@ -16,15 +16,18 @@ double DropZ(std::size_t n, double share) {
 
 SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
   SoftMaskPlan plan;
-  plan.width = options.width, plan.height = options.height;
+  plan.width = options.width;
+  plan.height = options.height;
   // Sharper kernels than 1e-15 pixel are not resolved, and would overflow; nor wider ones than
   // 1e37 pixels.
   const double longer = std::max(options.width, options.height);
   const double root =
       std::clamp(std::sqrt(options.delta * std::numbers::ln2), 2e-15 / longer, 1e37 / longer);
-  plan.unit_x = 2.0 / options.width / root, plan.unit_y = 2.0 / options.height / root;
+  plan.unit_x = 2.0 / options.width / root;
+  plan.unit_y = 2.0 / options.height / root;
   const double error = options.max_alpha_error;
-  plan.node_error = plan.stop_error = error / 4, plan.face_error = error * 3 / 4;
+  plan.node_error = plan.stop_error = error / 4;
+  plan.face_error = error * 3 / 4;
   plan.group_z = DropZ(options.faces, plan.node_error / 2);
   plan.group_influence = std::exp2(-plan.group_z);
   return plan;

@@ -23,7 +23,8 @@ HWY_EXPORT(SoftMaskBackwardTarget);
 void BuildSoftTree(SoftTree* tree, const Workers* workers) {
   constexpr std::size_t kChunkGroups = 16;  // that a worker takes at a time
   const std::size_t groups = tree->corners.packets() / kGroupNodes;
-  tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
+  tree->nodes.Resize(groups * kGroupNodes);
+  tree->groups.Resize(groups);
   ForChunks(workers, groups, kChunkGroups, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(BuildSoftGroupsTarget)(begin, end, tree);
   });

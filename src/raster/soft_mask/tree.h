@@ -24,7 +24,8 @@ struct SoftBoxes {
   std::size_t stride = 0, count = 0;
 
   void Resize(std::size_t n) {
-    count = n, stride = (n + kGroupNodes - 1) / kGroupNodes * kGroupNodes;
+    count = n;
+    stride = (n + kGroupNodes - 1) / kGroupNodes * kGroupNodes;
     values.resize(kArrays * stride);
   }
   float* array(std::size_t a) { return values.data() + a * stride; }

@@ -29,7 +29,8 @@ void AllFacesAlpha::Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, B
 raster::SoftWork AllFacesAlpha::work() const {
   raster::SoftWork sum;
   for (const raster::SoftMaskScratch& scratch : scratch_) {
-    sum.pairs += scratch.work.pairs, sum.powers += scratch.work.powers;
+    sum.pairs += scratch.work.pairs;
+    sum.powers += scratch.work.powers;
   }
   return sum;
 }

@@ -32,7 +32,10 @@ struct VertexSums {
 void AddCamera(const Camera& b, Camera* a) {
   for (int i = 0; i < 9; ++i) a->rotation[i] += b.rotation[i];
   for (int i = 0; i < 3; ++i) a->translation[i] += b.translation[i];
-  a->fx += b.fx, a->fy += b.fy, a->cx += b.cx, a->cy += b.cy;
+  a->fx += b.fx;
+  a->fy += b.fy;
+  a->cx += b.cx;
+  a->cy += b.cy;
 }
 
 }  // namespace
@@ -46,7 +49,8 @@ void PaperAlpha::Begin(const RenderOptions& options, std::size_t images) {
 
 void PaperAlpha::Prepare(std::size_t n, const ImageScratch& image) {
   Image* const out = &images_[n];
-  out->ids.clear(), out->faces.clear();
+  out->ids.clear();
+  out->faces.clear();
   for (std::size_t f = 0; f < image.mesh.faces(); ++f) {
     if ((image.mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
     out->ids.push_back(static_cast<std::int32_t>(f));

@@ -32,7 +32,8 @@ raster::NdcFace<T> NdcFaceOf(const raster::ScreenMeshT<T>& mesh, std::size_t fac
   raster::NdcFace<T> out;
   for (int k = 0; k < 3; ++k) {
     const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
-    out.x[k] = NdcX(mesh.x[v], mesh.width), out.y[k] = NdcY(mesh.y[v], mesh.height);
+    out.x[k] = NdcX(mesh.x[v], mesh.width);
+    out.y[k] = NdcY(mesh.y[v], mesh.height);
   }
   return out;
 }
@@ -60,7 +61,8 @@ NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster:
     const auto [left, right] = std::minmax({f.x[0], f.x[1], f.x[2]});
     const auto [bottom, top] = std::minmax({f.y[0], f.y[1], f.y[2]});
     if (right < x0 || left > x1 || top < y0 || bottom > y1) continue;
-    out.faces.push_back(f), out.source.push_back(n);
+    out.faces.push_back(f);
+    out.source.push_back(n);
   }
   return out;
 }

@@ -43,7 +43,8 @@ struct LitRenderer::Impl {
     const std::array<Light, 2> lights = DatasetLights();
     const MeshScene made(mesh, LitOptions());
     Scene scene = made.scene();
-    scene.shading.lighting = Lighting::kLambert, scene.lights = lights;
+    scene.shading.lighting = Lighting::kLambert;
+    scene.lights = lights;
     for (const Camera& camera : cameras) {
       scene.camera = camera;
       const PictureRequest request{

@@ -131,8 +131,10 @@ void MeshScene::AddSurfaces() {
           Decode(material.base_color[c], options_.color_space);
     }
     surface.texture = AddTexture(material);
-    surface.ambient = options_.ambient, surface.diffuse = options_.diffuse;
-    surface.specular = options_.specular, surface.shininess = options_.shininess;
+    surface.ambient = options_.ambient;
+    surface.diffuse = options_.diffuse;
+    surface.specular = options_.specular;
+    surface.shininess = options_.shininess;
     if (material.unlit) {
       surface.ambient = {1, 1, 1};
       surface.diffuse = surface.specular = {0, 0, 0};
@@ -183,7 +185,8 @@ void MeshScene::AddCover() {
   }
   for (const glm::vec4& color : mesh_.colors) vertex_alpha_.insert(vertex_alpha_.end(), 3, color.a);
   SceneCover& cover = cover_.emplace(SceneCover{scene_, std::move(covers)});
-  cover.alpha.shading = {}, cover.alpha.normals = {};
+  cover.alpha.shading = {};
+  cover.alpha.normals = {};
   cover.alpha.colors = {vertex_alpha_, Rate::kVertex};
   cover.alpha.surfaces = alpha_surfaces_;
   if (!textures_.empty()) cover.alpha.textures = alpha_textures_;

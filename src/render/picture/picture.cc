@@ -29,7 +29,8 @@ Status Check(const PictureRequest& r) {
 
 RenderOptions OptionsOf(const PictureRequest& r, int scale) {
   RenderOptions options;
-  options.width = scale * r.width, options.height = scale * r.height;
+  options.width = scale * r.width;
+  options.height = scale * r.height;
   options.culling = r.culling;
   if (r.soft_delta > 0) options.delta = r.soft_delta;
   return options;
@@ -68,7 +69,8 @@ void Copy(const From& from, To* to) {
 }  // namespace
 
 void AverageSamples(const Images& samples, int scale, Picture* picture) {
-  picture->width = samples.width / scale, picture->height = samples.height / scale;
+  picture->width = samples.width / scale;
+  picture->height = samples.height / scale;
   const auto pixels =
       static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
   const auto count = static_cast<float>(scale * scale);
@@ -113,7 +115,8 @@ Status PictureRenderer::RenderColorLayers(const Scene& scene, const PictureReque
   seen_.assign(request.color ? 3 * samples : 0, 0);
   through_.assign(samples, 1);
   Outputs images;
-  images.color = request.color, images.attributes = images.alpha = false;
+  images.color = request.color;
+  images.attributes = images.alpha = false;
   const auto take = [&](const Images& layer, std::size_t at, float cover) {
     float& through = through_[at];
     for (std::size_t c = 0; c < 3 && request.color; ++c) {
@@ -134,7 +137,9 @@ Status PictureRenderer::RenderColor(Scene scene, const PictureRequest& request, 
   scene.camera = ScaledCamera(scene.camera, static_cast<float>(scale));
   if (Layered(request)) return RenderColorLayers(scene, request, picture);
   Outputs images;
-  images.color = request.color, images.attributes = false, images.alpha = request.soft_delta > 0;
+  images.color = request.color;
+  images.attributes = false;
+  images.alpha = request.soft_delta > 0;
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, scale), images, &frame_));
   AverageSamples(frame_.images(), scale, picture);
   return {};
@@ -164,7 +169,8 @@ Status PictureRenderer::RenderExact(const Scene& scene, const PictureRequest& re
                                     Picture* picture) {
   Outputs images;
   images.color = images.attributes = images.alpha = false;
-  images.depth = request.depth, images.normals = request.normals;
+  images.depth = request.depth;
+  images.normals = request.normals;
   images.uv = request.uv && !scene.uvs.values.empty();
   if (Layered(request)) return RenderExactLayers(scene, request, images, picture);
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, 1), images, &frame_));
@@ -180,7 +186,8 @@ Status PictureRenderer::Render(const Scene& scene, const PictureRequest& request
                                Picture* picture) {
   TILEGRAD_TRY(Check(request));
   *picture = Picture{};
-  picture->width = request.width, picture->height = request.height;
+  picture->width = request.width;
+  picture->height = request.height;
   if (request.color || request.alpha) {
     TILEGRAD_TRY(RenderColor(scene, request, picture));
     picture->plans.push_back(Layered(request) ? layers_.plan() : Explain(renderer_));

@@ -72,7 +72,8 @@ void MixCutWeights(const PipelineScene& scene, const raster::ScreenMesh& mesh,
     float source[3];
     raster::SourceWeights<float>(mesh, scene.faces, static_cast<std::size_t>(faces[from]), piece,
                                  source);
-    w1[to] = source[1], w2[to] = source[2];
+    w1[to] = source[1];
+    w2[to] = source[2];
   });
 }
 

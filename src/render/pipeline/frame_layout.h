@@ -24,8 +24,10 @@ raster::AttributeViewT<const T> AttributesOf(const PipelineSceneT<T>& scene) {
 template <class T>
 void SizeFrame(int images, int channels, const RenderOptions& options, const Outputs& request,
                PipelineFrameT<T>* frame) {
-  frame->images = images, frame->channels = request.attributes ? channels : 0;
-  frame->height = options.height, frame->width = options.width;
+  frame->images = images;
+  frame->channels = request.attributes ? channels : 0;
+  frame->height = options.height;
+  frame->width = options.width;
   const std::size_t pixels = static_cast<std::size_t>(images) *
                              static_cast<std::size_t>(options.height) *
                              static_cast<std::size_t>(options.width);

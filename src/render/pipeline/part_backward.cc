@@ -77,7 +77,10 @@ bool GatherStripFaces(const StripPlace& strip, AlignedVector<std::int32_t>* face
     const std::int32_t* from =
         strip.faces.data() + static_cast<std::ptrdiff_t>(i) * strip.width + strip.x0;
     std::int32_t* to = faces->data() + static_cast<std::ptrdiff_t>(i) * raster::kBinSize;
-    for (int j = 0; j < strip.columns(); ++j) to[j] = from[j], all &= from[j];
+    for (int j = 0; j < strip.columns(); ++j) {
+      to[j] = from[j];
+      all &= from[j];
+    }
   }
   return all != raster::kNoFace;
 }

@@ -96,7 +96,10 @@ struct Pipeline::Impl {
              AlphaStage* rule) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
-    for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};
+    for (WorkerScratch& worker : worker_scratch) {
+      worker.stats = {};
+      worker.times = {};
+    }
     alpha = rule;
     if (alpha != nullptr) alpha->Begin(options, count);
     sound = topologies.Update(scenes, *workers);
@@ -333,14 +336,17 @@ Status Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOpt
 RenderStats Pipeline::stats() const {
   RenderStats sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
-    sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
-    sum.interpolated += worker.stats.interpolated, sum.alpha_parts += worker.stats.alpha_parts;
+    sum.prepared += worker.stats.prepared;
+    sum.drawn += worker.stats.drawn;
+    sum.interpolated += worker.stats.interpolated;
+    sum.alpha_parts += worker.stats.alpha_parts;
     sum.merged += worker.stats.merged;
   }
   if (impl_->alpha != nullptr) {
     sum.alpha_rule = impl_->alpha->name();
     const raster::SoftWork work = impl_->alpha->work();
-    sum.pairs = work.pairs, sum.powers = work.powers;
+    sum.pairs = work.pairs;
+    sum.powers = work.powers;
   }
   return sum;
 }
@@ -349,8 +355,12 @@ RenderTimes Pipeline::times() const {
   RenderTimes sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     const RenderTimes& t = worker.times;
-    sum.prepare += t.prepare, sum.visibility += t.visibility, sum.interpolate += t.interpolate;
-    sum.stage += t.stage, sum.gradients += t.gradients, sum.alpha += t.alpha;
+    sum.prepare += t.prepare;
+    sum.visibility += t.visibility;
+    sum.interpolate += t.interpolate;
+    sum.stage += t.stage;
+    sum.gradients += t.gradients;
+    sum.alpha += t.alpha;
     sum.merge += t.merge;
   }
   return sum;

@@ -167,7 +167,8 @@ void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOp
   const auto add = [&](std::size_t n, int corner, const T& d_x, const T& d_y) {
     const auto f = static_cast<std::size_t>(prepared.soft_faces[n]);
     const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
-    d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
+    d->screen.d_x[v] += d_x;
+    d->screen.d_y[v] += d_y;
   };
   if (options.alpha_rule == AlphaRule::kAllFaces) {
     raster::SoftAlphaRefBackward<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale,

@@ -50,7 +50,8 @@ bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
 void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
                       const PrepareRequest& request, PreparedFrom* from) {
   const PipelineScene& scene = in.scene;
-  from->valid = true, from->drawn_bins = request.drawn_bins;
+  from->valid = true;
+  from->drawn_bins = request.drawn_bins;
   from->alpha = request.alpha != nullptr;
   from->positions.assign(scene.positions.begin(), scene.positions.end());
   from->topology = in.topology.id;

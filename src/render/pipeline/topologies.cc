@@ -29,7 +29,8 @@ bool HasFacesOf(const Topology& topology, const PipelineScene& scene) {
 
 // Only neighbours are compared, so that a batch of all different meshes costs no more.
 void Topologies::Group(std::span<const PipelineScene> scenes) {
-  of_scene_.resize(scenes.size()), first_scene_.clear();
+  of_scene_.resize(scenes.size());
+  first_scene_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (n == 0 || !ShareFaces(scenes[n - 1], scenes[n])) first_scene_.push_back(n);
     of_scene_[n] = first_scene_.size() - 1;
@@ -38,7 +39,8 @@ void Topologies::Group(std::span<const PipelineScene> scenes) {
 }
 
 bool Topologies::Update(std::span<const PipelineScene> scenes, const Workers& workers) {
-  Group(scenes), ++updates_;
+  Group(scenes);
+  ++updates_;
   std::atomic<bool> sound = true;
   workers.For(first_scene_.size(), [&](std::size_t i, std::size_t) {
     const PipelineScene& scene = scenes[first_scene_[i]];

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "raster/conventions.h"
@@ -46,7 +47,10 @@ Camera CameraInFloat(const CameraT<T>& c) {
   Camera out;
   std::transform(std::begin(c.rotation), std::end(c.rotation), out.rotation, cast);
   std::transform(std::begin(c.translation), std::end(c.translation), out.translation, cast);
-  out.fx = cast(c.fx), out.fy = cast(c.fy), out.cx = cast(c.cx), out.cy = cast(c.cy);
+  out.fx = cast(c.fx);
+  out.fy = cast(c.fy);
+  out.cx = cast(c.cx);
+  out.cy = cast(c.cy);
   out.near_plane = cast(c.near_plane);
   return out;
 }
@@ -54,22 +58,17 @@ Camera CameraInFloat(const CameraT<T>& c) {
 Status CheckCamera(const Camera& camera) {
   TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
   TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
-  const struct {
-    const char* name;
-    float value;
-  } lengths[] = {{"fx", camera.fx}, {"fy", camera.fy}},
-    others[] = {{"cx", camera.cx}, {"cy", camera.cy}};
-  for (const auto& n : lengths) {
-    if (n.value != 0 && std::isfinite(n.value)) continue;
-    return InvalidArgument("camera.{} is {}, must be finite and not 0", n.name, n.value);
+  using Number = std::pair<const char*, float>;
+  for (const auto& [name, value] : {Number("fx", camera.fx), Number("fy", camera.fy)}) {
+    if (value != 0 && std::isfinite(value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite and not 0", name, value);
   }
   if (!(camera.near_plane > 0) || !std::isfinite(camera.near_plane)) {
     return InvalidArgument("camera.near_plane is {}, must be finite and > 0", camera.near_plane);
   }
-  for (const auto& n : others) {
-    if (!std::isfinite(n.value)) {
-      return InvalidArgument("camera.{} is {}, must be finite", n.name, n.value);
-    }
+  for (const auto& [name, value] : {Number("cx", camera.cx), Number("cy", camera.cy)}) {
+    if (std::isfinite(value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite", name, value);
   }
   return {};
 }

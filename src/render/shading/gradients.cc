@@ -50,7 +50,8 @@ void ShadeGradients::AddToPositions(const Batch& batch, std::size_t scene) {
 }
 
 void ShadeGradients::FindTargets(std::span<const SceneGradients> d_scenes) {
-  targets_.clear(), sinks_.clear();
+  targets_.clear();
+  sinks_.clear();
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
     ForEachStream(Scene(), d_scenes[n], [&](const SceneStream<float>& stream) {
       const std::span<float> out = stream.gradient;

@@ -87,7 +87,8 @@ void ShadeInputs::Begin(std::span<const Scene> scenes, bool textures) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     StageScene& out = stage_scenes_[n];
     out.scene = &scenes[n];
-    SetSurfaces(scenes[n], &out), SetLights(scenes[n], &out);
+    SetSurfaces(scenes[n], &out);
+    SetLights(scenes[n], &out);
     out.eye = EyeOf(scenes[n].camera);
     out.textures.clear();
   }
@@ -95,7 +96,8 @@ void ShadeInputs::Begin(std::span<const Scene> scenes, bool textures) {
 }
 
 void ShadeInputs::FindPacks(std::span<const Scene> scenes) {
-  first_of_pack_.clear(), pack_of_scene_.clear();
+  first_of_pack_.clear();
+  pack_of_scene_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack_.push_back(n);
     pack_of_scene_.push_back(first_of_pack_.size() - 1);
@@ -162,7 +164,8 @@ void ShadeInputs::SetViews(std::span<const Scene> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     PipelineScene view = PipelineSceneOf(scenes[n]);
     view.attributes = stage_scenes_[n].varyings.values;
-    view.channels = stage_scenes_[n].varyings.channels, view.rate = stage_scenes_[n].varyings.rate;
+    view.channels = stage_scenes_[n].varyings.channels;
+    view.rate = stage_scenes_[n].varyings.rate;
     views_.push_back(view);
   }
 }

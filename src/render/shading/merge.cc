@@ -21,7 +21,8 @@ void AddSums(const std::array<double, kSize>& from, std::array<double, kSize>& t
 }
 
 void AddSurface(const SurfaceSums& from, SurfaceSums& to) {
-  AddSums(from.factors.base, to.factors.base), AddSums(from.factors.ambient, to.factors.ambient);
+  AddSums(from.factors.base, to.factors.base);
+  AddSums(from.factors.ambient, to.factors.ambient);
   AddSums(from.factors.diffuse, to.factors.diffuse);
   AddSums(from.factors.specular, to.factors.specular);
   to.shininess += from.shininess;
@@ -33,7 +34,9 @@ void AddBand(const SceneSums& from, SceneSums& to) {
     AddSums(from.lights[i].direction, to.lights[i].direction);
     to.lights[i].intensity += from.lights[i].intensity;
   }
-  AddSums(from.sh, to.sh), AddSums(from.eye, to.eye), AddSums(from.depth_axis, to.depth_axis);
+  AddSums(from.sh, to.sh);
+  AddSums(from.eye, to.eye);
+  AddSums(from.depth_axis, to.depth_axis);
   to.depth_shift += from.depth_shift;
 }
 

@@ -150,7 +150,8 @@ int VaryingSet::channels() const { return first(Varying::kUser) + width(Varying:
 
 ForwardPlan PlanForward(const SceneParts& parts, const Outputs& request) {
   ForwardPlan plan;
-  plan.parts = parts, plan.request = request;
+  plan.parts = parts;
+  plan.request = request;
   if (request.color) plan.steps = ColorSteps(parts);
   if (request.normals) plan.steps.normal = true;
   TurnNormals(parts, &plan.steps);
@@ -177,7 +178,8 @@ bool BackwardPlan::staged() const {
 BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
   BackwardPlan plan;
   wishes.d_uv = wishes.d_uv && parts[Varying::kUv];
-  plan.parts = parts, plan.wishes = wishes;
+  plan.parts = parts;
+  plan.wishes = wishes;
   plan.geometry = wishes[Varying::kPosition] || wishes.camera;
   if (wishes.d_color) SetColorTargets(&plan);
   plan.pulled = PulledVaryings(plan);

@@ -144,7 +144,8 @@ shade::ColorFactors RunScene::factors() const {
   shade::ColorFactors out{surface->base_color, surface->ambient, surface->diffuse,
                           surface->specular};
   if (shading->lighting == Lighting::kSphericalHarmonics) {
-    out.ambient = {0, 0, 0}, out.diffuse = {1, 1, 1};
+    out.ambient = {0, 0, 0};
+    out.diffuse = {1, 1, 1};
   }
   return out;
 }
@@ -157,15 +158,25 @@ void ColorRun(std::size_t count, const ForwardPlan& plan, const RunScene& scene,
 void SceneSums::Clear(std::size_t surface_count, std::size_t light_count) {
   surfaces.assign(surface_count, {});
   lights.assign(light_count, shade::kNoLight<double>);
-  sh = {}, eye = {}, depth_axis = {};
+  sh = {};
+  eye = {};
+  depth_axis = {};
   depth_shift = 0;
 }
 
 void ShadeWork::Add(const ShadeWork& other) {
-  pixels += other.pixels, lookups += other.lookups, normals += other.normals, lit += other.lit;
+  pixels += other.pixels;
+  lookups += other.lookups;
+  normals += other.normals;
+  lit += other.lit;
   highlights += other.highlights;
-  gather += other.gather, normal += other.normal, texture += other.texture, light += other.light;
-  color += other.color, adjoint += other.adjoint, scatter += other.scatter;
+  gather += other.gather;
+  normal += other.normal;
+  texture += other.texture;
+  light += other.light;
+  color += other.color;
+  adjoint += other.adjoint;
+  scatter += other.scatter;
 }
 
 void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v,
@@ -185,7 +196,8 @@ void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene,
   }
   if (!steps.light) return;
   LightRun(count, steps, scene, v);
-  work->lit += pixels, work->highlights += steps.highlight ? pixels : 0;
+  work->lit += pixels;
+  work->highlights += steps.highlight ? pixels : 0;
   clock.Lap(&work->light);
 }
 

@@ -45,7 +45,8 @@ std::size_t RefNormalRow(const SceneT<T>& scene, std::size_t corner) {
 template <class T>
 void PackRef(RefScene<T>* s) {
   const SceneT<T>& scene = *s->scene;
-  s->set.rate = Rate::kCorner, s->set.user_channels = scene.channels;
+  s->set.rate = Rate::kCorner;
+  s->set.user_channels = scene.channels;
   ForEachStream(scene, {}, [&](const SceneStream<T>& stream) {
     s->set[stream.what] = !stream.values.empty();
   });

@@ -85,7 +85,8 @@ ShadeStage::ShadeStage(std::size_t workers) {
 }
 
 void ShadeStage::Begin(std::span<const StageScene> scenes, const RenderOptions& options) {
-  scenes_ = scenes, options_ = &options;
+  scenes_ = scenes;
+  options_ = &options;
   pixels_ = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   for (auto& worker : workers_) worker->work = {};
   sound_ = true;
@@ -93,13 +94,15 @@ void ShadeStage::Begin(std::span<const StageScene> scenes, const RenderOptions& 
 
 void ShadeStage::BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
                               const RenderOptions& options, FrameImages* frame) {
-  forward_ = &plan, frame_ = frame;
+  forward_ = &plan;
+  frame_ = frame;
   Begin(scenes, options);
 }
 
 void ShadeStage::BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
                                const RenderOptions& options, const FrameGradients& d_frame) {
-  backward_ = &plan, d_frame_ = &d_frame;
+  backward_ = &plan;
+  d_frame_ = &d_frame;
   Begin(scenes, options);
   bands_of_image_ = BandGrid(options.width, options.height).count();
   if (bands_.size() < scenes.size() * bands_of_image_) {
@@ -130,8 +133,10 @@ void ShadeStage::GatherInputs(const PixelStrip& strip, const PixelRun& run, cons
   const auto gather = [&](Varying what, std::span<RunPlane> to) {
     if (set[what]) GatherChannels(run, strip, set.first(what), to);
   };
-  gather(Varying::kColor, v->vertex_color), gather(Varying::kUv, v->uv);
-  gather(Varying::kNormal, v->normal), gather(Varying::kPosition, v->position);
+  gather(Varying::kColor, v->vertex_color);
+  gather(Varying::kUv, v->uv);
+  gather(Varying::kNormal, v->normal);
+  gather(Varying::kPosition, v->position);
   gather(Varying::kLightDirection, v->light_direction);
   const StageScene& scene = scenes_[strip.image];
   if (steps.turn) SetSides(strip, run, &v->side);
@@ -183,7 +188,10 @@ void ShadeStage::Forward(const PixelStrip& strip) {
       ClearRows(strip, width, PlaneOf(images.data(), planes, c, pixels_, strip));
     }
   };
-  clear(frame_->color), clear(frame_->normals), clear(frame_->uv), clear(frame_->attributes);
+  clear(frame_->color);
+  clear(frame_->normals);
+  clear(frame_->uv);
+  clear(frame_->attributes);
   if (!strip.any_face) return;
   StageWorker* const worker = workers_[strip.worker].get();
   FindSegments(strip.rows, strip.columns, strip.mesh->source_face,
@@ -266,8 +274,10 @@ void ShadeStage::ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
       ScatterRun(run, from[c], rows, d_varyings.data + plane * d_varyings.plane);
     }
   };
-  scatter(Varying::kColor, d.vertex_color), scatter(Varying::kUv, d.uv);
-  scatter(Varying::kNormal, d.normal), scatter(Varying::kPosition, d.position);
+  scatter(Varying::kColor, d.vertex_color);
+  scatter(Varying::kUv, d.uv);
+  scatter(Varying::kNormal, d.normal);
+  scatter(Varying::kPosition, d.position);
   scatter(Varying::kLightDirection, d.light_direction);
   const auto user = static_cast<std::size_t>(set.width(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {

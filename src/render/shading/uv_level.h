@@ -51,7 +51,8 @@ UvPlanes UvPlanesOf(const raster::ScreenMeshT<T>& mesh,
     SetSlopes(plane, n[i][0], n[i][1], n[i][2], &out.n_x[i], &out.n_y[i]);
   }
   SetSlopes(plane, m[0], m[1], m[2], &out.q_x, &out.q_y);
-  out.x0 = plane.x0, out.y0 = plane.y0;
+  out.x0 = plane.x0;
+  out.y0 = plane.y0;
   out.q = plane.base[0] * m[0] + plane.base[1] * m[1] + plane.base[2] * m[2];
   out.least_q = std::min({m[0], m[1], m[2]});
   return out;
@@ -67,7 +68,8 @@ Real UvLevel(const UvPlanes& p, double px, double py, const double (&uv)[2], con
     const double texels = size[i] / q;
     const double x = (p.n_x[i] - uv[i] * p.q_x) * texels;
     const double y = (p.n_y[i] - uv[i] * p.q_y) * texels;
-    across += x * x, down += y * y;
+    across += x * x;
+    down += y * y;
   }
   const double most = std::clamp(std::max(across, down), 1e-30, 1e30);
   return Real(0.5) * std::log2(static_cast<Real>(most));
