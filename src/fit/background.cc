@@ -159,7 +159,8 @@ void Separation::FitBorder() {
 
 void Separation::Measure() {
   threshold_ = std::max(kLeastThreshold, kThreshold * deviation_);
-  gap_.resize(pixels()), place_.resize(pixels());
+  gap_.resize(pixels());
+  place_.resize(pixels());
   for (std::size_t p = 0; p < pixels(); ++p) gap_[p] = static_cast<float>(Gap(color_, p));
   const auto outside = std::ranges::count_if(
       border_, [&](std::size_t p) { return static_cast<double>(gap_[p]) > threshold_; });

@@ -89,7 +89,9 @@ Status FitClock::LoadState(std::span<const nn::NamedTensor> state, std::int64_t 
     return {};
   }
   if (c[1] >= 0) Hurry(c[1]);
-  counted_ = c[3], sum_ = s[0], before_ = s[1];
+  counted_ = c[3];
+  sum_ = s[0];
+  before_ = s[1];
   return {};
 }
 

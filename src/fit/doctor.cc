@@ -54,7 +54,10 @@ std::vector<int> StepsToDrawn(std::span<const std::int32_t> faces, int width, in
   std::vector<int> steps(faces.size(), -1);
   std::deque<int> queue;
   for (std::size_t p = 0; p < faces.size(); ++p) {
-    if (faces[p] >= 0) steps[p] = 0, queue.push_back(static_cast<int>(p));
+    if (faces[p] >= 0) {
+      steps[p] = 0;
+      queue.push_back(static_cast<int>(p));
+    }
   }
   while (!queue.empty()) {
     const int p = queue.front(), x = p % width, y = p / width;
@@ -63,8 +66,10 @@ std::vector<int> StepsToDrawn(std::span<const std::int32_t> faces, int width, in
       const int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
       if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
       int& there = steps[static_cast<std::size_t>(ny * width + nx)];
-      if (there < 0)
-        there = steps[static_cast<std::size_t>(p)] + 1, queue.push_back(ny * width + nx);
+      if (there < 0) {
+        there = steps[static_cast<std::size_t>(p)] + 1;
+        queue.push_back(ny * width + nx);
+      }
     }
   }
   return steps;

@@ -28,8 +28,10 @@ std::optional<Extent> ExtentOf(const TargetImages& size, const Covers& covers) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       if (!covers(static_cast<std::size_t>(y * size.width + x))) continue;
-      left = std::min(left, x), right = std::max(right, x);
-      top = std::min(top, y), bottom = std::max(bottom, y);
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
     }
   }
   if (right < left) return std::nullopt;
@@ -78,7 +80,8 @@ class CameraFinder {
  private:
   void Start() {
     Lens lens = rule_.lens;
-    lens.width = picture_.width, lens.height = picture_.height;
+    lens.width = picture_.width;
+    lens.height = picture_.height;
     scene_.cameras.clear();
     for (const double elevation : kElevations) {
       for (int i = 0; i < kAzimuths; ++i) {
@@ -93,8 +96,10 @@ class CameraFinder {
 
   Status Render() {
     FitRenderer::Job job;
-    job.views = views_, job.alpha = false;
-    job.options.width = picture_.width, job.options.height = picture_.height;
+    job.views = views_;
+    job.alpha = false;
+    job.options.width = picture_.width;
+    job.options.height = picture_.height;
     return renderer_.Render(scene_, job);
   }
 

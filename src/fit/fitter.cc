@@ -151,7 +151,8 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   values.image =
       rule_.Evaluate(options_.loss, *step.targets, {step.views, scene_.gains}, images(), *workers_);
   FrameGradients d_frame;
-  d_frame.color = rule_.d_color(), d_frame.alpha = rule_.d_alpha();
+  d_frame.color = rule_.d_color();
+  d_frame.alpha = rule_.d_alpha();
   TILEGRAD_TRY(renderer_->Backward(scene_, job, d_frame, options_.parameters, &gradients_));
   gradients_.gains.assign(rule_.d_gains().begin(), rule_.d_gains().end());
   RegularizerTerms w = options_.regularizers;

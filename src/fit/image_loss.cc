@@ -95,12 +95,16 @@ ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages
                    part(frame.face_ids, i, plane),
                    part(d_color_, i, 3 * plane),
                    part(d_alpha_, i, plane)};
-    if (!of.gains.empty()) image.gain = of.gains[v], image.d_gain = &d_gains_[i];
+    if (!of.gains.empty()) {
+      image.gain = of.gains[v];
+      image.d_gain = &d_gains_[i];
+    }
     parts_[i] = EvaluateOne(loss, image, share);
   });
   ImageLossValue mean;
   for (const ImageLossValue& p : parts_) {
-    mean.color += share * p.color, mean.silhouette += share * p.silhouette;
+    mean.color += share * p.color;
+    mean.silhouette += share * p.silhouette;
     mean.total += share * p.total;
   }
   return mean;

@@ -175,7 +175,8 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
   TargetImages out;
   out.width = out.height = size;
   const std::size_t plane = out.pixels(), views = bytes.size() / (4 * plane);
-  out.color.resize(3 * plane * views), out.alpha.resize(plane * views);
+  out.color.resize(3 * plane * views);
+  out.alpha.resize(plane * views);
   for (std::size_t n = 0; n < views; ++n) {
     const std::uint8_t* from = &bytes[4 * plane * n];
     for (std::size_t p = 0; p < plane; ++p) {
@@ -246,9 +247,11 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
 TargetImages Reduce(const TargetImages& images, int factor) {
   if (factor == 1) return images;
   TargetImages out;
-  out.width = images.width / factor, out.height = images.height / factor;
+  out.width = images.width / factor;
+  out.height = images.height / factor;
   const std::size_t views = images.alpha.size() / images.pixels(), plane = out.pixels();
-  out.color.resize(3 * plane * views), out.alpha.resize(plane * views);
+  out.color.resize(3 * plane * views);
+  out.alpha.resize(plane * views);
   const auto wide = static_cast<std::size_t>(images.width), f = static_cast<std::size_t>(factor);
   const auto width = static_cast<std::size_t>(out.width);
   for (std::size_t i = 0; i < plane * views; ++i) {

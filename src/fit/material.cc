@@ -98,7 +98,8 @@ void StartMaterial(const FitInput& input, bool blank, FitScene* scene) {
   const auto fill = [&](std::span<float> colors) {
     for (std::size_t i = 0; i < colors.size(); ++i) colors[i] = static_cast<float>(mean[i % 3]);
   };
-  fill(scene->texture.pixels), fill(scene->colors);
+  fill(scene->texture.pixels);
+  fill(scene->colors);
 }
 
 std::optional<MainLight> MainLightOf(const FitScene& scene) {
@@ -111,7 +112,8 @@ Status SaveFittedGlb(const Path& file, const FitScene& scene) {
   const auto main = scene.light_mean_fixed ? MainLightOf(scene) : std::nullopt;
   if (!main) return io::SaveGlb(file, MeshOfScene(scene));
   FitScene shown = scene;
-  Multiply(shown.texture.pixels, main->facing), Multiply(shown.colors, main->facing);
+  Multiply(shown.texture.pixels, main->facing);
+  Multiply(shown.colors, main->facing);
   return io::SaveLitGlb(file, MeshOfScene(shown), main->direction);
 }
 

@@ -17,7 +17,8 @@ namespace {
 // `uvs` of the corners of a mesh with these faces. Corners of one vertex with the same coordinates
 // share them.
 void SetUvs(const std::vector<Face>& faces, const std::vector<glm::vec2>& uvs, FitScene* scene) {
-  scene->uvs.clear(), scene->uv_indices.clear();
+  scene->uvs.clear();
+  scene->uv_indices.clear();
   std::map<std::pair<std::int32_t, std::pair<float, float>>, std::int32_t> known;
   for (std::size_t i = 0; i < uvs.size(); ++i) {
     const glm::vec2 uv = uvs[i];
@@ -54,7 +55,8 @@ std::vector<glm::vec4> VertexColors(const Mesh& mesh) {
   std::vector<float> counts(mesh.positions.size(), 0);
   for (std::size_t c = 0; c < mesh.corner_colors.size(); ++c) {
     const std::int32_t v = mesh.faces[c / 3][c % 3];
-    colors[v] += mesh.corner_colors[c], counts[v] += 1;
+    colors[v] += mesh.corner_colors[c];
+    counts[v] += 1;
   }
   for (std::size_t v = 0; v < colors.size(); ++v)
     colors[v] = counts[v] > 0 ? colors[v] / counts[v] : glm::vec4(1);

@@ -135,7 +135,9 @@ std::string ParameterBlock::name() const {
 
 ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate, int view) {
   ParameterBlock block;
-  block.what = what, block.learning_rate = learning_rate, block.view = view;
+  block.what = what;
+  block.learning_rate = learning_rate;
+  block.view = view;
   ReadValues(scene, &block);
   for (auto* array : {&block.gradient, &block.m, &block.v}) array->resize(block.values.size());
   return block;
@@ -154,10 +156,12 @@ Status WriteBlock(ParameterBlock* block, FitScene* scene) {
       copy(scene->positions.begin());
       break;
     case Parameter::kColors:
-      Clamp(0, 1, &x, x.size()), copy(scene->colors.begin());
+      Clamp(0, 1, &x, x.size());
+      copy(scene->colors.begin());
       break;
     case Parameter::kTexture:
-      Clamp(0, 1, &x, x.size()), copy(scene->texture.pixels.begin());
+      Clamp(0, 1, &x, x.size());
+      copy(scene->texture.pixels.begin());
       break;
     case Parameter::kUv:
       copy(scene->uvs.begin());

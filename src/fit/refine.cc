@@ -60,7 +60,8 @@ TargetImages WithMirrorImage(const TargetImages& picture) {
          row += width)
       std::reverse(row, row + width);
   };
-  append(&out.color), append(&out.alpha);
+  append(&out.color);
+  append(&out.alpha);
   return out;
 }
 
@@ -154,7 +155,9 @@ Result<PictureMatch> Match(const FitScene& scene, const TargetImages& picture,
   for (std::size_t p = 0; p < pixels; ++p) {
     const auto a = static_cast<double>(picture.alpha[p]);
     const auto b = static_cast<double>(rendered.alpha[p]);
-    both += std::min(a, b), either += std::max(a, b), object += a;
+    both += std::min(a, b);
+    either += std::max(a, b);
+    object += a;
     for (std::size_t c = 0; c < 3; ++c) {
       gap += a * std::abs(static_cast<double>(picture.color[c * pixels + p]) -
                           b * static_cast<double>(rendered.color[c * pixels + p]));
@@ -234,7 +237,8 @@ Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& pictu
     scene = best.scene();
   }
   TILEGRAD_ASSIGN(out.after, Match(scene, picture, workers));
-  out.mesh = MeshOfScene(scene), out.camera = scene.cameras[0];
+  out.mesh = MeshOfScene(scene);
+  out.camera = scene.cameras[0];
   TILEGRAD_TRY(Normalize(&out.mesh, &out.camera));
   return out;
 }

@@ -31,14 +31,18 @@ ImageSize SizeOf(const FitInput& input) { return {input.images.width, input.imag
 FitStep StepOf(const FitConfig& config, const FitSchedule& schedule, const TargetImages& targets,
                std::span<const int> views) {
   FitStep step;
-  step.views = views, step.targets = &targets;
+  step.views = views;
+  step.targets = &targets;
   step.job.scale = 1.0f / static_cast<float>(schedule.factor);
-  step.job.options.width = targets.width, step.job.options.height = targets.height;
+  step.job.options.width = targets.width;
+  step.job.options.height = targets.height;
   step.job.options.delta = schedule.delta;
   step.job.options.max_alpha_error = config.max_alpha_error;
   step.rate_factor = step.area_factor = schedule.rate;
-  step.camera_factor = schedule.camera_rate, step.position_factor = schedule.position_rate;
-  step.texture_factor = schedule.texture_rate, step.light_factor = schedule.light_rate;
+  step.camera_factor = schedule.camera_rate;
+  step.position_factor = schedule.position_rate;
+  step.texture_factor = schedule.texture_rate;
+  step.light_factor = schedule.light_rate;
   return step;
 }
 
@@ -157,7 +161,8 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
   FitRenderer::Job job;
   job.views = std::span(job_.input.training).first(1);
   job.alpha = false;
-  job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
+  job.options.width = job_.input.images.width;
+  job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
   return OverGrey(renderer.images(), 0, kWhite);
 }

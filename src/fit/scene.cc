@@ -58,14 +58,16 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter) {
 
 void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {
   Scene one;
-  one.positions = scene.positions, one.faces = scene.faces;
+  one.positions = scene.positions;
+  one.faces = scene.faces;
   one.shading = scene.shading;
   if (!scene.colors.empty()) one.colors = {scene.colors, Rate::kVertex};
   if (!scene.texture.empty()) {
     corner_uvs_.resize(2 * scene.uv_indices.size());
     for (std::size_t i = 0; i < scene.uv_indices.size(); ++i) {
       const auto u = 2 * static_cast<std::size_t>(scene.uv_indices[i]);
-      corner_uvs_[2 * i] = scene.uvs[u], corner_uvs_[2 * i + 1] = scene.uvs[u + 1];
+      corner_uvs_[2 * i] = scene.uvs[u];
+      corner_uvs_[2 * i + 1] = scene.uvs[u + 1];
     }
     one.uvs = {corner_uvs_, Rate::kCorner};
     texture_ = {scene.texture.pixels, scene.texture.width, scene.texture.height, scene.wrap,
@@ -89,7 +91,8 @@ void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {
 Status FitRenderer::Render(const FitScene& scene, const Job& job) {
   SetScenes(scene, job);
   Outputs request;
-  request.attributes = false, request.alpha = job.alpha;
+  request.attributes = false;
+  request.alpha = job.alpha;
   return renderer_.Render(scenes_, job.options, request, &frame_);
 }
 

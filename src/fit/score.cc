@@ -21,10 +21,12 @@ constexpr double kBestPsnr = 99;
 Picture TruthOf(const TargetImages& images, std::size_t view) {
   const std::size_t plane = images.pixels();
   Picture out;
-  out.width = images.width, out.height = images.height;
+  out.width = images.width;
+  out.height = images.height;
   const auto color = std::span(images.color).subspan(3 * view * plane, 3 * plane);
   const auto alpha = std::span(images.alpha).subspan(view * plane, plane);
-  out.color.assign(color.begin(), color.end()), out.alpha.assign(alpha.begin(), alpha.end());
+  out.color.assign(color.begin(), color.end());
+  out.alpha.assign(alpha.begin(), alpha.end());
   return out;
 }
 
@@ -114,8 +116,10 @@ glm::dmat3 MatrixOf(const Alignment& a) {
 Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view, ImageSize size) {
   FitRenderer::Job job;
   job.views = {&view, 1};
-  job.scale = kSamples, job.alpha = false;
-  job.options.width = kSamples * size.width, job.options.height = kSamples * size.height;
+  job.scale = kSamples;
+  job.alpha = false;
+  job.options.width = kSamples * size.width;
+  job.options.height = kSamples * size.height;
   TILEGRAD_TRY(renderer.Render(scene, job));
   Picture out;
   AverageSamples(renderer.images(), kSamples, &out);
@@ -143,7 +147,8 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
     score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
     score.iou = MaskIou(rendered.alpha, truth.alpha);
-    score.truth = OverGrey(truth, kWhite), score.rendered = OverGrey(rendered, kWhite);
+    score.truth = OverGrey(truth, kWhite);
+    score.rendered = OverGrey(rendered, kWhite);
     scores.push_back(std::move(score));
   }
   if (!views.empty()) TILEGRAD_TRY(watch.At({"scoring views", views.size(), views.size(), ""}));
@@ -156,13 +161,15 @@ Alignment AlignCameras(std::span<const Camera> from, std::span<const Camera> to)
   const auto n = static_cast<double>(from.size());
   for (std::size_t i = 0; i < from.size(); ++i) {
     sum += glm::transpose(RotationOf(to[i])) * RotationOf(from[i]);
-    mean_from += CentreOf(from[i]) / n, mean_to += CentreOf(to[i]) / n;
+    mean_from += CentreOf(from[i]) / n;
+    mean_to += CentreOf(to[i]) / n;
   }
   const glm::dmat3 rotation = NearestRotation(sum);
   double along = 0, square = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     const glm::dvec3 a = rotation * (CentreOf(from[i]) - mean_from), b = CentreOf(to[i]) - mean_to;
-    along += glm::dot(a, b), square += glm::dot(a, a);
+    along += glm::dot(a, b);
+    square += glm::dot(a, a);
   }
   Alignment out;
   if (square > 0 && along > 0) out.scale = along / square;

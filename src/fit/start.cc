@@ -132,7 +132,8 @@ Bounds BoundsOf(const FitScene& scene) {
   Bounds box;
   for (std::size_t i = 0; i < scene.positions.size(); i += 3) {
     const glm::vec3 p(scene.positions[i], scene.positions[i + 1], scene.positions[i + 2]);
-    box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
+    box.low = glm::min(box.low, p);
+    box.high = glm::max(box.high, p);
   }
   return box;
 }
@@ -178,8 +179,10 @@ void SetLight(const FitConfig& config, FitScene* scene) {
 }
 
 void AddMesh(const Mesh& mesh, Hash* hash) {
-  hash->AddAll(mesh.positions), hash->AddAll(mesh.faces);
-  hash->AddAll(mesh.colors), hash->AddAll(mesh.corner_uvs);
+  hash->AddAll(mesh.positions);
+  hash->AddAll(mesh.faces);
+  hash->AddAll(mesh.colors);
+  hash->AddAll(mesh.corner_uvs);
   if (!mesh.corner_colors.empty()) hash->AddAll(mesh.corner_colors);
   for (const MeshTexture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
 }
@@ -187,7 +190,8 @@ void AddMesh(const Mesh& mesh, Hash* hash) {
 // Of the images, the cameras, which of them are held out, and the mesh to start from.
 std::string InputHash(const FitJob& job) {
   Hash hash;
-  hash.AddAll(job.input.images.color), hash.AddAll(job.input.images.alpha);
+  hash.AddAll(job.input.images.color);
+  hash.AddAll(job.input.images.alpha);
   for (const Camera& c : job.input.cameras) {
     hash.AddBytes(c.rotation, sizeof(c.rotation));
     hash.AddBytes(c.translation, sizeof(c.translation));
@@ -261,7 +265,8 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
     start.scene.gains.assign(start.scene.cameras.size(), 1.0f);
     options.exposure_reference = job.input.training.front();
   }
-  options.loss = job.config.loss, options.regularizers = start.config.regularizers;
+  options.loss = job.config.loss;
+  options.regularizers = start.config.regularizers;
   options.smoothing = job.config.smoothing;
   return start;
 }

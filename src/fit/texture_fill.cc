@@ -34,7 +34,8 @@ struct TexelGrid {
   // The texel of any column and row, or -1.
   std::ptrdiff_t At(int x, int y) const {
     if (repeats) {
-      x = (x % width + width) % width, y = (y % height + height) % height;
+      x = (x % width + width) % width;
+      y = (y % height + height) % height;
     } else if (x < 0 || y < 0 || x >= width || y >= height) {
       return -1;
     }
@@ -102,7 +103,9 @@ class RingFill {
       if (!done_[t]) open.push_back(t);
     }
     while (!open.empty()) {
-      ring_.clear(), colors_.clear(), rest_.clear();
+      ring_.clear();
+      colors_.clear();
+      rest_.clear();
       for (const std::size_t t : open) Visit(t, joins);
       if (ring_.empty()) return;
       for (std::size_t i = 0; i < ring_.size(); ++i) {
@@ -144,10 +147,14 @@ class RingFill {
 Result<std::vector<bool>> SeenTexels(const FitScene& scene, std::span<const int> views,
                                      ImageSize size, const Workers& workers) {
   FitScene plain = scene;  // without light and colours, which may be 0, every texel has its weight
-  plain.shading = {}, plain.lights.clear(), plain.colors.clear();
+  plain.shading = {};
+  plain.lights.clear();
+  plain.colors.clear();
   FitRenderer renderer(workers);
   FitRenderer::Job job;
-  job.options.width = size.width, job.options.height = size.height, job.alpha = false;
+  job.options.width = size.width;
+  job.options.height = size.height;
+  job.alpha = false;
   ParameterSet wanted;
   wanted[Parameter::kTexture] = true;
   const std::vector<float> ones(
@@ -170,8 +177,10 @@ std::vector<std::int32_t> ChartsOfTexels(const FitScene& scene) {
   const TexelGrid grid = GridOf(scene);
   ChartUnion charts(scene.uvs.size() / 2);
   const std::vector<std::int32_t>& uv = scene.uv_indices;
-  for (std::size_t c = 0; c + 2 < uv.size(); c += 3)
-    charts.Join(uv[c], uv[c + 1]), charts.Join(uv[c], uv[c + 2]);
+  for (std::size_t c = 0; c + 2 < uv.size(); c += 3) {
+    charts.Join(uv[c], uv[c + 1]);
+    charts.Join(uv[c], uv[c + 2]);
+  }
   std::vector<std::int32_t> out(grid.count(), -1);
   for (std::size_t c = 0; c + 2 < uv.size(); c += 3) {
     const std::array corners = {TexelAt(scene, uv[c]), TexelAt(scene, uv[c + 1]),

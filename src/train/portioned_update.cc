@@ -72,8 +72,11 @@ Status PortionedUpdate::Backward(UpdateIndex at) {
   at.listener = sums_.get();
   for (std::size_t i = 0; i < sums_->portions().size(); ++i) {
     at.portion = {sums_->portions()[i], portions_};
-    portion_.loss = kNoLoss, portion_.images = 0, portion_.stream_seconds = 0;
-    portion_.terms.clear(), portion_.also.clear();
+    portion_.loss = kNoLoss;
+    portion_.images = 0;
+    portion_.stream_seconds = 0;
+    portion_.terms.clear();
+    portion_.also.clear();
     sums_->BeginPortion(i);
     TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion_));
     sums_->EndPortion(gradients);

@@ -32,7 +32,8 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   Impl& impl = *out.impl_;
   TILEGRAD_ASSIGN(FoundCheckpoint found, FindCheckpoint(impl.context, path));
   impl.warnings = std::move(found.warnings);
-  impl.info = found.checkpoint.info, impl.checkpoint = found.file;
+  impl.info = found.checkpoint.info;
+  impl.checkpoint = found.file;
   if (impl.info.image_size < 1 || impl.info.image_size > 4096)
     return DataLoss("{}: image size {} is not possible", path.string(), impl.info.image_size);
   if (IsOfFit(impl.info.config)) {

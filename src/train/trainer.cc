@@ -73,7 +73,8 @@ class Training : public RunWork {
         portioned_->GatherMoments();
         continue;
       }
-      values.terms.clear(), values.also.clear();
+      values.terms.clear();
+      values.also.clear();
       const Status done = Updates(step, &values);
       if (!done.ok()) job_.crew->RaiseAlarm(done.Within(fmt::format("step {}", step)));
       outcome.last_step = step + 1;

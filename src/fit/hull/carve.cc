@@ -40,7 +40,10 @@ struct View {
 
 struct Box {
   glm::vec3 low{HUGE_VALF}, high{-HUGE_VALF};
-  void Add(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
+  void Add(glm::vec3 p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
   bool empty() const { return !(low.x <= high.x); }
 };
 
@@ -97,7 +100,8 @@ class Carver {
       const glm::vec3 at = v.Project(centre);
       const float near = at.z - radius;
       if (at.z + radius <= v.camera.near_plane) {
-        ++outside, ++not_inside;
+        ++outside;
+        ++not_inside;
         continue;
       }
       if (near <= v.camera.near_plane) {
@@ -109,7 +113,8 @@ class Carver {
           1 + std::hypot((at.x - v.camera.cx) / v.camera.fx, (at.y - v.camera.cy) / v.camera.fy);
       const float reach = radius * v.focal() * slant / near + kSlack + margin_;
       const float d = v.distance.At(at.x, at.y);
-      outside += d < -reach, not_inside += d < reach;
+      outside += d < -reach;
+      not_inside += d < reach;
     }
     if (outside > forgiven_) return Verdict::kOut;
     return not_inside <= forgiven_ ? Verdict::kIn : Verdict::kMixed;
@@ -176,13 +181,17 @@ Box SearchCells(const Carver& carver, glm::vec3 middle, float side, const Worker
       for (int k = 0; k < kCoarseSide; ++k) {
         const glm::vec3 c = centre(static_cast<int>(x), j, k);
         if (carver.Judge(c, radius) == Verdict::kOut) continue;
-        layers[x].Add(c - 0.5f * step), layers[x].Add(c + 0.5f * step);
+        layers[x].Add(c - 0.5f * step);
+        layers[x].Add(c + 0.5f * step);
       }
     }
   });
   Box box;
-  for (const Box& b : layers)
-    if (!b.empty()) box.Add(b.low), box.Add(b.high);
+  for (const Box& b : layers) {
+    if (b.empty()) continue;
+    box.Add(b.low);
+    box.Add(b.high);
+  }
   return box;
 }
 

@@ -66,7 +66,8 @@ class Propagation {
     const float t = (kHalf - a) / (b - a);
     const Point p{static_cast<float>(x) + t * static_cast<float>(dx),
                   static_cast<float>(y) + t * static_cast<float>(dy)};
-    Offer(p, x, y), Offer(p, x + dx, y + dy);
+    Offer(p, x, y);
+    Offer(p, x + dx, y + dy);
   }
 
   // What the row before (`from`: -1 above, 1 below) and the neighbours in the row know.

@@ -22,8 +22,10 @@ std::optional<Square> SquareAround(const CropSource& image) {
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       if (image.alpha[static_cast<std::size_t>(y * image.width + x)] < kInsideShare) continue;
-      left = std::min(left, x), right = std::max(right, x);
-      top = std::min(top, y), bottom = std::max(bottom, y);
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
     }
   }
   if (right < left) return std::nullopt;
@@ -64,7 +66,8 @@ std::optional<Crop> CropOf(const CropSource& image, const Camera& camera) {
   const auto square = SquareAround(image);
   if (!square) return std::nullopt;
   Crop out;
-  out.alpha.resize(kCropPixels), out.color.resize(3 * kCropPixels);
+  out.alpha.resize(kCropPixels);
+  out.color.resize(3 * kCropPixels);
   const double step = square->side / (kCropSide * kCropSamples);
   const double left = square->x - 0.5 * square->side, top = square->y - 0.5 * square->side;
   for (int j = 0; j < kCropSide * kCropSamples; ++j) {

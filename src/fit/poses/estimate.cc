@@ -47,7 +47,8 @@ FitterOptions OptionsOf(const RefitOptions& o, double color_weight) {
   out.rates[Parameter::kPositions] = o.shape_rate * kPositionRate;
   out.rates[Parameter::kColors] = o.shape_rate * kColorRate;
   out.rates[Parameter::kCamera] = kCameraRate;
-  out.smoothing = kSmoothing, out.color_smoothing = kColorSmoothing;
+  out.smoothing = kSmoothing;
+  out.color_smoothing = kColorSmoothing;
   out.loss.color_weight = color_weight;
   return out;
 }
@@ -64,7 +65,9 @@ PoseEstimate::PoseEstimate(const PosePictures& pictures, int level, const Worker
 void PoseEstimate::ForgetShape() {
   const Mesh sphere = Icosphere(level_, kRadius);
   const auto& color = pictures_.mean_color;
-  scene_.positions.clear(), scene_.faces.clear(), scene_.colors.clear();
+  scene_.positions.clear();
+  scene_.faces.clear();
+  scene_.colors.clear();
   for (const glm::vec3& p : sphere.positions) {
     scene_.positions.insert(scene_.positions.end(), {p.x, p.y, p.z});
     scene_.colors.insert(scene_.colors.end(), color.begin(), color.end());
@@ -76,7 +79,10 @@ void PoseEstimate::Place(std::size_t picture, const Camera& camera) {
   const Camera lens = pictures_.lenses[picture];
   Camera& out = scene_.cameras[picture];
   out = camera;
-  out.fx = lens.fx, out.fy = lens.fy, out.cx = lens.cx, out.cy = lens.cy;
+  out.fx = lens.fx;
+  out.fy = lens.fy;
+  out.cx = lens.cx;
+  out.cy = lens.cy;
   out.near_plane = lens.near_plane;
 }
 
@@ -110,7 +116,10 @@ Result<double> PoseEstimate::Refit(const RefitOptions& o, std::span<const int> p
     FitStep step = StepAt(static_cast<double>(i) / o.steps);
     step.views = views;
     TILEGRAD_ASSIGN(const FitValues values, fitter.Step(step));
-    if (4 * i >= 3 * o.steps) sum += values.total, ++counted;
+    if (4 * i >= 3 * o.steps) {
+      sum += values.total;
+      ++counted;
+    }
   }
   scene_ = fitter.scene();
   return counted > 0 ? sum / counted : 0;

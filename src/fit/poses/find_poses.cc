@@ -100,7 +100,10 @@ Result<bool> PoseSearch::LookForPictures(std::span<const int> pictures, double r
     for (const Viewpoint& v : around) {
       double cost = CropCost(v.crop, pictures_.crops[n], pictures_.color_weight);
       if (repulsion > 0) cost += repulsion * Repulsion(n, v.camera);
-      if (cost < least) best = &v, least = cost;
+      if (cost < least) {
+        best = &v;
+        least = cost;
+      }
     }
     if (best == nullptr) continue;
     const Camera camera = Aligned(best->crop, pictures_.crops[n], best->camera);
@@ -188,7 +191,10 @@ Status CheckPoses(const TargetImages& images, std::span<const Camera> lenses,
 }
 
 void CopyLens(const Camera& from, Camera* to) {
-  to->fx = from.fx, to->fy = from.fy, to->cx = from.cx, to->cy = from.cy;
+  to->fx = from.fx;
+  to->fy = from.fy;
+  to->cx = from.cx;
+  to->cy = from.cy;
   to->near_plane = from.near_plane;
 }
 

@@ -22,7 +22,8 @@ constexpr double kMostNumber = 1e30;
 
 TargetImages Chosen(const TargetImages& images, std::span<const int> views) {
   TargetImages out;
-  out.width = images.width, out.height = images.height;
+  out.width = images.width;
+  out.height = images.height;
   for (const int v : views) {
     const auto n = static_cast<std::size_t>(v);
     const auto color =
@@ -93,7 +94,8 @@ Status Keep(const InputPosesJob& job, const FoundPoses& found) {
 
 std::string ChecksumOf(const TargetImages& images) {
   Hash hash;
-  hash.AddAll(images.color), hash.AddAll(images.alpha);
+  hash.AddAll(images.color);
+  hash.AddAll(images.alpha);
   return hash.Text();
 }
 
@@ -155,7 +157,10 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
         "background");
   }
   std::vector<int> views = input->training;
-  if (!input->posed) views.resize(input->names.size()), std::iota(views.begin(), views.end(), 0);
+  if (!input->posed) {
+    views.resize(input->names.size());
+    std::iota(views.begin(), views.end(), 0);
+  }
   const std::vector<Camera> lenses = Chosen(input->cameras, views);
   FoundPoses found;
   Json kept = Json::object();

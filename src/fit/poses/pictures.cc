@@ -19,7 +19,8 @@ constexpr double kLeastDeviation = 0.02;  // of objects of one colour, whose sha
 // The upper left part whose sides are multiples of `factor`.
 TargetImages CutToMultiple(const TargetImages& images, int factor) {
   TargetImages out;
-  out.width = images.width / factor * factor, out.height = images.height / factor * factor;
+  out.width = images.width / factor * factor;
+  out.height = images.height / factor * factor;
   if (out.width == images.width && out.height == images.height) return images;
   const auto copy = [&](const AlignedVector<float>& from, AlignedVector<float>* to) {
     const std::size_t planes = from.size() / images.pixels();
@@ -32,7 +33,8 @@ TargetImages CutToMultiple(const TargetImages& images, int factor) {
       std::copy_n(source, out.width, to->data() + row * static_cast<std::size_t>(out.width));
     }
   };
-  copy(images.color, &out.color), copy(images.alpha, &out.alpha);
+  copy(images.color, &out.color);
+  copy(images.alpha, &out.alpha);
   return out;
 }
 

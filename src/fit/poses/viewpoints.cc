@@ -46,7 +46,8 @@ Result<std::vector<Viewpoint>> LookAround(const FitScene& scene, const std::arra
   std::vector<int> views(seen.cameras.size());
   std::iota(views.begin(), views.end(), 0);
   FitRenderer::Job job;
-  job.views = views, job.alpha = false;
+  job.views = views;
+  job.alpha = false;
   job.options.width = job.options.height = kSide;
   TILEGRAD_TRY(renderer->Render(seen, job));
   const Images& images = renderer->images();

@@ -24,7 +24,9 @@ Result<Window> FitWindow(const ImageU8& rgba) {
     for (int x = 0; x < rgba.width; ++x) {
       if (rgba.at(x, y)[3] < kOpaque) continue;
       ++opaque;
-      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y),
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
       bottom = std::max(bottom, y);
     }
   }

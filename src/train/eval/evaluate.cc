@@ -211,7 +211,8 @@ class Evaluator {
       out_.unusable_predictions += unusable_[i];
     }
     const ClassMeans means(data_, held_out);
-    out_.classes = means.classes(), out_.class_models = means.class_models();
+    out_.classes = means.classes();
+    out_.class_models = means.class_models();
     out_.rows = {means.Row("undeformed template", template_scores_),
                  means.Row("best single shape", single_scores_)};
     if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieval_scores_));

@@ -61,7 +61,10 @@ ImageIndex::Match ImageIndex::Nearest(std::span<const std::uint8_t> image, int s
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const std::uint32_t distance =
         ThumbnailDistance(small.data(), &thumbnails_[i * kThumbnailBytes]);
-    if (distance < best) best = distance, at = i;
+    if (distance < best) {
+      best = distance;
+      at = i;
+    }
   }
   return {entries_[at].model, entries_[at].view, std::sqrt(best / double{kThumbnailBytes}) / 255};
 }

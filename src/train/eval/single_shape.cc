@@ -75,7 +75,8 @@ Mesh VoxelSurface(std::span<const std::uint8_t> occupancy, int n) {
     at[axis] += side;
     for (const auto& [du, dv] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
       auto corner = at;
-      corner[u] += du, corner[v] += dv;
+      corner[u] += du;
+      corner[v] += dv;
       mesh.positions.emplace_back(corner[0], corner[1], corner[2]);
     }
     const std::int32_t b = side == 1 ? 1 : 3, d = side == 1 ? 3 : 1;

@@ -34,7 +34,8 @@ void AddLaplacian(std::span<const WeighedEdge> edges, std::span<const T> v, std:
     for (int c = 0; c < 3; ++c) {
       const auto a = static_cast<std::size_t>(3 * i + c), b = static_cast<std::size_t>(3 * j + c);
       const T difference = static_cast<T>(weight) * (v[b] - v[a]);
-      out[a] += difference, out[b] -= difference;
+      out[a] += difference;
+      out[b] -= difference;
     }
   }
 }

@@ -33,7 +33,8 @@ double EdgeLengthForward(const Topology& topology, std::span<const T> p, EdgeSum
   *sums = {};
   for (const Edge& e : topology.edges) {
     const double length = static_cast<double>(EdgeLength(p, e));
-    sums->length += length, sums->square += length * length;
+    sums->length += length;
+    sums->square += length * length;
   }
   if (!(sums->length > 0)) return 0;
   const auto edges = static_cast<double>(topology.edges.size());
@@ -55,7 +56,8 @@ void AddEdgeLengthGradient(const Topology& topology, std::span<const T> p, const
     const T along = static_cast<T>(factor * (static_cast<double>(length) - balance)) / length;
     for (std::int32_t c = 0; c < 3; ++c) {
       const T d = along * (p[3 * e.b + c] - p[3 * e.a + c]);
-      d_p[3 * e.b + c] += d, d_p[3 * e.a + c] -= d;
+      d_p[3 * e.b + c] += d;
+      d_p[3 * e.a + c] -= d;
     }
   }
 }

@@ -52,7 +52,8 @@ CriticLoss WganCriticLoss(nn::Module& critic, const nn::Var& real, const nn::Var
   nn::Var fake_score, penalty;
   if (options.penalty > 0 && options.place == PenaltyPlace::kRendered) {
     const nn::PenalisedScore at = nn::ScoreWithPenalty(critic, constant);
-    fake_score = at.score, penalty = at.penalty;
+    fake_score = at.score;
+    penalty = at.penalty;
   } else {
     fake_score = MeanScore(critic, constant);
     if (options.penalty > 0)

@@ -31,7 +31,8 @@ FaceTree::Nearest NearestOn(const Triangle& face, const dvec3& query) {
     const double t =
         length > 0 ? std::clamp(glm::dot(query - face[k], edge) / length, 0.0, 1.0) : 0.0;
     std::array<double, 3> weights{};
-    weights[k] = 1 - t, weights[next] = t;
+    weights[k] = 1 - t;
+    weights[next] = t;
     Offer(face, weights, query, &best);
   }
   const dvec3 normal = glm::cross(face[1] - face[0], face[2] - face[0]);
@@ -82,7 +83,8 @@ std::size_t FaceTree::Build(std::size_t begin, std::size_t end) {
   Node node{faces_[order_[begin]][0], faces_[order_[begin]][0], begin, end, 0};
   for (std::size_t i = begin; i < end; ++i) {
     for (const dvec3& p : faces_[order_[i]]) {
-      node.low = glm::min(node.low, p), node.high = glm::max(node.high, p);
+      node.low = glm::min(node.low, p);
+      node.high = glm::max(node.high, p);
     }
   }
   nodes_.push_back(node);
@@ -101,7 +103,8 @@ void FaceTree::SplitAtMedian(std::size_t begin, std::size_t middle, std::size_t 
   };
   dvec3 low = centroid(order_[begin]), high = low;
   for (std::size_t i = begin; i < end; ++i) {
-    low = glm::min(low, centroid(order_[i])), high = glm::max(high, centroid(order_[i]));
+    low = glm::min(low, centroid(order_[i]));
+    high = glm::max(high, centroid(order_[i]));
   }
   const dvec3 size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;

@@ -24,7 +24,8 @@ class KeypointScore {
     double sum = 0, count = 0;
     for (std::size_t k = 0; k < seen_.size(); ++k) {
       if (seen_[k] == 0) continue;
-      sum += static_cast<double>(right_[k]) / static_cast<double>(seen_[k]), count += 1;
+      sum += static_cast<double>(right_[k]) / static_cast<double>(seen_[k]);
+      count += 1;
     }
     return count > 0 ? std::optional(sum / count) : std::nullopt;
   }

@@ -22,7 +22,8 @@ void NearestPoint::Build(std::size_t begin, std::size_t end) {
   if (end - begin < 2) return;
   glm::dvec3 low = nodes_[begin].at, high = low;
   for (std::size_t i = begin; i < end; ++i) {
-    low = glm::min(low, nodes_[i].at), high = glm::max(high, nodes_[i].at);
+    low = glm::min(low, nodes_[i].at);
+    high = glm::max(high, nodes_[i].at);
   }
   const glm::dvec3 size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;

@@ -76,7 +76,10 @@ Result<std::vector<Nearest>> NearestRows(const FeatureRows& from, const FeatureR
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t j = 0; j < to.rows(); ++j) {
       const double d = SquaredDistance(from.Row(i), to.Row(j));
-      if (d < least) least = d, out[i].row = j;
+      if (d < least) {
+        least = d;
+        out[i].row = j;
+      }
     }
     out[i].distance = std::sqrt(least);
   });

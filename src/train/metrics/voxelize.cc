@@ -103,7 +103,8 @@ class Grid {
       for (int u = 0; u < n_; ++u) {
         for (int v = 0; v < n_; ++v) {
           std::array<int, 3> at{};
-          at[(axis + 1) % 3] = u, at[(axis + 2) % 3] = v;
+          at[(axis + 1) % 3] = u;
+          at[(axis + 2) % 3] = v;
           CarveRay(at, axis, false);
           CarveRay(at, axis, true);
         }

@@ -27,8 +27,10 @@ template <class Camera, class Row, class Visit>
 void ForEachCameraNumber(Camera& camera, Row& row, const Visit& visit) {
   for (std::size_t i = 0; i < 9; ++i) visit(camera.rotation[i], row[i]);
   for (std::size_t i = 0; i < 3; ++i) visit(camera.translation[i], row[9 + i]);
-  visit(camera.fx, row[12]), visit(camera.fy, row[13]);
-  visit(camera.cx, row[14]), visit(camera.cy, row[15]);
+  visit(camera.fx, row[12]);
+  visit(camera.fy, row[13]);
+  visit(camera.cx, row[14]);
+  visit(camera.cy, row[15]);
 }
 
 template <class T>
@@ -132,7 +134,8 @@ SceneT<T> BatchRender<T>::SceneOf(std::size_t image) {
   SetRecords(image);
   const std::size_t mesh = MeshOf(image);
   SceneT<T> scene;
-  scene.positions = Row(kPositions, mesh), scene.faces = job_.faces;
+  scene.positions = Row(kPositions, mesh);
+  scene.faces = job_.faces;
   scene.camera = CameraCast<T>(job_.cameras[image]);
   if (Has(kCameras)) {
     const std::span<const T> row = Row(kCameras, image);
@@ -155,7 +158,9 @@ Status BatchRender<T>::Forward() {
   TILEGRAD_TRY(Check());
   const std::size_t images = job_.cameras.size();
   uvs_.assign(job_.uvs.begin(), job_.uvs.end());
-  textures_.resize(images), surfaces_.resize(images), lights_.resize(images);
+  textures_.resize(images);
+  surfaces_.resize(images);
+  lights_.resize(images);
   std::vector<SceneT<T>> scenes;
   for (std::size_t n = 0; n < images; ++n) scenes.push_back(SceneOf(n));
   return renderer_.Render(scenes, job_.options, {.attributes = false, .normals = job_.normals},
@@ -215,7 +220,10 @@ RenderedImages Render(SceneRenderer& renderer, const SceneVars& vars, RenderJob 
   std::vector<nn::Var> inputs;
   std::vector<nn::Shape> shapes;
   for (const nn::Var& var : slots) {
-    if (var.valid()) inputs.push_back(var), shapes.push_back(var.shape());
+    if (var.valid()) {
+      inputs.push_back(var);
+      shapes.push_back(var.shape());
+    }
   }
   auto backward = [batch, &context, shapes](std::span<const nn::Tensor> d_outputs) {
     std::vector<nn::Tensor> d_inputs;

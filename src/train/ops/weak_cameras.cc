@@ -48,7 +48,8 @@ struct Projection {
       const auto camera = CameraAt(cameras.span<T>().data() + kRow * b);
       for (std::size_t k = b * count(); k < (b + 1) * count(); ++k) {
         const auto seen = ProjectWeakly(camera, PointAt(points.span<T>().data() + 3 * k));
-        out[2 * k] = seen[0], out[2 * k + 1] = seen[1];
+        out[2 * k] = seen[0];
+        out[2 * k + 1] = seen[1];
       }
     }
   }
@@ -71,15 +72,23 @@ struct Projection {
 
 template <class T>
 void PutPinhole(const CameraT<T>& camera, T* row) {
-  std::copy_n(camera.rotation, 9, row), std::copy_n(camera.translation, 3, row + 9);
-  row[12] = camera.fx, row[13] = camera.fy, row[14] = camera.cx, row[15] = camera.cy;
+  std::copy_n(camera.rotation, 9, row);
+  std::copy_n(camera.translation, 3, row + 9);
+  row[12] = camera.fx;
+  row[13] = camera.fy;
+  row[14] = camera.cx;
+  row[15] = camera.cy;
 }
 
 template <class T>
 CameraT<T> PinholeAt(const T* row) {
   CameraT<T> camera;
-  std::copy_n(row, 9, camera.rotation), std::copy_n(row + 9, 3, camera.translation);
-  camera.fx = row[12], camera.fy = row[13], camera.cx = row[14], camera.cy = row[15];
+  std::copy_n(row, 9, camera.rotation);
+  std::copy_n(row + 9, 3, camera.translation);
+  camera.fx = row[12];
+  camera.fy = row[13];
+  camera.cx = row[14];
+  camera.cy = row[15];
   return camera;
 }
 

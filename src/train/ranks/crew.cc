@@ -21,7 +21,10 @@ constexpr auto kPatience = std::chrono::seconds(60);
 // by a zero byte.
 std::string Report(const Transport& ranks, const Status& own, const std::vector<Trait>& traits) {
   std::string text;
-  const auto add = [&](const std::string& part) { text += part, text += '\0'; };
+  const auto add = [&](const std::string& part) {
+    text += part;
+    text += '\0';
+  };
   add(ranks.host());
   add(std::to_string(static_cast<int>(own.code())));
   add(own.message());
@@ -63,7 +66,8 @@ Status CheckReport(std::size_t rank, const std::string& report, const std::strin
 Crew::Crew(Transport& ranks) : ranks_(ranks) {
   if (!leads()) return;
   const auto followers = static_cast<std::size_t>(ranks.size() - 1);
-  alarms_.resize(followers), rung_.resize(followers);
+  alarms_.resize(followers);
+  rung_.resize(followers);
   for (std::size_t i = 0; i < followers; ++i) {
     tickets_.push_back(ranks.Receive({static_cast<int>(i) + 1, MessageKind::kAlarm},
                                      std::as_writable_bytes(std::span(alarms_[i]))));

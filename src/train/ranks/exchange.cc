@@ -61,7 +61,8 @@ float* Exchange::SumOf(std::size_t subtree, std::size_t bucket) {
 void Exchange::Start(std::size_t bucket) {
   const std::scoped_lock lock(mutex_);
   Moving& m = moving_[started_++];
-  m.bucket = bucket, m.phase = Phase::kParts;
+  m.bucket = bucket;
+  m.phase = Phase::kParts;
   const int number = static_cast<int>(bucket), me = ranks_.rank();
   const std::size_t mine = Piece(bucket, me).size();
   for (std::size_t i = 0; i < subtrees_.size(); ++i) {
@@ -131,9 +132,14 @@ bool Exchange::Advance() {
     moved |= Drop(&m.rest);
     if (m.phase == Phase::kParts && m.parts.empty()) {
       Fold(m.bucket);
-      m.phase = Phase::kTotals, moved = true;
+      m.phase = Phase::kTotals;
+      moved = true;
     }
-    if (m.phase == Phase::kTotals && m.rest.empty()) m.phase = Phase::kDone, ++done_, moved = true;
+    if (m.phase == Phase::kTotals && m.rest.empty()) {
+      m.phase = Phase::kDone;
+      ++done_;
+      moved = true;
+    }
   }
   return moved;
 }

@@ -22,7 +22,8 @@ GradientSums::GradientSums(nn::Context& context, const Shape& shape,
                            std::vector<nn::NamedTensor> statistics)
     : context_(context), shape_(shape), statistics_(std::move(statistics)) {
   for (const nn::NamedTensor& t : statistics_) statistics_numbers_ += t.value.elements();
-  before_.resize(statistics_numbers_), after_.resize(statistics_numbers_);
+  before_.resize(statistics_numbers_);
+  after_.resize(statistics_numbers_);
   const int ranks = shape.ranks ? shape.ranks->size() : 1;
   const int rank = shape.ranks ? shape.ranks->rank() : 0;
   const std::vector<Subtree> all = SubtreesOf(ranks, shape.portions);
@@ -36,7 +37,8 @@ GradientSums::GradientSums(nn::Context& context, const Shape& shape,
     }
     own_.push_back(s);
   }
-  levels_.resize(levels), sums_.resize(own_.size());
+  levels_.resize(levels);
+  sums_.resize(own_.size());
   if (ranks <= 1) return;
   exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
   share_ = std::make_unique<WeightShare>(*shape.ranks, context.workers(), *exchange_);
@@ -62,7 +64,8 @@ void GradientSums::BeginUpdate() {
 void GradientSums::GiveUp() { SetStatistics(before_.data()); }
 
 void GradientSums::BeginPortion(std::size_t i) {
-  at_ = i, told_ = false;
+  at_ = i;
+  told_ = false;
   if (i > 0) SetStatistics(before_.data());
 }
 

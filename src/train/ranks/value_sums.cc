@@ -13,7 +13,8 @@ ValueSums::ValueSums(std::int64_t portions, Transport* ranks)
     own_.push_back(i);
     levels = std::max(levels, ClimbOf(subtrees_[i].count - 1));
   }
-  rows_.resize(subtrees_.size()), levels_.resize(levels);
+  rows_.resize(subtrees_.size());
+  levels_.resize(levels);
 }
 
 void ValueSums::Add(std::span<const double> numbers) {

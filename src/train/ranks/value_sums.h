@@ -16,7 +16,10 @@ class ValueSums {
  public:
   ValueSums(std::int64_t portions, Transport* ranks);
 
-  void BeginUpdate() { subtree_ = 0, leaf_ = 0; }
+  void BeginUpdate() {
+    subtree_ = 0;
+    leaf_ = 0;
+  }
   // Of each portion of this rank in turn; as many numbers every time, on every rank.
   void Add(std::span<const double> numbers);
   // On rank 0 the sums of all portions, else nothing. `meanwhile` as for Await; after a false the

@@ -29,8 +29,10 @@ void WeightShare::PlacesOf(const BucketLayout& layout, int rank, int ranks,
 
 void WeightShare::Prepare(Job job) {
   job_ = std::move(job);
-  finished_ = false, seconds_waited_ = 0;
-  own_.clear(), foreign_.clear();
+  finished_ = false;
+  seconds_waited_ = 0;
+  own_.clear();
+  foreign_.clear();
   for (int rank = 0; rank < ranks_.size(); ++rank)
     PlacesOf(*job_.layout, rank, ranks_.size(), rank == ranks_.rank() ? &own_ : &foreign_);
   const std::size_t buckets = job_.layout->buckets();

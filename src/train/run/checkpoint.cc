@@ -35,10 +35,15 @@ std::optional<T> Number(const std::map<std::string, std::string>& metadata,
 std::string ChecksumOf(const nn::TensorFile& file) {
   Hash hash;
   for (const auto& [key, value] : file.metadata) {
-    if (key != kChecksum) hash.Add(key), hash.Add(value);
+    if (key != kChecksum) {
+      hash.Add(key);
+      hash.Add(value);
+    }
   }
   for (const nn::NamedTensor& t : file.tensors) {
-    hash.Add(t.name), hash.Add(nn::NameOf(t.value.dtype())), hash.Add(t.value.shape().ToString());
+    hash.Add(t.name);
+    hash.Add(nn::NameOf(t.value.dtype()));
+    hash.Add(t.value.shape().ToString());
     hash.AddBytes(t.value.raw(), t.value.bytes());
   }
   return hash.Text();

@@ -42,7 +42,8 @@ Status CheckSettings(const RunPlan& plan, const RunWork& work, const std::string
                      const Path& place, const std::string& may_differ) {
   TILEGRAD_ASSIGN(std::string then, work.ResultSettings(before, place.string()));
   TILEGRAD_ASSIGN(std::string now, work.ResultSettings(plan.settings, "this run"));
-  then = WithoutKey(then, may_differ), now = WithoutKey(now, may_differ);
+  then = WithoutKey(then, may_differ);
+  now = WithoutKey(now, may_differ);
   if (then == now) return {};
   return InvalidArgument(
       "{}: was started with another configuration: {}; resume with that one, or start anew with "
@@ -189,8 +190,10 @@ Status Session::Draw() {
 
 Status Session::OneStep() {
   const Schedule& s = plan_.schedule;
-  values_.terms.clear(), values_.also.clear();
-  values_.images = 0, values_.stream_seconds = values_.wait_seconds = values_.summed_numbers = 0;
+  values_.terms.clear();
+  values_.also.clear();
+  values_.images = 0;
+  values_.stream_seconds = values_.wait_seconds = values_.summed_numbers = 0;
   TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
   ++done_;
   images_ += values_.images;

@@ -74,7 +74,8 @@ Status WriteKeypointNames(const Path& folder, const PhotographSet& set) {
   std::vector<double> mirror;
   for (const int m : set.mirror) mirror.push_back(m + 1);
   MatArray names;
-  names.kind = io::MatKind::kCell, names.dims = {1, set.keypoint_names.size()};
+  names.kind = io::MatKind::kCell;
+  names.dims = {1, set.keypoint_names.size()};
   for (const std::string& name : set.keypoint_names) names.elements.push_back(MatArray::Text(name));
   return io::SaveMat(
       folder / "data/car_kps.mat",

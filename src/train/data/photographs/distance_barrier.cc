@@ -15,7 +15,8 @@ void TransformLine(double* f, std::size_t n, std::size_t stride) {
   std::vector<std::size_t> tops(n);
   for (std::size_t q = 0; q < n; ++q) in[q] = f[q * stride];
   std::size_t last = 0;
-  edges[0] = -kFar, edges[1] = kFar;
+  edges[0] = -kFar;
+  edges[1] = kFar;
   for (std::size_t q = 1; q < n; ++q) {
     const auto meet = [&](std::size_t p) {
       const auto x = static_cast<double>(q), y = static_cast<double>(p);
@@ -23,7 +24,9 @@ void TransformLine(double* f, std::size_t n, std::size_t stride) {
     };
     double at = meet(tops[last]);
     while (last > 0 && at <= edges[last]) at = meet(tops[--last]);
-    tops[++last] = q, edges[last] = at, edges[last + 1] = kFar;
+    tops[++last] = q;
+    edges[last] = at;
+    edges[last + 1] = kFar;
   }
   std::size_t k = 0;
   for (std::size_t q = 0; q < n; ++q) {

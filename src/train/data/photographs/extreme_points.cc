@@ -40,7 +40,8 @@ std::vector<glm::vec3> FindExtremePoints(const Mesh& mesh) {
     float count = 0;
     for (const glm::vec3& p : mesh.positions) {
       if (glm::dot(along, p - centre) < farthest - 0.01f) continue;
-      sum += p, count += 1;
+      sum += p;
+      count += 1;
     }
     out.push_back(sum / count);
   }

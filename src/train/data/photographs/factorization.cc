@@ -123,15 +123,20 @@ Normalization NormalizationOf(const std::vector<Keypoint>& view) {
   double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
   for (const Keypoint& k : view) {
     if (!k.visible) continue;
-    low[0] = std::min(low[0], k.x), high[0] = std::max(high[0], k.x);
-    low[1] = std::min(low[1], k.y), high[1] = std::max(high[1], k.y);
+    low[0] = std::min(low[0], k.x);
+    high[0] = std::max(high[0], k.x);
+    low[1] = std::min(low[1], k.y);
+    high[1] = std::max(high[1], k.y);
   }
   return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2,
           std::max({high[0] - low[0], high[1] - low[1], 1e-9})};
 }
 
 std::vector<Keypoint> Normalized(std::vector<Keypoint> view, const Normalization& n) {
-  for (Keypoint& k : view) k.x = (k.x - n.x) / n.extent, k.y = (k.y - n.y) / n.extent;
+  for (Keypoint& k : view) {
+    k.x = (k.x - n.x) / n.extent;
+    k.y = (k.y - n.y) / n.extent;
+  }
   return view;
 }
 

@@ -68,11 +68,13 @@ class FolderReader {
 
   // `names` of pictures in the folder `place`.
   Result<PhotographSet> Read(const Path& place, const std::vector<Path>& names) {
-    set_.folder = folder_, set_.source = "photographs";
+    set_.folder = folder_;
+    set_.source = "photographs";
     int index = 0;
     for (const Path& name : names) {
       Photograph photo;
-      photo.id = name.string(), photo.image = place / name;
+      photo.id = name.string();
+      photo.image = place / name;
       photo.split = ++index % kTestEvery == 0 ? Split::kTest : Split::kTrain;
       TILEGRAD_ASSIGN(const ImageU8 image, Masked(folder_, photo.image));
       TILEGRAD_TRY(SetMask(image, &photo));

@@ -80,7 +80,9 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
                                     const CropRule& rule, int size, const Workers& workers,
                                     const ProgressSink& progress, const StopFlag& stop) {
   PhotoStore store;
-  store.rule_ = rule, store.mirror_ = set.mirror, store.size_ = size;
+  store.rule_ = rule;
+  store.mirror_ = set.mirror;
+  store.size_ = size;
   store.stored_ = size + 2 * static_cast<int>(std::ceil(kMargin * size));
   for (const int i : photographs)
     store.photos_.push_back(&set.photographs[static_cast<std::size_t>(i)]);

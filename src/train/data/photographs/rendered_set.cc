@@ -65,7 +65,8 @@ class Photographer {
 
   static Camera CameraOf(Rng& rng) {
     Lens lens;
-    lens.width = lens.height = kSide, lens.fov_y = kFov;
+    lens.width = lens.height = kSide;
+    lens.fov_y = kFov;
     const double azimuth = rng.Uniform(0, 360), elevation = rng.Uniform(-5, 30);
     return OrbitCamera<float>(lens, azimuth, elevation, rng.Uniform(2.3, 3.2));
   }
@@ -126,9 +127,11 @@ class Photographer {
     const double deviation = noise_.keypoint * photo->box.longer_side();
     auto visible = std::ranges::count_if(photo->keypoints, &Keypoint::visible);
     for (Keypoint& k : photo->keypoints) {
-      k.x += deviation * rng.Normal(), k.y += deviation * rng.Normal();
+      k.x += deviation * rng.Normal();
+      k.y += deviation * rng.Normal();
       if (rng.Uniform() >= noise_.hidden || !k.visible || visible <= 5) continue;
-      k.visible = false, --visible;
+      k.visible = false;
+      --visible;
     }
     photo->mask = DisturbedMask(photo->mask, noise_.mask, rng);
   }
@@ -172,7 +175,10 @@ Status FindCameras(PhotographSet* set) {
   job.mirror = set->mirror;
   for (const Photograph& photo : set->photographs) job.views.push_back(photo.keypoints);
   for (int k = 0; k < 12; k += 2) job.left.emplace_back(k + 1, k);
-  for (int k = 0; k < 2; ++k) job.up.emplace_back(k, 8 + k), job.up.emplace_back(2 + k, 10 + k);
+  for (int k = 0; k < 2; ++k) {
+    job.up.emplace_back(k, 8 + k);
+    job.up.emplace_back(2 + k, 10 + k);
+  }
   for (int k = 0; k < 2; ++k) job.front.emplace_back(6 + k, 4 + k);
   TILEGRAD_ASSIGN(const Structure found, FactorizeKeypoints(job));
   set->mean_keypoints = found.shape;
@@ -193,7 +199,8 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
   for (int w = 0; w < workers.count(); ++w)
     photographers.push_back(std::make_unique<Photographer>(job, noise, backgrounds));
   PhotographSet set;
-  set.source = "pascal3d", set.mirror = ExtremeMirror();
+  set.source = "pascal3d";
+  set.mirror = ExtremeMirror();
   for (const ExtremePoint& point : kExtremePoints) set.keypoint_names.emplace_back(point.name);
   std::vector<Photograph> all(count);
   std::vector<Status> failures(count);

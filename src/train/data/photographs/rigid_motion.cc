@@ -138,8 +138,7 @@ Eigen::Matrix3d MetricUpgrade(const std::vector<Motion>& motions) {
   }
   a += weight * mean * mean.transpose();
   const Vector6 q = SolvePositive<6>(a, weight * mean);
-  Eigen::Matrix3d metric;
-  metric << q[0], q[1], q[2], q[1], q[3], q[4], q[2], q[4], q[5];
+  const Eigen::Matrix3d metric{{q[0], q[1], q[2]}, {q[1], q[3], q[4]}, {q[2], q[4], q[5]}};
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(metric);
   const double least = 1e-4 * std::max(parts.eigenvalues().maxCoeff(), 1e-300);
   return parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).cwiseSqrt().asDiagonal();
@@ -148,8 +147,8 @@ Eigen::Matrix3d MetricUpgrade(const std::vector<Motion>& motions) {
 // The scaled rotation nearest to two rows: (M M^T)^(-1/2) M.
 WeakPerspective NearestCamera(const Motion& m) {
   const double cross = Dot(m.rows[0], m.rows[1]);
-  Eigen::Matrix2d products;
-  products << Dot(m.rows[0], m.rows[0]), cross, cross, Dot(m.rows[1], m.rows[1]);
+  const Eigen::Matrix2d products{{Dot(m.rows[0], m.rows[0]), cross},
+                                 {cross, Dot(m.rows[1], m.rows[1])}};
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(products);
   const Eigen::Vector2d roots = parts.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
   const Eigen::Matrix2d inverse =

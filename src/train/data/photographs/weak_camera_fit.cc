@@ -50,7 +50,8 @@ std::array<double, 4> Turned(const std::array<double, 4>& q, double x, double y,
 WeakPerspective Moved(const WeakPerspective& camera, const Vector6& by) {
   WeakPerspective out = camera;
   out.scale = std::max(camera.scale + by[0], 0.1 * camera.scale);
-  out.translation[0] += by[1], out.translation[1] += by[2];
+  out.translation[0] += by[1];
+  out.translation[1] += by[2];
   out.quaternion = Turned(camera.quaternion, by[3], by[4], by[5]);
   return out;
 }
@@ -72,7 +73,9 @@ WeakPerspective FitWeakCamera(const std::vector<PlanePoint>& shape,
       continue;
     }
     const bool settled = at.squares - there.squares < 1e-12 * at.squares;
-    camera = next, at = there, damping *= 0.2;
+    camera = next;
+    at = there;
+    damping *= 0.2;
     if (settled) break;
   }
   return camera;

@@ -40,7 +40,8 @@ Status Paint(const io::FileSource& files, const std::string& image, io::LoadedMe
   if (mesh.corner_uvs.empty()) return DataLoss("{}: has no uv", files.Describe(image));
   mesh.textures = {{image, io::ToColor(std::move(pixels))}};
   mesh.materials.assign(1, {});
-  mesh.materials[0].base_color = glm::vec4(1), mesh.materials[0].base_color_texture = 0;
+  mesh.materials[0].base_color = glm::vec4(1);
+  mesh.materials[0].base_color_texture = 0;
   mesh.face_materials.clear();
   loaded->warnings.clear();
   return {};

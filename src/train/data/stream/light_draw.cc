@@ -78,7 +78,8 @@ Lighting LightingOf(const LightConfig& config) { return Find(config.model)->ligh
 Surface SurfaceUnder(const LightConfig& config) {
   Surface surface;
   surface.ambient.fill(static_cast<float>(config.ambient));
-  surface.diffuse.fill(1), surface.specular.fill(0.4f);
+  surface.diffuse.fill(1);
+  surface.specular.fill(0.4f);
   return surface;
 }
 

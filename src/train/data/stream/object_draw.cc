@@ -12,7 +12,10 @@ double Factor(Rng& rng, double log_range) { return std::exp(rng.Uniform(-log_ran
 
 void Normalize(float half_extent, std::vector<glm::vec3>* positions) {
   glm::vec3 low = positions->front(), high = low;
-  for (const glm::vec3& p : *positions) low = glm::min(low, p), high = glm::max(high, p);
+  for (const glm::vec3& p : *positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
   const glm::vec3 half = 0.5f * (high - low), centre = 0.5f * (high + low);
   const float scale = half_extent / std::max({half.x, half.y, half.z, 1e-6f});
   for (glm::vec3& p : *positions) p = scale * (p - centre);
@@ -47,7 +50,8 @@ void DrawShape(const StreamConfig& config, std::span<const glm::vec3> positions,
   for (const glm::vec3& p : positions) {
     glm::vec3 q = scale * glm::vec3(x(p.x), y(p.y), z(p.z));
     const auto width = static_cast<float>(std::exp(0.5 * taper * p.y / half_extent));
-    q.x *= width, q.z *= width;
+    q.x *= width;
+    q.z *= width;
     out->push_back(q);
   }
   Normalize(half_extent, out);

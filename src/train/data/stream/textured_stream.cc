@@ -111,7 +111,8 @@ void TexturedStream::Worker::DrawViews(const Job& job, const Scene& object,
   sh.resize(views.size());
   scenes.assign(views.size(), object);
   for (Surface& surface : surfaces) {
-    surface.ambient = under.ambient, surface.diffuse = under.diffuse;
+    surface.ambient = under.ambient;
+    surface.diffuse = under.diffuse;
     surface.specular = under.specular;
   }
   // Shininess is one of the light's numbers here: one set of surfaces for each view.
@@ -212,7 +213,10 @@ Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appeara
   const Lighting lighting = appearance == Appearance::kTexture ? Lighting::kNone : of_job;
   w.shown = w.scenes;
   w.white = w.surfaces;
-  for (Surface& surface : w.white) surface.base_color = {1, 1, 1}, surface.texture = -1;
+  for (Surface& surface : w.white) {
+    surface.base_color = {1, 1, 1};
+    surface.texture = -1;
+  }
   for (std::size_t v = 0; v < w.shown.size(); ++v) {
     Scene& scene = w.shown[v];
     scene.shading.lighting = lighting;
@@ -223,7 +227,9 @@ Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appeara
     if (appearance != Appearance::kLight) continue;
     const std::size_t count = scene.surfaces.size();
     scene.surfaces = std::span(w.white).subspan(v * count, count);
-    scene.colors = {}, scene.textures = {}, scene.uvs = {};
+    scene.colors = {};
+    scene.textures = {};
+    scene.uvs = {};
   }
   TILEGRAD_TRY(w.Take(job_));
   return std::span<const float>(w.rgba);

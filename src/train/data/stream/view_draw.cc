@@ -17,7 +17,8 @@ void Roll(double angle, Camera* camera) {
   const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
   const auto turn = [&](float& x, float& y) {
     const float was = x;
-    x = c * was - s * y, y = s * was + c * y;
+    x = c * was - s * y;
+    y = s * was + c * y;
   };
   for (int i = 0; i < 3; ++i) turn(camera->rotation[i], camera->rotation[3 + i]);
   turn(camera->translation[0], camera->translation[1]);
