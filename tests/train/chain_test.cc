@@ -138,7 +138,9 @@ struct SmallProblem {
                       .color_bias = 0.4};
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
     config.batch = 3;
-    store.models = 2, store.views = 3, store.size = 16;
+    store.models = 2;
+    store.views = 3;
+    store.size = 16;
     CameraRule rule;
     rule.lens.width = rule.lens.height = store.size;
     Rng rng(5);
@@ -235,7 +237,8 @@ TEST(Chain, SoDoThoseOfN3mrsVertices) {
 TEST(Chain, SoDoThoseThroughSoftRas) {
   SmallProblem p;
   p.config.render.rule = "softras";
-  p.config.rivals.softras.sigma = 3e-3, p.config.rivals.softras.exact_product = true;
+  p.config.rivals.softras.sigma = 3e-3;
+  p.config.rivals.softras.exact_product = true;
   ExpectGradientsAgreeWithDifferences(p);
   p.config.rivals.softras_color = p.config.rivals.softras_colors.position_gradient = true;
   p.config.rivals.softras_colors.gamma = 1e-2;
@@ -285,7 +288,8 @@ void ExpectSameBitsAndLearning(const std::string& rule, bool color = false) {
     const Workers workers(count);
     nn::Context context(workers);
     SingleImageConfig config = p.config;
-    config.optimizer.learning_rate = 3e-3, config.render.rule = rule;
+    config.optimizer.learning_rate = 3e-3;
+    config.render.rule = rule;
     TrainStep step(context, config, p.store.size);
     for (std::int64_t s = 0; s < 60; ++s) {
       const auto values = RunStep(step, GatherBatch(context, p.store, p.samples), s);

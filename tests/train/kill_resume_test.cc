@@ -179,7 +179,8 @@ TEST_F(KillResume, TerminationSavesAndSaysHowToGoOn) {
 
 // As nohup and a shell's background do.
 TEST_F(KillResume, SignalsThatWereIgnoredStayIgnored) {
-  steps_ = 100000, minutes_ = "0.03";
+  steps_ = 100000;
+  minutes_ = "0.03";
   const pid_t child = Start("run", 1, [] {
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
@@ -193,7 +194,8 @@ TEST_F(KillResume, SignalsThatWereIgnoredStayIgnored) {
 
 // The progress line, after two seconds, is the first that is written there.
 TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
-  steps_ = 100000, minutes_ = "0.05";
+  steps_ = 100000;
+  minutes_ = "0.05";
   const pid_t child = Start("run", 1, [] {
     int ends[2] = {-1, -1};
     if (::pipe(ends) != 0 || ::dup2(ends[1], 2) < 0 || ::close(ends[0]) != 0) ::_exit(126);

@@ -112,13 +112,16 @@ TEST_F(PhotographParts, SliversStayFinite) {
 TEST(KeypointScores, AreMeansOverKeypoints) {
   KeypointScore score(3, 0.1);
   EXPECT_FALSE(score.Mean());
-  score.Add(0, 0.05), score.Add(0, 0.1), score.Add(1, 0.0);
+  score.Add(0, 0.05);
+  score.Add(0, 0.1);
+  score.Add(1, 0.0);
   EXPECT_EQ(score.Mean(), 0.75);
 }
 
 TEST(DistanceBarriers, DistancesAreEuclidean) {
   std::vector<float> mask(49, 0.0f);
-  mask[3 * 7 + 2] = 1, mask[0] = 1;
+  mask[3 * 7 + 2] = 1;
+  mask[0] = 1;
   const auto squares = SquaredDistances(mask, 7, true);
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 7; ++x) {

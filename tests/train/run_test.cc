@@ -158,7 +158,11 @@ TEST_F(RunTest, FieldsOfEveryType) {
   ASSERT_TRUE(OverrideFields({"t.flag=true", "t.small=4"}, fields).ok());
   EXPECT_EQ(ResultSettings(fields), "t.word = b\nt.small = 4\nu.number = 0.5\nt.flag = true\n");
   const std::string text = WriteFields(fields);
-  word = "", large = 0, small = 0, number = 0, flag = false;
+  word = "";
+  large = 0;
+  small = 0;
+  number = 0;
+  flag = false;
   ASSERT_TRUE(ReadFields(text, fields).ok());
   EXPECT_EQ(WriteFields(fields), text);
   EXPECT_EQ(large, 7);
@@ -389,7 +393,8 @@ TEST(MirroredCamera, SeesTheMirroredWorldFlipped) {
   Lens lens;
   lens.width = lens.height = size;
   Camera camera = OrbitCamera(lens, 37, 21, 1.7);
-  camera.cx += 3, camera.translation[0] = 0.25f;  // off the middle, and not towards it
+  camera.cx += 3;
+  camera.translation[0] = 0.25f;  // off the middle, and not towards it
   const Camera mirrored = MirroredCamera(camera, size);
   const auto project = [](const Camera& c, std::array<float, 3> p) {
     std::array<float, 3> q;

@@ -13,7 +13,8 @@ class EvaluateShapesTest : public TempFolderTest {
  protected:
   void SetUp() override {
     BuildOptions options;
-    options.image_size = 8, options.views = 1;
+    options.image_size = 8;
+    options.views = 1;
     const StopFlag stop = false;
     ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, folder_, Workers(1), {}, stop).ok());
   }
@@ -80,7 +81,10 @@ TEST_F(EvaluateShapesTest, TheNearestPictureIsOfTrainingModelsThatItMayKnow) {
   const auto all = static_cast<int>(dataset.Select(Split::kTrain).size());
   const auto score = [&](Split split, int searched) {
     return Score(dataset,
-                 [=](EvaluationJob& job) { job.split = split, job.retrieval_models = searched; })
+                 [=](EvaluationJob& job) {
+                   job.split = split;
+                   job.retrieval_models = searched;
+                 })
         .value();
   };
   EXPECT_EQ(score(Split::kTest, 1000).retrieval_models, all);

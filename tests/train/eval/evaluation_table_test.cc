@@ -11,8 +11,11 @@ namespace tilegrad::train::evaluation_table_test {
 
 Evaluation Named(const std::string& name) {
   Evaluation e;
-  e.predictor = name, e.split = "test", e.views_per_model = 1;
-  e.classes = {name}, e.class_models = {1};
+  e.predictor = name;
+  e.split = "test";
+  e.views_per_model = 1;
+  e.classes = {name};
+  e.class_models = {1};
   e.rows = {{name, {{0.5, 0.25}}, {0.5, 0.25}}};
   e.models = {{name, name, {0.5, 0.25}}};
   return e;

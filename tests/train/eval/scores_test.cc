@@ -70,7 +70,8 @@ TEST(PredictionPictures, ShowUnlitColours) {
     EXPECT_EQ(image[768], 0);
   }
   Mesh broken;
-  broken.positions = {glm::vec3(0)}, broken.faces = {{0, 0, 9}};
+  broken.positions = {glm::vec3(0)};
+  broken.faces = {{0, 0, 9}};
   EXPECT_FALSE(pictures.Draw(broken).ok());
 }
 
@@ -95,7 +96,8 @@ TEST(ImageIndex, FindsTheNearestAndSaysHowFarItIs) {
 
 TEST(ImageIndex, ThumbnailsAreMeans) {
   std::vector<std::uint8_t> image = Flat(0, 32);
-  image[0] = 255, image[1] = 1;  // two of the four pixels of the first mean: 64
+  image[0] = 255;
+  image[1] = 1;  // two of the four pixels of the first mean: 64
   const auto small = Thumbnail(image, 32);
   EXPECT_EQ(small.size(), 4u * 16 * 16);
   EXPECT_EQ(small[0], 64);

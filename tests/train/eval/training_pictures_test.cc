@@ -52,14 +52,18 @@ class TrainingPicturesTest : public TempFolderTest {
   // `shape`: what the models' shapes are called; "": each is its own.
   TrainingPictures Make(int models, const std::string& shape = "", int workers = 1) {
     DatasetInfo info;
-    info.source = "nmr", info.classes = {"ellipse"}, info.recipe = "0000000000000000";
+    info.source = "nmr";
+    info.classes = {"ellipse"};
+    info.recipe = "0000000000000000";
     info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
     info.views = kViews;
     ImageStore store{.bytes = {}, .cameras = {}, .models = models, .views = kViews, .size = kSize};
     std::vector<ModelInfo> infos;
     for (int m = 0; m < models; ++m) {
       ModelInfo& model = infos.emplace_back();
-      model.id = "m" + std::to_string(m), model.name = "a\tb " + model.id, model.shape = shape;
+      model.id = "m" + std::to_string(m);
+      model.name = "a\tb " + model.id;
+      model.shape = shape;
       for (int v = 0; v < kViews; ++v)
         AddPlanar(picture_.empty() ? Draw(Shown(m, v)) : picture_, &store.bytes);
     }

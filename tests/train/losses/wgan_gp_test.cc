@@ -113,7 +113,8 @@ class WganGpThroughRenderer : public WganGp {
       return nn::Parameter(context_,
                            context_.From({1, vertices, 3}, std::span<const double>(values)));
     };
-    positions_ = leaf(positions), colors_ = leaf(colors);
+    positions_ = leaf(positions);
+    colors_ = leaf(colors);
   }
   // [1, 3, 16, 16], lit up by alpha, so that positions matter at the outline, too.
   nn::Var Draw() {

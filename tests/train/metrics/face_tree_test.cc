@@ -57,7 +57,10 @@ TEST(FaceTree, FindsTheNearestOfAllFaces) {
     FaceTree::Nearest best;
     for (std::size_t f = 0; f < faces.size(); ++f) {
       const auto alone = FaceTree(std::span(&faces[f], 1)).Find(query);
-      if (alone.squared < best.squared) best = alone, best.face = static_cast<std::int32_t>(f);
+      if (alone.squared < best.squared) {
+        best = alone;
+        best.face = static_cast<std::int32_t>(f);
+      }
     }
     EXPECT_EQ(found.face, best.face);
     EXPECT_EQ(found.squared, best.squared);
@@ -130,7 +133,10 @@ TEST(FaceTree, EnclosesATorusButNotItsHole) {
   const FaceTree tree(faces);
   // The axis of the torus is that in which its box is shortest.
   dvec3 low = faces[0][0], high = low;
-  for (const Triangle& f : faces) low = glm::min(low, f[0]), high = glm::max(high, f[0]);
+  for (const Triangle& f : faces) {
+    low = glm::min(low, f[0]);
+    high = glm::max(high, f[0]);
+  }
   const dvec3 size = high - low;
   const int axis = size.x < size.y ? 0 : size.y < size.z ? 1 : 2;
   Rng rng(6);

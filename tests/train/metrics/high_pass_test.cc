@@ -45,7 +45,10 @@ TEST(HighPass, OutlinesDoNotCount) {
   std::vector<float> image(7 * 7, 0.0f);
   std::vector<std::uint8_t> covered(7 * 7, 0);
   for (int y = 1; y < 6; ++y) {
-    for (int x = 1; x < 6; ++x) image[y * 7 + x] = 0.5f, covered[y * 7 + x] = 255;
+    for (int x = 1; x < 6; ++x) {
+      image[y * 7 + x] = 0.5f;
+      covered[y * 7 + x] = 255;
+    }
   }
   EXPECT_GT(Energy(image, 1, 7, 7), 0.001);
   EXPECT_EQ(Energy(image, 1, 7, 7, covered), 0);

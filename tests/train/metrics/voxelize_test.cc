@@ -135,7 +135,9 @@ TEST(SampleSurface, PointsLieOnTheSurfaceByArea) {
     const bool first = p.x <= 1;
     EXPECT_TRUE(first || p.x >= 2);
     if (!first) continue;
-    ++small, x += p.x, y += p.y;
+    ++small;
+    x += p.x;
+    y += p.y;
   }
   // Five standard deviations: sqrt(n p (1 - p)) of the count, 1 / sqrt(12 m) of a mean.
   EXPECT_NEAR(small, n / 4, 5 * std::sqrt(n * 0.25 * 0.75));

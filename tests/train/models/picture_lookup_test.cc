@@ -21,7 +21,8 @@ class Lookup : public testing::Test {
  protected:
   Lookup() {
     view_.camera = OrbitCamera<float>({}, 70, 25, 1.6);
-    view_.camera.cx += 2, view_.camera.cy -= 3;
+    view_.camera.cx += 2;
+    view_.camera.cy -= 3;
     view_.light.direction = {0.48f, 0.6f, 0.64f};
   }
   void Draw(const Mesh& mesh, const LightConfig& light, Appearance appearance) {

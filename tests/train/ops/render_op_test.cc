@@ -56,8 +56,11 @@ struct Batch {
                fill(kImages * 9, 0.1, 0.4),
                cameras};
     job.faces = {ball.faces[0].data(), 3 * ball.faces.size()};
-    job.views = kViews, job.uvs = uvs, job.shading = shading;
-    job.options.width = job.options.height = kSide, job.options.delta = 1e-2;
+    job.views = kViews;
+    job.uvs = uvs;
+    job.shading = shading;
+    job.options.width = job.options.height = kSide;
+    job.options.delta = 1e-2;
     job.options.max_alpha_error = 0;
   }
 };

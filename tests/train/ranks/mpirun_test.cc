@@ -87,7 +87,8 @@ class Ranks : public TempFolderTest {
 
   void Use(const Kind& kind) {
     Write("tiny.toml", kind.config);
-    settings_ = kind.settings, data_ = kind.data;
+    settings_ = kind.settings;
+    data_ = kind.data;
     if (std::string_view(kind.name) != kGan.name) return;
     if (!std::filesystem::exists(folder_ / "textures")) MakeTextures("textures", "schedule.seed=1");
     settings_.push_back("textures.run=" + (folder_ / "textures").string());

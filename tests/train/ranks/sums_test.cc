@@ -189,7 +189,10 @@ TEST(GradientSums, AreMeansOverPortions) {
   const Bits got = MeansOf(kPortions, true);
   for (std::size_t i = 0; i < of_portion[0].size(); ++i) {
     double mean = 0, size = 0;
-    for (const auto& row : of_portion) mean += row[i] / kPortions, size += std::abs(row[i]);
+    for (const auto& row : of_portion) {
+      mean += row[i] / kPortions;
+      size += std::abs(row[i]);
+    }
     // Three additions in float, each to half a unit of the last place of at most `size`.
     EXPECT_NEAR(got[i], mean, 3 * 0x1p-24 * size / kPortions + 1e-30) << i;
   }

@@ -13,7 +13,8 @@ DatasetInfo SmallInfo() {
   DatasetInfo info;
   info.source = "folder";
   info.image_size = info.camera.lens.width = info.camera.lens.height = 32;
-  info.views = 12, info.camera.azimuth_step = -30;
+  info.views = 12;
+  info.camera.azimuth_step = -30;
   info.camera.elevation = 0;  // all of an ellipsoid is seen, and its outlines decide its shape
   return info;
 }

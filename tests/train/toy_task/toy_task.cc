@@ -55,8 +55,11 @@ Mesh BoxOf(const Numbers& size) { return Box({0, 0, 0}, {size[0], size[1], size[
 // 3D IoU of two boxes with one centre.
 double BoxIou(const Numbers& a, const Numbers& b) {
   double both = 1, volume_a = 1, volume_b = 1;
-  for (std::size_t i = 0; i < 3; ++i)
-    both *= std::min(a[i], b[i]), volume_a *= a[i], volume_b *= b[i];
+  for (std::size_t i = 0; i < 3; ++i) {
+    both *= std::min(a[i], b[i]);
+    volume_a *= a[i];
+    volume_b *= b[i];
+  }
   return both / (volume_a + volume_b - both);
 }
 
@@ -203,9 +206,11 @@ Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /
                                      const ProgressSink& /*progress*/, const StopFlag& stop) {
   Evaluation out;
   out.predictor = job.predictor.description();
-  out.split = "test", out.dataset_source = "random numbers";
+  out.split = "test";
+  out.dataset_source = "random numbers";
   out.views_per_model = 1;
-  out.classes = {"box"}, out.class_models = {10};
+  out.classes = {"box"};
+  out.class_models = {10};
   Rng rng(0, kTestStream);
   double untrained = 0, predicted = 0;
   for (int i = 0; i < out.class_models[0]; ++i) {
@@ -235,11 +240,13 @@ Result<Showcase> ToyTask::Show(const ShowcaseRequest& request, const Workers& /*
     const Numbers box = RandomBox(rng);
     TILEGRAD_ASSIGN(auto meshes, request.predictor.Predict(ImageOf(box)));
     Example& example = out.examples.emplace_back();
-    example.name = fmt::format("box {}", i), example.class_name = "box";
+    example.name = fmt::format("box {}", i);
+    example.class_name = "box";
     example.id = fmt::format("{}", i);
     example.pictures = {{PictureOf(box), "seen", "a colour"},
                         {PictureOf(SizeOf(meshes[0])), "predicted", "its size as a colour"}};
-    example.prediction = std::move(meshes[0]), example.truth = BoxOf(box);
+    example.prediction = std::move(meshes[0]);
+    example.truth = BoxOf(box);
   }
   return out;
 }

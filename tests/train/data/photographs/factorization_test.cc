@@ -51,7 +51,9 @@ Scene MakeScene(int views, double noise, std::uint64_t seed) {
     out.job.views.push_back(seen);
     out.cameras.push_back(camera);
   }
-  out.job.mirror = kMirror, out.job.left = kLeft, out.job.up = kUp;
+  out.job.mirror = kMirror;
+  out.job.left = kLeft;
+  out.job.up = kUp;
   return out;
 }
 
@@ -151,8 +153,10 @@ TEST(WeakCameraFit, FindsTheCamera) {
   const Scene scene = MakeScene(30, 0, 6);
   for (std::size_t v = 0; v < scene.cameras.size(); ++v) {
     WeakPerspective start = scene.cameras[v];
-    start.scale *= 1.3, start.translation[0] += 9;
-    start.quaternion[2] += 0.2, start.quaternion[0] -= 0.1;
+    start.scale *= 1.3;
+    start.translation[0] += 9;
+    start.quaternion[2] += 0.2;
+    start.quaternion[0] -= 0.1;
     const auto found = FitWeakCamera(kShape, scene.job.views[v], start);
     EXPECT_LT(WeakCameraError(kShape, scene.job.views[v], found), 1e-5);
     EXPECT_LT(AngleBetween(found, scene.cameras[v]), 1e-3);

@@ -189,7 +189,9 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   const auto source = Open(Row("one") + Row("two"));
   ASSERT_NE(source, nullptr);
   BuildOptions options;
-  options.image_size = 8, options.views = 2, options.split.test_share = 0.5;
+  options.image_size = 8;
+  options.views = 2;
+  options.split.test_share = 0.5;
   const StopFlag stop = false;
   const auto summary = BuildDataset(*source, options, folder_ / "out", Workers(2), {}, stop);
   ASSERT_TRUE(summary.ok()) << summary.status().message();
@@ -222,7 +224,8 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   const auto source = Open(Row("one"));
   ASSERT_NE(source, nullptr);
   BuildOptions options;
-  options.image_size = 8, options.views = 1;
+  options.image_size = 8;
+  options.views = 1;
   const StopFlag stop = false;
   ASSERT_TRUE(BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop).ok());
   std::string row = Row("one");

@@ -66,7 +66,8 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   EXPECT_EQ((*source)->entries()[0].id, "a_b");
   EXPECT_EQ((*source)->entries()[0].class_name, "solid");
   BuildOptions options;
-  options.image_size = 8, options.views = 2;
+  options.image_size = 8;
+  options.views = 2;
   const StopFlag stop = false;
   const auto summary = BuildDataset(**source, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_TRUE(summary.ok()) << summary.status().message();

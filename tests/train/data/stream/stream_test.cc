@@ -21,7 +21,8 @@ namespace tilegrad::train::stream_test {
 // Nothing is left to chance but the azimuth.
 StreamConfig Still() {
   StreamConfig c;
-  c.share = 1, c.stretch = c.taper = c.roll = c.jitter = 0;
+  c.share = 1;
+  c.stretch = c.taper = c.roll = c.jitter = 0;
   c.recolor = c.brightness = c.light = 0;
   c.elevation_low = c.elevation_high = 27;
   c.fov_low = c.fov_high = Lens{}.fov_y;
@@ -146,7 +147,9 @@ TEST(ViewDraw, WithoutChanceItIsAnOrbit) {
 // A square that faces the camera at the origin has the same size through any lens.
 TEST(ViewDraw, TheDistanceFollowsTheLens) {
   StreamConfig config = Still();
-  config.fov_low = 20, config.fov_high = 80, config.roll = 20;
+  config.fov_low = 20;
+  config.fov_high = 80;
+  config.roll = 20;
   const DatasetInfo info = Info(64);
   const float want = info.camera.View(0).fx / 1.45f;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
@@ -159,8 +162,10 @@ TEST(ViewDraw, TheDistanceFollowsTheLens) {
 // The height of the eye over its distance is the sine of the elevation.
 TEST(ViewDraw, OtherViewsHaveTheirOwnElevations) {
   StreamConfig config;
-  config.elevation_low = 10, config.elevation_high = 20;
-  config.around_low = -40, config.around_high = -30;
+  config.elevation_low = 10;
+  config.elevation_high = 20;
+  config.around_low = -40;
+  config.around_high = -30;
   const DatasetInfo info = Info(64);
   const auto elevation = [&](std::size_t view, std::uint64_t seed) {
     Rng rng(seed);

@@ -198,7 +198,8 @@ class TexturedMeshes : public TempFolderTest {
     auto source = FolderSource(folder_ / "models");
     EXPECT_TRUE(source.ok()) << source.status().message();
     BuildOptions options;
-    options.image_size = 16, options.views = 2;
+    options.image_size = 16;
+    options.views = 2;
     const auto built = BuildDataset(**source, options, folder_ / "data", workers_, nullptr, stop_);
     EXPECT_TRUE(built.ok()) << built.status().message();
   }

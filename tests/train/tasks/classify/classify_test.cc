@@ -192,7 +192,8 @@ TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {
   TrainJob job;
   job.config = ParseConfig(kConfig, "tiny.toml").value();
   ASSERT_TRUE(ApplyOverrides({"network.levels=6"}, &job.config).ok());
-  job.run = folder_ / "run", job.data = folder_ / "data";
+  job.run = folder_ / "run";
+  job.data = folder_ / "data";
   ExpectMessage(Train(job, workers_, kSilent, stop_).status(), "16 pixels", "at least 32");
 }
 
@@ -249,7 +250,8 @@ TEST_F(ClassifyTest, PerceptualNetworksThatAreNoneAreNamed) {
   TrainJob job;
   job.config = ParseConfig(kTinyConfig, "tiny.toml").value();
   ASSERT_TRUE(ApplyOverrides({"schedule.steps=1"}, &job.config).ok());
-  job.run = folder_ / "meshes", job.data = folder_ / "noise";
+  job.run = folder_ / "meshes";
+  job.data = folder_ / "noise";
   ASSERT_TRUE(Train(job, workers_, kSilent, stop_).ok());
   ExpectMessage(LoadPerceptualNetwork(context_, {.file = job.run}).status(), "meshes",
                 "\"single_image\"", "\"classify\"");

@@ -25,8 +25,10 @@ GanConfig TinyConfig() {
                     .texture_size = 16,
                     .texture_base = 2,
                     .texture_most = 4};
-  config.critic.base = 2, config.critic.halvings = 2;
-  config.render.sharpness = 60, config.render.max_alpha_error = 0;
+  config.critic.base = 2;
+  config.critic.halvings = 2;
+  config.render.sharpness = 60;
+  config.render.max_alpha_error = 0;
   config.batch = 3;
   return config;
 }
@@ -109,7 +111,8 @@ TEST(GanStep, GradientsOfTextures) {
 
 TEST(GanStep, GradientsOfWholeMapsInOneSampleAPixel) {
   GanConfig config = TinyConfig();
-  config.network.symmetric_texture = false, config.stream.draw.samples = 1;
+  config.network.symmetric_texture = false;
+  config.stream.draw.samples = 1;
   config.views = kMostViews;
   ExpectGradientsAgreeWithDifferences(config, GanStage::kTexture);
 }

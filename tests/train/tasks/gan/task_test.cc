@@ -28,7 +28,9 @@ class GanTaskTest : public TempFolderTest {
     ASSERT_TRUE(config.ok()) << config.status().message();
     ValueOf<std::int64_t>(*config, "schedule.steps") = 2;
     TrainJob job;
-    job.config = std::move(*config), job.data = folder_ / "data", job.run = folder_ / "textured";
+    job.config = std::move(*config);
+    job.data = folder_ / "data";
+    job.run = folder_ / "textured";
     const auto outcome = Train(job, workers_, kSilent, stop_);
     ASSERT_TRUE(outcome.ok()) << outcome.status().message();
   }
@@ -44,7 +46,8 @@ class GanTaskTest : public TempFolderTest {
     std::vector<std::string> settings = {"textures.run=" + (folder_ / "textured").string()};
     settings.insert(settings.end(), at.settings.begin(), at.settings.end());
     TILEGRAD_TRY(OverrideFields(settings, job.config.Fields()));
-    job.data = folder_ / "data", job.run = folder_ / at.run;
+    job.data = folder_ / "data";
+    job.run = folder_ / at.run;
     job.existing = ExistingRun::kContinue;
     StopFlag stop = false;
     const ProgressSink watch = [&](const Progress& progress) {

@@ -27,7 +27,8 @@ class PhotographsWithACritic : public TempFolderTest {
   Status Train(const std::string& run, const std::string& more, int workers, int most = 100) {
     TrainJob job;
     TILEGRAD_ASSIGN(job.config, ParseConfig(std::string(kTinyPhotographs) + more, "tiny"));
-    job.data = folder_ / "cub", job.run = folder_ / run;
+    job.data = folder_ / "cub";
+    job.run = folder_ / run;
     job.existing = ExistingRun::kContinue;
     StopFlag stop = false;
     int steps = 0;
@@ -93,7 +94,8 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
                  .laplacian = 0,
                  .entropy = 0,
                  .color = 0};
-  config.size = 16, config.render.sharpness = config.render.sharpness_start = 50;
+  config.size = 16;
+  config.render.sharpness = config.render.sharpness_start = 50;
   config.schedule.steps = 10;
   const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
   const StopFlag stop = false;

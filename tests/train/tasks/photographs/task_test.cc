@@ -47,7 +47,8 @@ class PhotographsTask : public TempFolderTest {
     job.config.schedule.steps = changes.steps;
     job.config.schedule.sample_every = changes.sample_every;
     job.extends = true;
-    job.data = folder_ / changes.data, job.run = folder_ / run;
+    job.data = folder_ / changes.data;
+    job.run = folder_ / run;
     job.existing = ExistingRun::kContinue;
     return train::Train(job, Workers(changes.workers), kSilent, stop_);
   }
@@ -151,7 +152,8 @@ TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
   ASSERT_TRUE(Train("whole", {}).ok());
   TrainJob job;
   job.config = ParseConfig(TinyConfig(), "tiny.toml").value();
-  job.data = folder_ / "cub", job.run = folder_ / "stopped";
+  job.data = folder_ / "cub";
+  job.run = folder_ / "stopped";
   job.existing = ExistingRun::kContinue;
   int steps = 0;
   StopFlag stop = false;
@@ -172,7 +174,8 @@ TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
   config.replace(config.find("size = 16"), 9, "size = 16\ncamera = \"predicted\"");
   TrainJob job;
   job.config = ParseConfig(config, "tiny.toml").value();
-  job.data = folder_ / "p3d", job.run = folder_ / "camera";
+  job.data = folder_ / "p3d";
+  job.run = folder_ / "camera";
   const auto outcome = train::Train(job, workers_, kSilent, stop_);
   ASSERT_TRUE(outcome.ok()) << outcome.status().message();
 }
@@ -184,7 +187,8 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   config.replace(config.find("levels = 2"), 10, "levels = 2\ntexture = \"paint\"");
   TrainJob job;
   job.config = ParseConfig(config, "tiny.toml").value();
-  job.data = folder_ / "cub", job.run = folder_ / "c";
+  job.data = folder_ / "cub";
+  job.run = folder_ / "c";
   ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "network.texture", "paint");
   ASSERT_TRUE(Train("d", {}).ok());
   WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
@@ -281,7 +285,10 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   double sum = 0, largest = 0;
   const auto q = out.positions.value().span<double>();
-  for (std::size_t i = 0; i < q.size(); i += 3) sum += q[i], largest = std::max(largest, q[i]);
+  for (std::size_t i = 0; i < q.size(); i += 3) {
+    sum += q[i];
+    largest = std::max(largest, q[i]);
+  }
   EXPECT_NEAR(sum, 0, 1e-9);
   EXPECT_GT(largest, 0.1);
   EXPECT_EQ(out.keypoints.shape(), (nn::Shape{2, 15, 3}));

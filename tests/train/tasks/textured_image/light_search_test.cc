@@ -48,7 +48,8 @@ struct Ball {
 
 LightConfig Light(double spread, double ambient) {
   LightConfig config;
-  config.spread = spread, config.ambient = ambient;
+  config.spread = spread;
+  config.ambient = ambient;
   return config;
 }
 

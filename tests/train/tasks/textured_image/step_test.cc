@@ -138,8 +138,10 @@ TEST(TexturedStep, GradientsWithoutLightAndSkips) {
 
 TexturedImageConfig LookupConfig() {
   TexturedImageConfig config = TinyConfig("lambert");
-  config.network.lookup = true, config.network.lookup_width = 4;
-  config.network.skips = false, config.network.normalize = false;
+  config.network.lookup = true;
+  config.network.lookup_width = 4;
+  config.network.skips = false;
+  config.network.normalize = false;
   config.color = {.masked = true, .soft = 0.3, .own = 0.3, .pose = 2};
   return config;
 }
@@ -187,7 +189,8 @@ TEST(TexturedStep, GradientsOfTheAdversarialLoss) {
 TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
   for (const char* place : {"rendered", "interpolates"}) {
     TexturedImageConfig config = AdversarialConfig();
-    config.adversary.place = place, config.adversary.penalty = 4;
+    config.adversary.place = place;
+    config.adversary.penalty = 4;
     SmallProblem p(config);
     p.LossNow();
     StepValues values;
@@ -235,7 +238,8 @@ TEST(Adversary, RefusesWordsAndMissingFiles) {
 
 TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {
   TexturedImageConfig config = TinyConfig("none");
-  config.schedule.steps = 10, config.color.from = 0.5;
+  config.schedule.steps = 10;
+  config.color.from = 0.5;
   SmallProblem p(config);
   for (const auto& [step, counts] : {std::pair(4, false), {5, true}}) {
     StepValues values;

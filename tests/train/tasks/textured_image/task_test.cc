@@ -29,7 +29,8 @@ class TexturedTask : public TempFolderTest {
     ASSERT_TRUE(config.ok()) << config.status().message();
     job.config = std::move(*config);
     ValueOf<std::int64_t>(job.config, "schedule.steps") = 12;
-    job.data = folder_ / "data", job.run = run_;
+    job.data = folder_ / "data";
+    job.run = run_;
     const auto outcome = train::Train(job, workers_, kSilent, stop_);
     ASSERT_TRUE(outcome.ok()) << outcome.status().message();
     EXPECT_TRUE(outcome->finished);
@@ -84,7 +85,8 @@ TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
   TrainJob job;
   job.config = ParseConfig(text, "tiny.toml").value();
   ValueOf<std::int64_t>(job.config, "schedule.steps") = 4;
-  job.data = folder_ / "data", job.run = run_;
+  job.data = folder_ / "data";
+  job.run = run_;
   const auto outcome = train::Train(job, workers_, kSilent, stop_);
   ASSERT_TRUE(outcome.ok()) << outcome.status().message();
   const auto predictor = Predictor::Load(run_, workers_);
@@ -103,7 +105,8 @@ TEST_F(TexturedTask, RulesThatDrawNoTexturesAreErrors) {
     text.replace(text.find("[render]"), 8, std::string("[render]\nrule = \"") + rule + "\"");
     TrainJob job;
     job.config = ParseConfig(text + "[light]\nmodel = \"" + light + "\"\n", "t").value();
-    job.data = folder_ / "data", job.run = run_;
+    job.data = folder_ / "data";
+    job.run = run_;
     ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), part);
   }
 }
@@ -159,7 +162,8 @@ TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
   TrainJob job;
   job.config =
       ParseConfig(std::string(kTinyTextured) + "[start]\nrun = \"/no/run\"\n", "t").value();
-  job.data = folder_ / "data", job.run = run_;
+  job.data = folder_ / "data";
+  job.run = run_;
   ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "/no/run");
 }
 
@@ -181,7 +185,8 @@ TEST(TexturedConfigs, AreRead) {
 TEST_F(TexturedTask, WordsThatAreNotKnownAreErrors) {
   TrainJob job;
   job.config = ParseConfig(std::string(kTinyTextured) + "[light]\nmodel = \"neon\"\n", "t").value();
-  job.data = folder_ / "data", job.run = folder_ / "run";
+  job.data = folder_ / "data";
+  job.run = folder_ / "run";
   ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "light.model is \"neon\"");
 }
 
