@@ -86,7 +86,10 @@ inline std::vector<tilegrad_surface> RandomSurfaces(Dice* dice, std::size_t text
 }
 
 inline void FillCamera(Dice* dice, tilegrad_camera* camera) {
-  camera->fx = 20 + 5 * dice->Number(), camera->fy = 20, camera->cx = 12, camera->cy = 9;
+  camera->fx = 20 + 5 * dice->Number();
+  camera->fy = 20;
+  camera->cx = 12;
+  camera->cy = 9;
   camera->translation[2] = dice->Of({-2.0f, -0.5f, 0.3f});
   if (dice->OneIn(60)) camera->near_plane = dice->Of({0.0f, -1.0f, NAN, 1e30f});
   if (dice->OneIn(60)) camera->fx = dice->Of({0.0f, -1.0f, NAN, 1e30f, 1e-30f});
@@ -101,7 +104,8 @@ inline tilegrad_scene RandomScene(Dice* dice, World* world) {
   s.positions = world->Floats(dice, 3 * s.vertices);
   s.faces = world->Indices(dice, 3 * s.face_count, s.vertices);
   FillCamera(dice, &s.camera);
-  s.colors = RandomStream(dice, world, s, 3), s.uvs = RandomStream(dice, world, s, 2);
+  s.colors = RandomStream(dice, world, s, 3);
+  s.uvs = RandomStream(dice, world, s, 2);
   s.normals = RandomStream(dice, world, s, 3);
   s.channels = dice->Of({0, 0, 1, 4});
   if (s.channels > 0) {
@@ -110,17 +114,23 @@ inline tilegrad_scene RandomScene(Dice* dice, World* world) {
   if (dice->OneIn(60)) s.channels = dice->Of({-1, INT_MAX, INT_MIN});
   world->textures.push_back(RandomTextures(dice, world));
   if (s.uvs.values == nullptr && !dice->OneIn(10)) world->textures.back().clear();
-  s.textures = world->textures.back().data(), s.texture_count = world->textures.back().size();
+  s.textures = world->textures.back().data();
+  s.texture_count = world->textures.back().size();
   world->surfaces.push_back(RandomSurfaces(dice, s.texture_count));
-  s.surfaces = world->surfaces.back().data(), s.surface_count = world->surfaces.back().size();
+  s.surfaces = world->surfaces.back().data();
+  s.surface_count = world->surfaces.back().size();
   if (dice->OneIn(2)) s.face_surfaces = world->Indices(dice, s.face_count, s.surface_count);
   s.lighting = dice->Of({0, 0, 1, 2, 3});
   s.normal_kind = s.normals.values == nullptr ? dice->Of({0, 1}) : dice->Of({0, 1, 2});
-  s.two_sided = dice->Of({0, 1, -5}), s.clamp = dice->Of({0, 1});
+  s.two_sided = dice->Of({0, 1, -5});
+  s.clamp = dice->Of({0, 1});
   world->lights.emplace_back(dice->Of<std::size_t>({1, 1, 2}));
   for (tilegrad_light& l : world->lights.back()) l = {{dice->Number(), 1, dice->Number()}, 1};
   const bool lamps = dice->OneIn(2);
-  if (lamps) s.lights = world->lights.back().data(), s.light_count = world->lights.back().size();
+  if (lamps) {
+    s.lights = world->lights.back().data();
+    s.light_count = world->lights.back().size();
+  }
   if (!lamps) s.light_directions = world->Floats(dice, 3 * s.vertices);
   if (!dice->OneIn(20)) s.sh = world->Floats(dice, 9);
   if (dice->OneIn(30)) s.lighting = dice->Of({-1, 4, INT_MAX});
@@ -145,14 +155,16 @@ inline std::unique_ptr<World> RandomWorld(Dice* dice) {
   }
   tilegrad_options& o = world->options;
   tilegrad_options_init(&o);
-  o.width = dice->Of({1, 7, 24, 33, 70}), o.height = dice->Of({1, 5, 18, 65});
+  o.width = dice->Of({1, 7, 24, 33, 70});
+  o.height = dice->Of({1, 5, 18, 65});
   o.delta = dice->Of({1e-3, 1.0 / 7000, 10.0, 1e-12});
   o.max_alpha_error = dice->Of({0.0, 1e-6, 0.1, 1.0});
   for (std::int32_t* wanted :
        {&o.color, &o.alpha, &o.attributes, &o.depth, &o.normals, &o.uv, &o.barycentrics}) {
     *wanted = dice->Of({0, 1, 1, -1});
   }
-  o.culling = dice->Of({0, 0, 1}), o.interpolation = dice->Of({0, 0, 1});
+  o.culling = dice->Of({0, 0, 1});
+  o.interpolation = dice->Of({0, 0, 1});
   o.alpha_rule = dice->Of({0, 0, 1});
   if (dice->OneIn(40)) o.width = dice->Of({0, -1, INT_MAX, INT_MIN, 16385});
   if (dice->OneIn(40)) o.delta = dice->Of<double>({0, -1, NAN, INFINITY, 1e-320, 1e308});
@@ -279,7 +291,8 @@ class Caller {
                               no_options ? nullptr : &world.options, frame),
               TILEGRAD_OK);
     tilegrad_images anew, before;
-    tilegrad_images_init(&anew), tilegrad_images_init(&before);
+    tilegrad_images_init(&anew);
+    tilegrad_images_init(&before);
     ASSERT_EQ(tilegrad_frame_images(frame, &anew), TILEGRAD_OK);
     ASSERT_EQ(tilegrad_frame_images(shot.frame, &before), TILEGRAD_OK);
     const auto a = Planes(anew), b = Planes(before);
@@ -352,7 +365,9 @@ class Caller {
     tilegrad_scene_gradients d;
     tilegrad_scene_gradients_init(&d);
     d.positions = Wanted(scratch, 3 * s.vertices, true);
-    d.colors = stream(s.colors, 3), d.uvs = stream(s.uvs, 2), d.normals = stream(s.normals, 3);
+    d.colors = stream(s.colors, 3);
+    d.uvs = stream(s.uvs, 2);
+    d.normals = stream(s.normals, 3);
     d.attributes = stream(s.attributes, static_cast<std::size_t>(std::max(s.channels, 0)));
     d.light_directions = Wanted(scratch, 3 * s.vertices, s.light_directions != nullptr);
     d.sh = Wanted(scratch, 9, s.sh != nullptr);
@@ -369,9 +384,11 @@ class Caller {
       if (given == nullptr && !dice_.OneIn(30)) return nullptr;
       return dice_.OneIn(3) ? nullptr : scratch->Floats(&dice_, width * pixels);
     };
-    d_frame.color = image(3, images.color), d_frame.alpha = image(1, images.alpha);
+    d_frame.color = image(3, images.color);
+    d_frame.alpha = image(1, images.alpha);
     d_frame.attributes = image(static_cast<std::size_t>(images.channels), images.attributes);
-    d_frame.depth = image(1, images.depth), d_frame.normals = image(3, images.normals);
+    d_frame.depth = image(1, images.depth);
+    d_frame.normals = image(3, images.normals);
     d_frame.uv = image(2, images.uv);
     if (dice_.OneIn(50)) d_frame.struct_size = dice_.Of<std::size_t>({0, 3, 8, SIZE_MAX});
     return d_frame;

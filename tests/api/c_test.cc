@@ -26,12 +26,19 @@ struct CScene {
 
   explicit CScene(const TestScene<float>& s) {
     tilegrad_scene_init(&scene);
-    scene.positions = s.positions.data(), scene.vertices = 16;
-    scene.faces = s.faces.data(), scene.face_count = s.faces.size() / 3;
+    scene.positions = s.positions.data();
+    scene.vertices = 16;
+    scene.faces = s.faces.data();
+    scene.face_count = s.faces.size() / 3;
     const Camera& c = s.scene.camera;
-    scene.camera.fx = c.fx, scene.camera.fy = c.fy, scene.camera.cx = c.cx, scene.camera.cy = c.cy;
-    scene.colors = {s.colors.data(), 0}, scene.uvs = {s.uvs.data(), 1};
-    scene.attributes = {s.attributes.data(), 0}, scene.channels = 2;
+    scene.camera.fx = c.fx;
+    scene.camera.fy = c.fy;
+    scene.camera.cx = c.cx;
+    scene.camera.cy = c.cy;
+    scene.colors = {s.colors.data(), 0};
+    scene.uvs = {s.uvs.data(), 1};
+    scene.attributes = {s.attributes.data(), 0};
+    scene.channels = 2;
     texture = {s.texels.data(), 5, 4, 1, 1};
     const Surface& f = s.surfaces[0];
     surface = {{f.base_color[0], f.base_color[1], f.base_color[2]},
@@ -42,9 +49,13 @@ struct CScene {
                f.texture};
     const Light& l = s.lights[0];
     light = {{l.direction[0], l.direction[1], l.direction[2]}, l.intensity};
-    scene.textures = &texture, scene.texture_count = 1;
-    scene.surfaces = &surface, scene.surface_count = 1;
-    scene.lights = &light, scene.light_count = 1, scene.lighting = 2;
+    scene.textures = &texture;
+    scene.texture_count = 1;
+    scene.surfaces = &surface;
+    scene.surface_count = 1;
+    scene.lights = &light;
+    scene.light_count = 1;
+    scene.lighting = 2;
   }
 };
 
@@ -52,7 +63,9 @@ class CApi : public testing::Test {
  protected:
   CApi() : s(Lighting::kPhong), c(s) {
     tilegrad_options_init(&options);
-    options.width = 34, options.height = 29, options.delta = 1e-3;
+    options.width = 34;
+    options.height = 29;
+    options.delta = 1e-3;
     options.depth = options.normals = options.uv = options.barycentrics = 1;
   }
   ~CApi() override {
@@ -65,6 +78,41 @@ class CApi : public testing::Test {
     return tilegrad_last_error(renderer);
   }
   tilegrad_status Render() { return tilegrad_render(renderer, &c.scene, 1, &options, frame); }
+  // The gradients of the rendered frame, for cotangents `d`, are `g`, bit by bit.
+  void ExpectGradients(const FrameGradients& d, const TestGradients<float>& g) {
+    tilegrad_frame_gradients d_frame;
+    tilegrad_frame_gradients_init(&d_frame);
+    d_frame.color = d.color.data();
+    d_frame.alpha = d.alpha.data();
+    d_frame.depth = d.depth.data();
+    TestGradients<float> h(s);
+    float* textures[1] = {h.texels.data()};
+    tilegrad_camera d_camera = {};
+    tilegrad_surface d_surface = {};
+    tilegrad_light d_light = {};
+    tilegrad_scene_gradients d_scene;
+    tilegrad_scene_gradients_init(&d_scene);
+    d_scene.positions = h.positions.data();
+    d_scene.colors = h.colors.data();
+    d_scene.uvs = h.uvs.data();
+    d_scene.textures = textures;
+    d_scene.camera = &d_camera;
+    d_scene.surfaces = &d_surface;
+    d_scene.lights = &d_light;
+    ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK)
+        << tilegrad_last_error(renderer);
+    EXPECT_EQ(g.positions, h.positions);
+    EXPECT_EQ(g.colors, h.colors);
+    EXPECT_EQ(g.uvs, h.uvs);
+    EXPECT_EQ(g.texels, h.texels);
+    EXPECT_EQ(d_camera.rotation[5], g.camera.rotation[5]);
+    EXPECT_EQ(d_camera.fx, g.camera.fx);
+    EXPECT_EQ(d_surface.shininess, g.surfaces[0].shininess);
+    EXPECT_EQ(d_light.direction[1], g.lights[0].direction[1]);
+    ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 1), TILEGRAD_OK);
+    EXPECT_EQ(d_camera.fx, 2 * g.camera.fx);
+    EXPECT_EQ(h.colors[9], 2 * g.colors[9]);
+  }
 
   TestScene<float> s;
   CScene c;
@@ -88,37 +136,11 @@ TEST_F(CApi, GivesTheBitsOfTheCppInterface) {
   EXPECT_TRUE(std::equal(e.uv.begin(), e.uv.end(), images.uv));
   EXPECT_TRUE(std::equal(e.depth.begin(), e.depth.end(), images.depth));
   EXPECT_TRUE(std::equal(e.face_ids.begin(), e.face_ids.end(), images.face_ids));
-
   const TestCotangents<float> d(e);
-  tilegrad_frame_gradients d_frame;
-  tilegrad_frame_gradients_init(&d_frame);
-  d_frame.color = d.color.data(), d_frame.alpha = d.alpha.data(), d_frame.depth = d.depth.data();
-  TestGradients<float> g(s), h(s);
-  float* textures[1] = {h.texels.data()};
-  tilegrad_camera d_camera = {};
-  tilegrad_surface d_surface = {};
-  tilegrad_light d_light = {};
-  tilegrad_scene_gradients d_scene;
-  tilegrad_scene_gradients_init(&d_scene);
-  d_scene.positions = h.positions.data(), d_scene.colors = h.colors.data();
-  d_scene.uvs = h.uvs.data(), d_scene.textures = textures, d_scene.camera = &d_camera;
-  d_scene.surfaces = &d_surface, d_scene.lights = &d_light;
-  ASSERT_TRUE(
-      cpp.Backward(expected, {.color = d.color, .alpha = d.alpha, .depth = d.depth}, {&g.d, 1})
-          .ok());
-  ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK)
-      << tilegrad_last_error(renderer);
-  EXPECT_EQ(g.positions, h.positions);
-  EXPECT_EQ(g.colors, h.colors);
-  EXPECT_EQ(g.uvs, h.uvs);
-  EXPECT_EQ(g.texels, h.texels);
-  EXPECT_EQ(d_camera.rotation[5], g.camera.rotation[5]);
-  EXPECT_EQ(d_camera.fx, g.camera.fx);
-  EXPECT_EQ(d_surface.shininess, g.surfaces[0].shininess);
-  EXPECT_EQ(d_light.direction[1], g.lights[0].direction[1]);
-  ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 1), TILEGRAD_OK);
-  EXPECT_EQ(d_camera.fx, 2 * g.camera.fx);
-  EXPECT_EQ(h.colors[9], 2 * g.colors[9]);
+  const FrameGradients d_cpp = {.color = d.color, .alpha = d.alpha, .depth = d.depth};
+  TestGradients<float> g(s);
+  ASSERT_TRUE(cpp.Backward(expected, d_cpp, {&g.d, 1}).ok());
+  ExpectGradients(d_cpp, g);
 }
 
 // A caller of an older version has shorter structs: what it does not know has its default. Here
@@ -169,11 +191,14 @@ TEST_F(CApi, APointerThatWasForgottenIsNoEmptyArray) {
   const tilegrad_scene sound = c.scene;
   c.scene.faces = nullptr;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: faces is NULL, but face_count is 18");
-  c.scene = sound, c.scene.positions = nullptr;
+  c.scene = sound;
+  c.scene.positions = nullptr;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: positions is NULL, but vertices is 16");
-  c.scene = sound, c.scene.textures = nullptr;
+  c.scene = sound;
+  c.scene.textures = nullptr;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: textures is NULL, but texture_count is 1");
-  c.scene = sound, c.scene.surfaces = nullptr;
+  c.scene = sound;
+  c.scene.surfaces = nullptr;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: surfaces is NULL, but surface_count is 1");
 }
 
@@ -188,14 +213,19 @@ TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
   d_scene.sh = numbers;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
             "scene 0: d_scene.sh is wanted, but the scene has none");
-  d_scene.sh = nullptr, d_scene.normals = numbers;
+  d_scene.sh = nullptr;
+  d_scene.normals = numbers;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
             "scene 0: d_scene.normals is wanted, but the scene has none");
 }
 
 TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
-  c.scene.textures = nullptr, c.scene.texture_count = 0, c.surface.texture = -1;
-  c.scene.lights = nullptr, c.scene.light_count = 0, c.scene.lighting = 0;
+  c.scene.textures = nullptr;
+  c.scene.texture_count = 0;
+  c.surface.texture = -1;
+  c.scene.lights = nullptr;
+  c.scene.light_count = 0;
+  c.scene.lighting = 0;
   ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
   tilegrad_frame_gradients d_frame;
   tilegrad_frame_gradients_init(&d_frame);
@@ -206,7 +236,8 @@ TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
             "scene 0: d_scene.textures is wanted, but the scene has none");
   tilegrad_light d_light = {};
-  d_scene.textures = nullptr, d_scene.lights = &d_light;
+  d_scene.textures = nullptr;
+  d_scene.lights = &d_light;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
             "scene 0: d_scene.lights is wanted, but the scene has none");
 }
@@ -222,7 +253,8 @@ TEST_F(CApi, CountsBeyondAnyArrayAreNamed) {
   c.scene.light_count = none;
   EXPECT_EQ(ErrorOf(Render()),
             "scene 0: light_count is 18446744073709551615, must be in 0..2147483647");
-  c.scene = sound, c.scene.vertices = none / 2;
+  c.scene = sound;
+  c.scene.vertices = none / 2;
   EXPECT_EQ(ErrorOf(Render()),
             "scene 0: vertices is 9223372036854775807, must be in 0..2147483647");
 }
@@ -251,10 +283,12 @@ TEST_F(CApi, SaysWhatIsWrong) {
   EXPECT_EQ(tilegrad_render(nullptr, &c.scene, 1, &options, frame), TILEGRAD_INVALID_ARGUMENT);
   c.scene.lighting = 4;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: shading.lighting is 4, must be in 0..3");
-  c.scene.lighting = 2, c.texture.width = -5;
+  c.scene.lighting = 2;
+  c.texture.width = -5;
   EXPECT_EQ(ErrorOf(Render()),
             "scene 0: textures[0]: is -5 x 4 texels; each side must be in 1..16384");
-  c.texture.width = 5, c.scene.struct_size = 0;
+  c.texture.width = 5;
+  c.scene.struct_size = 0;
   EXPECT_EQ(ErrorOf(Render()), "scene 0: scene.struct_size is 0: tilegrad_..._init comes first");
   tilegrad_images images;
   tilegrad_images_init(&images);

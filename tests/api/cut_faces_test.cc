@@ -24,9 +24,13 @@ struct CutWall {
 
   explicit CutWall(test::Numbers* numbers) : positions(numbers->Vector<T>(9, 4)) {
     for (T& p : positions) p = static_cast<T>(static_cast<float>(p));
-    scene.positions = positions, scene.faces = faces;
-    scene.attributes = {attributes, Rate::kVertex}, scene.channels = 1;
-    scene.camera.fx = scene.camera.fy = 20, scene.camera.cx = 24, scene.camera.cy = 20;
+    scene.positions = positions;
+    scene.faces = faces;
+    scene.attributes = {attributes, Rate::kVertex};
+    scene.channels = 1;
+    scene.camera.fx = scene.camera.fy = 20;
+    scene.camera.cx = 24;
+    scene.camera.cy = 20;
     scene.camera.near_plane = static_cast<T>(0.01f);
   }
 };
@@ -44,7 +48,8 @@ struct WallsInBoth {
   FrameT<double> truth;
 
   void RenderNext(const RenderOptions& options, const Outputs& outputs) {
-    wall.emplace(&numbers), same.emplace(&again);
+    wall.emplace(&numbers);
+    same.emplace(&again);
     ASSERT_TRUE(renderer.Render({&wall->scene, 1}, options, outputs, &frame).ok());
     ASSERT_TRUE(reference.Render({&same->scene, 1}, options, outputs, &truth).ok());
   }
@@ -114,7 +119,8 @@ template <class T>
 std::pair<std::vector<double>, std::vector<double>> AlphaAndPull(RendererT<T>* renderer,
                                                                  const CutWall<T>& wall) {
   RenderOptions options = kWallOptions;
-  options.delta = 1e-3, options.max_alpha_error = 0;
+  options.delta = 1e-3;
+  options.max_alpha_error = 0;
   FrameT<T> frame;
   EXPECT_TRUE(renderer->Render({&wall.scene, 1}, options, {}, &frame).ok());
   const ImagesT<T>& images = frame.images();
@@ -122,7 +128,8 @@ std::pair<std::vector<double>, std::vector<double>> AlphaAndPull(RendererT<T>* r
   const auto d_alpha = numbers.Vector<T>(images.alpha.size());
   const auto d_attributes = numbers.Vector<T>(images.attributes.size());
   FrameGradientsT<T> d_frame;
-  d_frame.alpha = d_alpha, d_frame.attributes = d_attributes;
+  d_frame.alpha = d_alpha;
+  d_frame.attributes = d_attributes;
   std::vector<T> d_positions(9);
   SceneGradientsT<T> d_scene;
   d_scene.positions = d_positions;
@@ -145,7 +152,8 @@ void ExpectCutFacesToBeTheSameFromAnyCorner(double alpha_tolerance, double pull_
     const double most = MostOf(pull);
     walls += most > 1e-3;
     for (const auto& order : {std::vector{1, 2, 0}, std::vector{0, 2, 1}, std::vector{2, 1, 0}}) {
-      wall.faces.assign(order.begin(), order.end()), wall.scene.faces = wall.faces;
+      wall.faces.assign(order.begin(), order.end());
+      wall.scene.faces = wall.faces;
       const auto [other_alpha, other_pull] = AlphaAndPull(&renderer, wall);
       for (std::size_t i = 0; i < alpha.size(); ++i) {
         ASSERT_NEAR(other_alpha[i], alpha[i], alpha_tolerance) << trial << ' ' << i;

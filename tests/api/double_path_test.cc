@@ -46,7 +46,8 @@ struct Moved {
 
   explicit Moved(const Trial& t) : s(t.lighting) {
     test::Numbers numbers;
-    s.textures[0].wrap = t.wrap, s.textures[0].filter = t.filter;
+    s.textures[0].wrap = t.wrap;
+    s.textures[0].filter = t.filter;
     for (double& uv : s.uvs) uv *= 6;  // so that pixels want several levels
     s.scene.shading.normals = t.normals;
     if (t.normals == Normals::kGiven) {
@@ -56,11 +57,15 @@ struct Moved {
     }
     if (t.vertex_lights) {
       light_directions = numbers.Vector<double>(s.positions.size(), 0.4, 1);
-      s.scene.light_directions = light_directions, s.scene.lights = {};
+      s.scene.light_directions = light_directions;
+      s.scene.lights = {};
     }
     if (t.cut) s.scene.camera.near_plane = 1.97;
-    options.alpha_rule = t.rule, options.interpolation = t.interpolation;
-    options.width = 24, options.height = 20, options.paper_faces = 4;
+    options.alpha_rule = t.rule;
+    options.interpolation = t.interpolation;
+    options.width = 24;
+    options.height = 20;
+    options.paper_faces = 4;
   }
 
   // Calls visit(kind, number) for all that a gradient is wanted of.
@@ -69,19 +74,28 @@ struct Moved {
     const auto all = [&](const char* kind, auto& values) {
       for (double& x : values) visit(kind, x);
     };
-    all("positions", s.positions), all("colors", s.colors), all("uvs", s.uvs);
-    all("attributes", s.attributes), all("texels", s.texels), all("normals", normals);
+    all("positions", s.positions);
+    all("colors", s.colors);
+    all("uvs", s.uvs);
+    all("attributes", s.attributes);
+    all("texels", s.texels);
+    all("normals", normals);
     all("light directions", light_directions);
     if (!s.scene.sh.empty()) all("sh", s.sh);
     if (!s.scene.lights.empty()) {
-      all("lights", s.lights[0].direction), visit("intensity", s.lights[0].intensity);
+      all("lights", s.lights[0].direction);
+      visit("intensity", s.lights[0].intensity);
     }
     SurfaceT<double>& u = s.surfaces[0];
-    all("surface", u.base_color), all("surface", u.ambient), all("surface", u.diffuse);
-    all("surface", u.specular), visit("shininess", u.shininess);
+    all("surface", u.base_color);
+    all("surface", u.ambient);
+    all("surface", u.diffuse);
+    all("surface", u.specular);
+    visit("shininess", u.shininess);
     CameraT<double>& c = s.scene.camera;
-    all("rotation", c.rotation), all("translation", c.translation);
-    visit("lens", c.fx), visit("lens", c.fy), visit("lens", c.cx), visit("lens", c.cy);
+    all("rotation", c.rotation);
+    all("translation", c.translation);
+    for (double* number : {&c.fx, &c.fy, &c.cx, &c.cy}) visit("lens", *number);
     visit("near plane", c.near_plane);
   }
 };
@@ -105,22 +119,31 @@ std::vector<Output> OutputsOf(Moved& m) {
   Status status = renderer.Render({&m.s.scene, 1}, m.options, wanted, &frame);
   EXPECT_TRUE(status.ok()) << status.message();
   const ImagesT<double>& i = frame.images();
-  Append("color", i.color, &out), Append("alpha", i.alpha, &out);
-  Append("attributes", i.attributes, &out), Append("depth", i.depth, &out);
-  Append("normals", i.normals, &out), Append("uv", i.uv, &out);
+  Append("color", i.color, &out);
+  Append("alpha", i.alpha, &out);
+  Append("attributes", i.attributes, &out);
+  Append("depth", i.depth, &out);
+  Append("normals", i.normals, &out);
+  Append("uv", i.uv, &out);
   Append("barycentrics", i.barycentrics, &out);
   const TestCotangents<double> cotangents(i);
   TestGradients<double> g(m.s);
   std::vector<double> d_normals(m.normals.size()), d_directions(m.light_directions.size());
-  g.d.normals = d_normals, g.d.light_directions = d_directions;
+  g.d.normals = d_normals;
+  g.d.light_directions = d_directions;
   status = renderer.Backward(frame, cotangents.d, {&g.d, 1});
   EXPECT_TRUE(status.ok()) << status.message();
-  Append("d_positions", g.positions, &out), Append("d_colors", g.colors, &out);
-  Append("d_uvs", g.uvs, &out), Append("d_attributes", g.attributes, &out);
-  Append("d_texels", g.texels, &out), Append("d_normals", d_normals, &out);
-  Append("d_light directions", d_directions, &out), Append("d_sh", g.sh, &out);
+  Append("d_positions", g.positions, &out);
+  Append("d_colors", g.colors, &out);
+  Append("d_uvs", g.uvs, &out);
+  Append("d_attributes", g.attributes, &out);
+  Append("d_texels", g.texels, &out);
+  Append("d_normals", d_normals, &out);
+  Append("d_light directions", d_directions, &out);
+  Append("d_sh", g.sh, &out);
   for (const LightT<double>& light : g.lights) {
-    Append("d_lights", light.direction, &out), Append("d_intensity", {&light.intensity, 1}, &out);
+    Append("d_lights", light.direction, &out);
+    Append("d_intensity", {&light.intensity, 1}, &out);
   }
   const SurfaceT<double>& u = g.surfaces[0];
   for (const auto& part : {u.base_color, u.ambient, u.diffuse, u.specular}) {

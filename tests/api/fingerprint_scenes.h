@@ -62,7 +62,8 @@ CameraT<T> MakeTestCamera(const Case& c, int n) {
   const int turns = inside ? 1 + n % 3 : 3 + 4 * (n % 3);
   SetRotation<T>({16, 2 - n % 5, turns, 1}, &camera);
   const int side = std::min(c.options.width, c.options.height);
-  camera.translation[0] = Part<T>(30 + 50 * n), camera.translation[1] = Part<T>(-40);
+  camera.translation[0] = Part<T>(30 + 50 * n);
+  camera.translation[1] = Part<T>(-40);
   camera.translation[2] = inside ? T(0) : Part<T>(-2900 - 100 * n);
   camera.fx = Part<T>(side * 1200), camera.fy = Part<T>(side * 1250);
   camera.cx = Part<T>(c.options.width * 520), camera.cy = Part<T>(c.options.height * 505);
@@ -94,7 +95,8 @@ class OwnScene {
     for (const Point& p : mesh_.points) {
       for (const int x : p) positions_.push_back(Part<T>(x));
     }
-    view_.positions = positions_, view_.faces = mesh_.faces;
+    view_.positions = positions_;
+    view_.faces = mesh_.faces;
   }
 
   // The vertices whose values a stream has one after the other.
@@ -113,7 +115,8 @@ class OwnScene {
     if (c.attributes) {
       const auto channels = static_cast<std::size_t>(c.channels);
       attributes_ = Parts<T>(channels * Rows(*c.attributes).size(), -1024, 1024, stream_ + 2);
-      view_.attributes = {attributes_, *c.attributes}, view_.channels = c.channels;
+      view_.attributes = {attributes_, *c.attributes};
+      view_.channels = c.channels;
     }
     if (c.uvs) SetUvs(*c.uvs);
     if (c.normals) SetNormals(*c.normals);
@@ -222,9 +225,11 @@ struct PulledImages {
       if (!c.pulled.empty() && c.pulled.count(name) == 0) return {};
       return arrays[name] = Parts<T>(image.size(), -1024, 1024, 50 + arrays.size());
     };
-    view.color = add("color", images.color), view.alpha = add("alpha", images.alpha);
+    view.color = add("color", images.color);
+    view.alpha = add("alpha", images.alpha);
     view.attributes = add("attributes", images.attributes);
-    view.normals = add("normals", images.normals), view.uv = add("uv", images.uv);
+    view.normals = add("normals", images.normals);
+    view.uv = add("uv", images.uv);
     if (c.options.interpolation == Interpolation::kPerspective) {
       view.depth = add("depth", images.depth);
     }
@@ -291,7 +296,8 @@ class WantedGradients {
     // The default surface, where it is asked for by name.
     if (case_.wanted.count("surfaces") > 0 && surfaces_.empty()) surfaces_.resize(1);
     if (Wants("lights")) lights_.resize(scene.lights.size());
-    view_.surfaces = surfaces_, view_.lights = lights_;
+    view_.surfaces = surfaces_;
+    view_.lights = lights_;
   }
   template <class Visit>
   void VisitCamera(const Visit& visit) const {

@@ -124,9 +124,12 @@ struct Table {
 template <class T>
 void AddImages(const ImagesT<T>& images, Hashes* hashes) {
   hashes->Add("face_ids", images.face_ids);
-  hashes->Add("color", images.color), hashes->Add("alpha", images.alpha);
-  hashes->Add("attributes", images.attributes), hashes->Add("depth", images.depth);
-  hashes->Add("normals", images.normals), hashes->Add("uv", images.uv);
+  hashes->Add("color", images.color);
+  hashes->Add("alpha", images.alpha);
+  hashes->Add("attributes", images.attributes);
+  hashes->Add("depth", images.depth);
+  hashes->Add("normals", images.normals);
+  hashes->Add("uv", images.uv);
   hashes->Add("barycentrics", images.barycentrics);
   if (images.alpha.empty()) return;
   hashes->Add("alpha_error_bound", std::span<const double>(&images.alpha_error_bound, 1));

@@ -27,14 +27,18 @@ TEST(ApiGradientArrays, AddsToWhatIsThere) {
   ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &frame).ok());
   const TestCotangents<float> cotangents(frame.images());
   TestGradients<float> plain(s), added(s, 3.0f);
-  added.camera.fx = 3, added.lights[0].intensity = 3, added.surfaces[0].shininess = 3;
+  added.camera.fx = 3;
+  added.lights[0].intensity = 3;
+  added.surfaces[0].shininess = 3;
   ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&plain.d, 1}).ok());
   ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&added.d, 1}, GradientMode::kAdd).ok());
   const auto expect = [](const std::vector<float>& a, const std::vector<float>& b) {
     for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(b[i], a[i] + 3) << i;
   };
-  expect(plain.positions, added.positions), expect(plain.colors, added.colors);
-  expect(plain.uvs, added.uvs), expect(plain.texels, added.texels);
+  expect(plain.positions, added.positions);
+  expect(plain.colors, added.colors);
+  expect(plain.uvs, added.uvs);
+  expect(plain.texels, added.texels);
   expect(plain.attributes, added.attributes);
   EXPECT_EQ(added.camera.fx, plain.camera.fx + 3);
   EXPECT_EQ(added.lights[0].intensity, plain.lights[0].intensity + 3);
@@ -82,9 +86,12 @@ template <class T>
 void ExpectArraysThatMeetAreRefused() {
   const TestScene<T> s(Lighting::kNone);
   std::vector<SceneT<T>> scenes(2, s.scene);
-  scenes[1].positions = s.scene.positions.first(45), scenes[1].faces = s.scene.faces.first(36);
+  scenes[1].positions = s.scene.positions.first(45);
+  scenes[1].faces = s.scene.faces.first(36);
   for (SceneT<T>& scene : scenes) {
-    scene.uvs = {}, scene.textures = {}, scene.surfaces = {};
+    scene.uvs = {};
+    scene.textures = {};
+    scene.surfaces = {};
     scene.colors.values = scene.colors.values.first(scene.positions.size());
     scene.attributes.values = scene.attributes.values.first(2 * scene.positions.size() / 3);
   }
@@ -134,7 +141,10 @@ TEST(ApiGradientArrays, TexturesOfTwoFiltersShareAGradient) {
   std::vector<Scene> scenes(2, s.scene);
   std::vector<float> uvs(s.uvs);
   for (float& x : uvs) x *= 40;  // coarse levels
-  for (std::size_t n : {0, 1}) scenes[n].textures = textures[n], scenes[n].uvs.values = uvs;
+  for (std::size_t n : {0, 1}) {
+    scenes[n].textures = textures[n];
+    scenes[n].uvs.values = uvs;
+  }
   Renderer renderer;
   Frame frame;
   ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
@@ -155,7 +165,8 @@ void ExpectNoGradientOfNormalsThatAreNotUsed() {
   const TestScene<T> s(Lighting::kLambert);
   SceneT<T> scene = s.scene;
   const std::vector<T> normals(9, T(1));
-  scene.faces = scene.faces.first(3), scene.uvs.values = scene.uvs.values.first(6);
+  scene.faces = scene.faces.first(3);
+  scene.uvs.values = scene.uvs.values.first(6);
   scene.normals = {normals, Rate::kCorner};
   RendererT<T> renderer;
   FrameT<T> frame;

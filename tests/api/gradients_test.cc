@@ -29,8 +29,12 @@ double Loss(RendererT<double>* renderer, const TestScene<double>& s,
       if (std::isfinite(image[p])) sum += d_image[p] * image[p];
     }
   };
-  add(i.color, d.color), add(i.alpha, d.alpha), add(i.attributes, d.attributes);
-  add(i.depth, d.depth), add(i.normals, d.normals), add(i.uv, d.uv);
+  add(i.color, d.color);
+  add(i.alpha, d.alpha);
+  add(i.attributes, d.attributes);
+  add(i.depth, d.depth);
+  add(i.normals, d.normals);
+  add(i.uv, d.uv);
   return sum;
 }
 
@@ -58,7 +62,8 @@ std::vector<Input> InputsOf(TestScene<double>& s, const TestGradients<double>& g
   CameraT<double>& camera = s.scene.camera;
   add("rotation", camera.rotation, g.camera.rotation, 9, 1);
   add("translation", camera.translation, g.camera.translation, 3, 1);
-  add("fx", &camera.fx, &g.camera.fx, 1, 1), add("cy", &camera.cy, &g.camera.cy, 1, 1);
+  add("fx", &camera.fx, &g.camera.fx, 1, 1);
+  add("cy", &camera.cy, &g.camera.cy, 1, 1);
   add("base_color", s.surfaces[0].base_color.data(), g.surfaces[0].base_color.data(), 3, 1);
   add("ambient", s.surfaces[0].ambient.data(), g.surfaces[0].ambient.data(), 3, 1);
   add("specular", s.surfaces[0].specular.data(), g.surfaces[0].specular.data(), 3, 1);

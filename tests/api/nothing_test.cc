@@ -29,17 +29,31 @@ struct Sparse {
 
 template <class T>
 std::vector<Sparse<T>> SparseScenes() {
-  const auto no_texture = [](SceneT<T>* s) { s->uvs = {}, s->textures = {}, s->surfaces = {}; };
+  const auto no_texture = [](SceneT<T>* s) {
+    s->uvs = {};
+    s->textures = {};
+    s->surfaces = {};
+  };
   const auto bare = [=](SceneT<T>* s) {
-    no_texture(s), s->lights = {}, s->shading = {}, s->attributes = {}, s->channels = 0;
+    no_texture(s);
+    s->lights = {};
+    s->shading = {};
+    s->attributes = {};
+    s->channels = 0;
   };
   return {{"no uv", no_texture},
           {"colours", bare},
-          {"geometry", [=](SceneT<T>* s) { bare(s), s->colors = {}; }},
+          {"geometry",
+           [=](SceneT<T>* s) {
+             bare(s);
+             s->colors = {};
+           }},
           {"no faces", [](SceneT<T>* s) {
-             s->faces = {}, s->uvs.values = {};
+             s->faces = {};
+             s->uvs.values = {};
              s->uvs.rate = {};
-             s->textures = {}, s->surfaces = {};
+             s->textures = {};
+             s->surfaces = {};
            }}};
 }
 
@@ -78,8 +92,10 @@ void ExpectImages(const ImagesT<T>& i, const SceneT<T>& scene, const Outputs& o)
     EXPECT_TRUE(!nothing || Holds<T>(image, image.size(), T(0)));
   };
   const bool no_face = scene.faces.empty();
-  expect(o.color, 3, i.color, no_face), expect(o.alpha, 1, i.alpha, no_face);
-  expect(o.normals, 3, i.normals, no_face), expect(o.barycentrics, 2, i.barycentrics, no_face);
+  expect(o.color, 3, i.color, no_face);
+  expect(o.alpha, 1, i.alpha, no_face);
+  expect(o.normals, 3, i.normals, no_face);
+  expect(o.barycentrics, 2, i.barycentrics, no_face);
   expect(o.uv, 2, i.uv, scene.uvs.values.empty());
   expect(o.attributes, static_cast<std::size_t>(scene.channels), i.attributes, no_face);
   expect(o.depth, 1, i.depth, false);
@@ -162,11 +178,16 @@ TEST(ApiNothing, IsBackgroundInC) {
   tilegrad_frame* const frame = tilegrad_frame_create();
   tilegrad_scene scene;
   tilegrad_scene_init(&scene);
-  scene.positions = positions, scene.vertices = 3, scene.faces = faces, scene.face_count = 1;
-  scene.camera.fx = scene.camera.fy = 20, scene.camera.cx = scene.camera.cy = 8;
+  scene.positions = positions;
+  scene.vertices = 3;
+  scene.faces = faces;
+  scene.face_count = 1;
+  scene.camera.fx = scene.camera.fy = 20;
+  scene.camera.cx = scene.camera.cy = 8;
   tilegrad_options options;
   tilegrad_options_init(&options);
-  options.color = options.attributes = 0, options.uv = options.depth = 1;
+  options.color = options.attributes = 0;
+  options.uv = options.depth = 1;
   for (const int size : {3, 40}) {
     options.width = options.height = size;
     ASSERT_EQ(tilegrad_render(renderer, &scene, 1, &options, frame), TILEGRAD_OK);

@@ -155,7 +155,8 @@ std::vector<float> Step(int threads, int side = 29) {
     out.insert(out.end(), array->begin(), array->end());
   }
   out.insert(out.end(), g.camera.rotation, g.camera.rotation + 9);
-  out.push_back(g.lights[0].intensity), out.push_back(g.surfaces[0].shininess);
+  out.push_back(g.lights[0].intensity);
+  out.push_back(g.surfaces[0].shininess);
   return out;
 }
 
@@ -170,7 +171,8 @@ TEST(ApiThreads, RenderersOnTwoThreadsDoNotMeet) {
   const std::vector<float> one = Step(1);
   std::vector<float> a, b;
   std::thread first([&] { a = Step(2); }), second([&] { b = Step(2); });
-  first.join(), second.join();
+  first.join();
+  second.join();
   EXPECT_EQ(a, one);
   EXPECT_EQ(b, one);
 }
@@ -321,8 +323,10 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
 TEST(ApiErrors, VerticesWithoutFacesHaveNormalsToo) {
   const TestScene<float> s(Lighting::kLambert);
   Scene scene;
-  scene.positions = s.positions, scene.lights = s.lights;
-  scene.shading.lighting = Lighting::kLambert, scene.shading.normals = Normals::kGiven;
+  scene.positions = s.positions;
+  scene.lights = s.lights;
+  scene.shading.lighting = Lighting::kLambert;
+  scene.shading.normals = Normals::kGiven;
   Renderer renderer;
   Frame frame;
   EXPECT_NE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).message().find("no normals"),
@@ -340,7 +344,9 @@ TEST(ApiImages, TheSharpestKernelIsAHardMask) {
   Frame frame;
   RenderOptions options = kTestOptions;
   for (const AlphaRule rule : {AlphaRule::kAllFaces, AlphaRule::kPaper}) {
-    options.delta = 1e-320, options.alpha_rule = rule, options.culling = FaceCulling::kBack;
+    options.delta = 1e-320;
+    options.alpha_rule = rule;
+    options.culling = FaceCulling::kBack;
     // A face that is drawn to a line through pixel centres.
     std::vector<float> positions = s.positions;
     for (std::size_t v = 0; v < 16; ++v) positions[3 * v + 1] = 0.5f / 30 * positions[3 * v + 2];
@@ -362,7 +368,8 @@ TEST(ApiErrors, ChannelsHaveALimit) {
   Scene scene;
   scene.shading.lighting = Lighting::kSphericalHarmonics;
   const std::vector<float> sh(9, 0.5f);
-  scene.sh = sh, scene.channels = std::numeric_limits<int>::max();
+  scene.sh = sh;
+  scene.channels = std::numeric_limits<int>::max();
   Renderer renderer;
   Frame frame;
   const Status status = renderer.Render({&scene, 1}, kTestOptions, {}, &frame);

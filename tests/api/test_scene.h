@@ -59,7 +59,8 @@ struct TestScene {
     sh = numbers.Vector<T>(9, 0.3);
     textures = {{texels, 5, 4, Wrap::kClamp, Filter::kBilinear}};
     surfaces.resize(1);
-    surfaces[0].texture = 0, surfaces[0].ambient = {T(0.2), T(0.2), T(0.3)};
+    surfaces[0].texture = 0;
+    surfaces[0].ambient = {T(0.2), T(0.2), T(0.3)};
     lights = {{{T(0.3), T(0.5), T(1)}, T(0.8)}};
     SetViews(lighting);
   }
@@ -68,11 +69,17 @@ struct TestScene {
 
  private:
   void SetViews(Lighting lighting) {
-    scene.positions = positions, scene.faces = faces;
-    scene.camera.fx = scene.camera.fy = 30, scene.camera.cx = 17, scene.camera.cy = 14;
-    scene.colors = {colors, Rate::kVertex}, scene.uvs = {uvs, Rate::kCorner};
-    scene.attributes = {attributes, Rate::kVertex}, scene.channels = 2;
-    scene.textures = textures, scene.surfaces = surfaces;
+    scene.positions = positions;
+    scene.faces = faces;
+    scene.camera.fx = scene.camera.fy = 30;
+    scene.camera.cx = 17;
+    scene.camera.cy = 14;
+    scene.colors = {colors, Rate::kVertex};
+    scene.uvs = {uvs, Rate::kCorner};
+    scene.attributes = {attributes, Rate::kVertex};
+    scene.channels = 2;
+    scene.textures = textures;
+    scene.surfaces = surfaces;
     scene.shading.lighting = lighting;
     const bool sh_lit = lighting == Lighting::kSphericalHarmonics;
     if (sh_lit) scene.sh = sh;

@@ -74,9 +74,13 @@ TEST(ArrayChecks, FindWrongValuesOnEveryTarget) {
   for (const std::string& target : RunnableTargets()) {
     SCOPED_TRACE(target);
     ASSERT_TRUE(ForceTarget(target).ok());
-    CheckFinite<float>(), CheckFinite<double>();
-    CheckBelow<float>(), CheckBelow<double>();
-    CheckWithin(-1, 5000), CheckWithin(0, 1), CheckWithin(-7, 1 << 30);
+    CheckFinite<float>();
+    CheckFinite<double>();
+    CheckBelow<float>();
+    CheckBelow<double>();
+    CheckWithin(-1, 5000);
+    CheckWithin(0, 1);
+    CheckWithin(-7, 1 << 30);
     EXPECT_TRUE(AllWithin({}, 0, 0));
     EXPECT_FALSE(
         AllWithin(std::vector<std::int32_t>{0}, 0, std::numeric_limits<std::int32_t>::min()));

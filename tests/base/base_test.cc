@@ -233,7 +233,8 @@ TEST(Rng, MomentsOfUniformAndNormal) {
   for (int i = 0; i < n; ++i) {
     sum += rng.Uniform();
     const double z = rng.Normal();
-    normal += z, squares += z * z;
+    normal += z;
+    squares += z * z;
   }
   // Five standard errors: 5 * sqrt(1/12/n), 5 / sqrt(n), 5 * sqrt(2/n).
   EXPECT_NEAR(sum / n, 0.5, 5 * std::sqrt(1.0 / 12 / n));

@@ -87,7 +87,10 @@ TEST_F(Guard, FoldersAreFilledIfNothingIsInThem) {
 TEST_F(Guard, WritesWhatMayBeWritten) {
   const Path file = folder_ / "a.txt";
   int writes = 0;
-  const auto write = [&] { return ++writes, WriteTextAtomic(file, "text"); };
+  const auto write = [&] {
+    ++writes;
+    return WriteTextAtomic(file, "text");
+  };
   EXPECT_TRUE(WriteGuarded(OutputGuard(), file, write).ok());
   EXPECT_FALSE(WriteGuarded(OutputGuard(), file, write).ok());
   EXPECT_TRUE(WriteGuarded(OutputGuard(true), file, write).ok());

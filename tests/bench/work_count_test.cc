@@ -100,8 +100,13 @@ constexpr MachineRates kRates{50e9, 6.3e9, 1.05e9, 20e9, 20.6e9};
 // Counts and limits of a scene that were worked out by hand with the same rates.
 TEST(WorkCount, LimitsByHand) {
   WorkCount work;
-  work.pixels = 262144, work.faces = 81920, work.covered = 99090, work.seen = 28784;
-  work.hard_blocks = 193704, work.soft_blocks = 92892, work.pairs = 207475;
+  work.pixels = 262144;
+  work.faces = 81920;
+  work.covered = 99090;
+  work.seen = 28784;
+  work.hard_blocks = 193704;
+  work.soft_blocks = 92892;
+  work.pairs = 207475;
   const Limit forward = ForwardLimit(work, {}, kRates), backward = BackwardLimit(work, {}, kRates);
   // Set-up 0.254, cover 0.372, shading 0.132, soft 0.124 (blocks: 0.446), memory 0.255.
   EXPECT_NEAR(forward.low, 0.254 + 0.372 + 0.132 + 0.124, 0.002);
@@ -115,7 +120,10 @@ TEST(WorkCount, LimitsByHand) {
 
 TEST(WorkCount, WhatIsNotAskedForCostsNothing) {
   WorkCount work;
-  work.pixels = 1000, work.faces = 1000, work.pairs = 1e6, work.soft_blocks = 2e5;
+  work.pixels = 1000;
+  work.faces = 1000;
+  work.pairs = 1e6;
+  work.soft_blocks = 2e5;
   const Limit both = ForwardLimit(work, {}, kRates);
   const Limit color = ForwardLimit(work, {true, false}, kRates);
   EXPECT_NEAR(both.low - color.low, 1e3 * 30 * 1e6 / kRates.lane_ops, 1e-9);

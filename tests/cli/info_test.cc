@@ -73,14 +73,17 @@ TEST_F(InfoCommand, SaysWhatAFileHolds) {
 TEST_F(InfoCommand, KnowsWhatIsWatertight) {
   const Mesh box = Box({0, 0, 0}, {1, 1, 1});
   Mesh torn = box;
-  torn.positions.clear(), torn.faces.clear();
+  torn.positions.clear();
+  torn.faces.clear();
   for (const Face& face : box.faces) {
     const auto first = static_cast<std::int32_t>(torn.positions.size());
     for (const std::int32_t v : face)
       torn.positions.push_back(box.positions[static_cast<std::size_t>(v)]);
     torn.faces.push_back({first, first + 1, first + 2});
   }
-  torn.normals.clear(), torn.corner_normals.clear(), torn.corner_uvs.clear();
+  torn.normals.clear();
+  torn.corner_normals.clear();
+  torn.corner_uvs.clear();
   Mesh open = torn, more = torn;
   open.faces.pop_back();
   more.faces.push_back(more.faces[0]);

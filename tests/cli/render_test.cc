@@ -128,7 +128,10 @@ TEST_F(Render, FramesTheWholeMeshByItself) {
   int top = 48, bottom = -1;
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 64; ++x) {
-      if (image.at(x, y)[3] > 0) top = std::min(top, y), bottom = std::max(bottom, y);
+      if (image.at(x, y)[3] > 0) {
+        top = std::min(top, y);
+        bottom = std::max(bottom, y);
+      }
     }
   }
   // A margin of 5 % of half the image is 1.2 pixels on each side.

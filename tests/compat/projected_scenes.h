@@ -34,7 +34,9 @@ ProjectedFacesOwner<T> Cast(const ProjectedFacesOwner<U>& from) {
 inline ProjectedFacesOwner<float> RandomFaces(std::size_t images, std::size_t faces,
                                               std::size_t channels, double size, Rng* rng) {
   ProjectedFacesOwner<float> out;
-  out.images = images, out.faces = faces, out.channels = channels;
+  out.images = images;
+  out.faces = faces;
+  out.channels = channels;
   for (std::size_t f = 0; f < images * faces; ++f) {
     const double x = rng->Uniform(-1.2, 1.2), y = rng->Uniform(-1.2, 1.2);
     for (int k = 0; k < 3; ++k) {

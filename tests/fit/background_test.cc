@@ -42,7 +42,8 @@ double IouWithRing(const std::vector<float>& alpha) {
   for (std::size_t p = 0; p < kPixels; ++p) {
     const bool a = alpha[p] >= 0.5f,
                b = OnRing(static_cast<int>(p) % kSide, static_cast<int>(p) / kSide);
-    both += a && b, either += a || b;
+    both += a && b;
+    either += a || b;
   }
   return both / either;
 }
@@ -128,16 +129,15 @@ TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
   double both = 0, either = 0;
   for (std::size_t p = 0; p < found->images.alpha.size(); ++p) {
     const bool a = found->images.alpha[p] >= 0.5f, b = truth->images.alpha[p] >= 0.5f;
-    both += a && b, either += a || b;
+    both += a && b;
+    either += a || b;
   }
   EXPECT_GT(both / either, 0.96);
-  // Only what is asked for.
-  const auto bare = ReadFitFolder(folder_ / "views", {.background = Background::kMask});
-  ASSERT_TRUE(bare.ok());
-  EXPECT_FALSE(bare->masked);
-  const auto none = ReadFitFolder(folder_ / "views", {.background = Background::kNone});
-  ASSERT_TRUE(none.ok());
-  EXPECT_FALSE(none->masked);
+  for (const Background other : {Background::kMask, Background::kNone}) {
+    const auto bare = ReadFitFolder(folder_ / "views", {.background = other});
+    ASSERT_TRUE(bare.ok());
+    EXPECT_FALSE(bare->masked);
+  }
   // Without its cameras, the same folder.
   std::filesystem::remove(folder_ / "views" / "transforms_train.json");
   const auto lone = ReadFitFolder(folder_ / "views", {.fov = 90});

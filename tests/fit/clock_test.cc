@@ -18,7 +18,8 @@ constexpr std::int64_t kWindow = FitClock::kWindow;
 
 FitConfig Config(std::int64_t steps) {
   FitConfig config;
-  config.steps = steps, config.levels = 1;
+  config.steps = steps;
+  config.levels = 1;
   return config;
 }
 
@@ -45,7 +46,8 @@ TEST(FitClock, HurriesFromWhereTheLossStays) {
   FitConfig config = Config(1000);
   config.stop_gain = 0;
   EXPECT_EQ(StepsOf(config, 0), 1000);
-  config = Config(1000), config.stop_gain = 0.2;
+  config = Config(1000);
+  config.stop_gain = 0.2;
   EXPECT_EQ(StepsOf(config, 1000), 200 + 267);
 }
 
@@ -53,7 +55,8 @@ TEST(FitClock, WaitsForFullResolutionAndForCameras) {
   FitConfig config = Config(1000);
   config.levels = 3;  // until step 550: windows end at 650, 750
   EXPECT_EQ(StepsOf(config, 0), 750 + 84);
-  config.levels = 1, config.cameras_rest = 0.4;
+  config.levels = 1;
+  config.cameras_rest = 0.4;
   EXPECT_EQ(StepsOf(config, 0), 600 + 134);
 }
 
@@ -71,8 +74,11 @@ class HurriedFit : public TempFolderTest {
     FitJob job;
     job.input = ReadFitFolder(folder_ / "views", 0).value();
     job.out = folder_ / out;
-    job.config.start = StartShape::kHull, job.config.texture_size = 64;
-    job.config.steps = 260, job.config.stop_gain = 1, job.config.checkpoint_every = 50;
+    job.config.start = StartShape::kHull;
+    job.config.texture_size = 64;
+    job.config.steps = 260;
+    job.config.stop_gain = 1;
+    job.config.checkpoint_every = 50;
     job.config.timelapse = 4;
     return job;
   }
@@ -110,7 +116,8 @@ TEST_F(HurriedFit, AFinishedFitGoesOnWithMoreSteps) {
   for (const char* name : {"once", "parts"}) {
     FitJob job = Job(name);
     ASSERT_TRUE(RunFit(job, Workers(1), {}, stop_).ok());
-    job.existing = ExistingRun::kContinue, job.config.steps = 300;
+    job.existing = ExistingRun::kContinue;
+    job.config.steps = 300;
     if (name == std::string("parts")) {
       StopAt(job, 260);
       job.config.steps = 280;  // neither what it has now, nor what it had

@@ -27,7 +27,8 @@ struct Patient {
   }
   FitStep Step() const {
     FitStep step;
-    step.views = {&kView, 1}, step.targets = &targets;
+    step.views = {&kView, 1};
+    step.targets = &targets;
     step.job.options = render;
     return step;
   }
@@ -47,7 +48,8 @@ struct Patient {
   }
   void MoveMesh(float x, float z) {
     for (std::size_t i = 0; i < scene.positions.size(); i += 3) {
-      scene.positions[i] += x, scene.positions[i + 2] += z;
+      scene.positions[i] += x;
+      scene.positions[i + 2] += z;
     }
   }
   Finding Ask(Parameter parameter) {

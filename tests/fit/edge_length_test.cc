@@ -74,7 +74,8 @@ TEST(EdgeLength, FloatIsRightOnALargeMesh) {
   AddEdgeLengthGradient<double>(topology, exact, sums_exact, 1.0, d_exact);
   double gap = 0, norm = 0;
   for (std::size_t i = 0; i < d.size(); ++i) {
-    gap += std::pow(static_cast<double>(d[i]) - d_exact[i], 2), norm += d_exact[i] * d_exact[i];
+    gap += std::pow(static_cast<double>(d[i]) - d_exact[i], 2);
+    norm += d_exact[i] * d_exact[i];
   }
   EXPECT_LT(std::sqrt(gap / norm), 1e-4);
 }

@@ -32,7 +32,8 @@ class Exposure : public TempFolderTest {
     if (input.ok()) job.input = std::move(*input);
     if (truth.ok()) job.start = truth->mesh;
     job.out = folder_ / "run";
-    job.config.timelapse = 0, job.config.levels = 1;
+    job.config.timelapse = 0;
+    job.config.levels = 1;
     job.config.views_per_step = 8;
     return job;
   }
@@ -48,9 +49,11 @@ class Exposure : public TempFolderTest {
     EXPECT_TRUE(fitter.ok()) << fitter.status().message();
     FitStep step;
     std::vector<int> views(job.input.training);
-    step.views = views, step.targets = &job.input.images;
+    step.views = views;
+    step.targets = &job.input.images;
     step.job.options.width = step.job.options.height = 64;
-    step.job.options.delta = 1e-3, step.job.options.max_alpha_error = 1e-6;
+    step.job.options.delta = 1e-3;
+    step.job.options.max_alpha_error = 1e-6;
     const auto values = fitter->Evaluate(step);
     EXPECT_TRUE(values.ok());
     Evaluation out;
@@ -66,7 +69,8 @@ class Exposure : public TempFolderTest {
     std::vector<int> views(scene.cameras.size());
     std::iota(views.begin(), views.end(), 0);
     FitRenderer::Job job;
-    job.views = views, job.alpha = false;
+    job.views = views;
+    job.alpha = false;
     job.options.width = job.options.height = 64;
     ASSERT_TRUE(renderer.Render(scene, job).ok());
     std::ranges::copy(renderer.images().color, input->images.color.begin());
@@ -99,7 +103,8 @@ TEST_F(Exposure, GradientsAreThoseOfDifferences) {
       continue;
     }
     FitScene more = scene, less = scene;
-    more.gains[v] *= std::exp(kStep), less.gains[v] *= std::exp(-kStep);
+    more.gains[v] *= std::exp(kStep);
+    less.gains[v] *= std::exp(-kStep);
     const double difference = (Evaluate(more, job, Parameter::kExposure).total -
                                Evaluate(less, job, Parameter::kExposure).total) /
                               (2 * static_cast<double>(kStep));
@@ -115,7 +120,8 @@ TEST_F(Exposure, FocalGradientIsThatOfDifferences) {
   const auto scaled = [&](double by) {
     FitScene out = scene;
     for (Camera& c : out.cameras) {
-      c.fx *= static_cast<float>(std::exp(by)), c.fy *= static_cast<float>(std::exp(by));
+      c.fx *= static_cast<float>(std::exp(by));
+      c.fy *= static_cast<float>(std::exp(by));
     }
     return out;
   };
@@ -161,7 +167,10 @@ TEST_F(Exposure, GainsAreRecovered) {
 TEST_F(Exposure, TheFocalLengthIsRecovered) {
   FitJob job = Job();
   const float truth = job.input.cameras[0].fx;
-  for (Camera& c : job.input.cameras) c.fx *= 1.15f, c.fy *= 1.15f;
+  for (Camera& c : job.input.cameras) {
+    c.fx *= 1.15f;
+    c.fy *= 1.15f;
+  }
   job.config.parameters[Parameter::kFocal] = true;
   job.config.steps = 200;
   job.config.rates[Parameter::kFocal] = 0.005;

@@ -46,7 +46,8 @@ TEST_F(HullFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
       };
       const auto stopped = RunFit(job, Workers(2), stop, stop_);
       ASSERT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-      stop_ = false, job.existing = ExistingRun::kContinue;
+      stop_ = false;
+      job.existing = ExistingRun::kContinue;
     }
     const auto resumed = RunFit(job, Workers(7), {}, stop_);
     ASSERT_TRUE(resumed.ok()) << resumed.status().message();
@@ -64,7 +65,8 @@ TEST_F(HullFit, ChartsWithoutRoomGetALargerTexture) {
   ASSERT_TRUE(larger.ok()) << larger.status().message();
   EXPECT_GT(larger->scene.texture.width, 16);
   EXPECT_LE(larger->scene.texture.width, 64);
-  job.config.texture_size = 2, job.config.start = StartShape::kAuto;
+  job.config.texture_size = 2;
+  job.config.start = StartShape::kAuto;
   const auto sphere = PrepareFit(job, Workers(1));
   ASSERT_TRUE(sphere.ok()) << sphere.status().message();
   EXPECT_NE(sphere->note.find("no hull: a texture of 8 x 8"), std::string::npos) << sphere->note;

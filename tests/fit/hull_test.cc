@@ -87,7 +87,9 @@ TEST_F(Hull, ContainsTheObjectAndIsLittleLarger) {
         const glm::vec3 p = glm::abs(grid->low + grid->cell * glm::vec3(i, j, k));
         const bool in = p.x < 0.45f && p.y < 0.25f && p.z < 0.3f;
         const bool kept = grid->values[grid->At(i, j, k)] > 0;
-        inside += in, missing += in && !kept, more += kept && !in;
+        inside += in;
+        missing += in && !kept;
+        more += kept && !in;
       }
   EXPECT_EQ(missing, 0);
   EXPECT_LT(more, inside / 4);

@@ -42,7 +42,8 @@ class LitFit : public TempFolderTest {
     FitScene scene = SceneOfMesh(truth_).value();
     scene.cameras = input_.cameras;
     scene.shading.lighting = Lighting::kLambert;
-    scene.surface.ambient.fill(0.3f), scene.surface.diffuse.fill(0.7f);
+    scene.surface.ambient.fill(0.3f);
+    scene.surface.diffuse.fill(0.7f);
     scene.lights = {
         {{static_cast<float>(kSun.x), static_cast<float>(kSun.y), static_cast<float>(kSun.z)}, 1}};
     const Workers workers(2);
@@ -58,11 +59,15 @@ class LitFit : public TempFolderTest {
     FitJob job;
     job.input = input_;
     job.start.emplace();
-    job.start->positions = truth_.positions, job.start->faces = truth_.faces;
+    job.start->positions = truth_.positions;
+    job.start->faces = truth_.faces;
     job.out = folder_ / out;
-    job.config.material = material, job.config.vertex_colors = true;
+    job.config.material = material;
+    job.config.vertex_colors = true;
     job.config.parameters[Parameter::kColors] = true;
-    job.config.steps = 300, job.config.levels = 1, job.config.timelapse = 0;
+    job.config.steps = 300;
+    job.config.levels = 1;
+    job.config.timelapse = 0;
     return job;
   }
   // RMS over vertices of colours, relative to the truth's, after the best common factor.
@@ -74,7 +79,9 @@ class LitFit : public TempFolderTest {
       for (int c = 0; c < 3; ++c) {
         const double a = static_cast<double>(fitted.colors[v][c]);
         const double b = static_cast<double>(truth_.colors[v][c]);
-        both += a * b, own += a * a, all += b * b;
+        both += a * b;
+        own += a * a;
+        all += b * b;
       }
     }
     return std::sqrt(std::max(0.0, 1 - both * both / (own * all)));
@@ -128,7 +135,8 @@ TEST_F(LitFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
       const auto stopped = RunFit(
           job, Workers(3), [&](const Progress& p) { stop_ = p.done == step; }, stop_);
       ASSERT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-      stop_ = false, job.existing = ExistingRun::kContinue;
+      stop_ = false;
+      job.existing = ExistingRun::kContinue;
     }
     ASSERT_TRUE(RunFit(job, Workers(2), {}, stop_).ok());
     EXPECT_EQ(ReadFile(folder_ / whole / "mesh.glb").value(),
@@ -139,7 +147,8 @@ TEST_F(LitFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
 TEST_F(LitFit, TheMeanOfTheLightStays) {
   FitScene scene = SceneOfMesh(truth_).value();
   StartMaterial(input_, true, &scene);
-  scene.shading.lighting = Lighting::kPhong, scene.lights = {{{0, 0, 1}, 1}};
+  scene.shading.lighting = Lighting::kPhong;
+  scene.lights = {{{0, 0, 1}, 1}};
   ParameterBlock block = MakeBlock(scene, Parameter::kMaterial, 0.1);
   Rng rng(1, 2);
   for (int i = 0; i < 1000; ++i) {

@@ -66,7 +66,9 @@ TEST(FindCameras, FollowsAPictureThatIsFramedOtherwise) {
   auto scene = SceneOfMesh(mesh);
   ASSERT_TRUE(scene.ok());
   Camera camera = CameraAt(45);
-  camera.translation[0] += 0.15f, camera.translation[1] -= 0.1f, camera.translation[2] -= 0.4f;
+  camera.translation[0] += 0.15f;
+  camera.translation[1] -= 0.1f;
+  camera.translation[2] -= 0.4f;
   const auto found = FindCameras(*scene, PictureOf(mesh, camera), CameraRule(), workers);
   ASSERT_TRUE(found.ok());
   EXPECT_GT(found->front().silhouette_iou, 0.9);
@@ -114,13 +116,15 @@ TEST(RefineMesh, TheCameraSeesTheMeshThatIsGiven) {
     FitRenderer renderer(workers);
     FitRenderer::Job job;
     const int own[] = {0};
-    job.views = own, job.alpha = false;
+    job.views = own;
+    job.alpha = false;
     job.options.width = job.options.height = kSize;
     ASSERT_TRUE(renderer.Render(*scene, job).ok());
     double both = 0, either = 0;
     for (std::size_t p = 0; p < picture.pixels(); ++p) {
       const bool a = renderer.images().face_ids[p] >= 0, b = picture.alpha[p] >= 0.5f;
-      both += a && b, either += a || b;
+      both += a && b;
+      either += a || b;
     }
     EXPECT_NEAR(both / either, refined->after.silhouette_iou, 0.03) << steps;
   }
@@ -143,7 +147,8 @@ TEST(RefineMesh, APictureWithoutAnObjectIsAnError) {
   const Workers workers(1);
   TargetImages empty;
   empty.width = empty.height = kSize;
-  empty.color.resize(3 * empty.pixels()), empty.alpha.resize(empty.pixels());
+  empty.color.resize(3 * empty.pixels());
+  empty.alpha.resize(empty.pixels());
   const auto refined = RefineMesh(Figure({0.4f, 0.35f, 0.4f}), empty, {.steps = 5}, workers);
   ASSERT_FALSE(refined.ok());
   EXPECT_NE(refined.status().message().find("no object"), std::string::npos);

@@ -36,8 +36,11 @@ class Fit : public TempFolderTest {
     EXPECT_TRUE(input.ok()) << input.status().message();
     if (input.ok()) job.input = std::move(*input);
     job.out = folder_ / out;
-    job.config.steps = 60, job.config.template_level = 2, job.config.texture_size = 32;
-    job.config.checkpoint_every = 20, job.config.timelapse = 3;
+    job.config.steps = 60;
+    job.config.template_level = 2;
+    job.config.texture_size = 32;
+    job.config.checkpoint_every = 20;
+    job.config.timelapse = 3;
     return job;
   }
   Result<FitOutcome> Run(const FitJob& job, int workers = 2) {
@@ -72,7 +75,8 @@ TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
   const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
   ASSERT_TRUE(truth.ok());
   FitJob job = Job("run");
-  job.config.steps = 400, job.config.template_level = 3;
+  job.config.steps = 400;
+  job.config.template_level = 3;
   job.truth = truth->mesh;
   const auto outcome = Run(job);
   ASSERT_TRUE(outcome.ok()) << outcome.status().message();
@@ -143,7 +147,8 @@ TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
   std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);
   std::vector<std::string> warnings;
   job.warn = [&](const std::string& warning) { warnings.push_back(warning); };
-  job.existing = ExistingRun::kContinue, stop_ = false;
+  job.existing = ExistingRun::kContinue;
+  stop_ = false;
   EXPECT_EQ(stop_at(13).status().code(), StatusCode::kCancelled);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
@@ -152,7 +157,8 @@ TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
 // Going on from an older checkpoint would throw away what a newer version did.
 TEST_F(Fit, AnotherVersionsCheckpointStopsIt) {
   FitJob job = Job("run");
-  job.config.steps = 12, job.config.checkpoint_every = 5;
+  job.config.steps = 12;
+  job.config.checkpoint_every = 5;
   ASSERT_TRUE(Run(job).ok());
   const Workers workers(1);
   nn::Context context(workers);
@@ -182,7 +188,8 @@ TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
 TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   FitJob job = Job("run");
   ASSERT_TRUE(Run(job).ok());
-  job.existing = ExistingRun::kContinue, job.config.smoothing = 3;
+  job.existing = ExistingRun::kContinue;
+  job.config.smoothing = 3;
   ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
 }
 
@@ -279,7 +286,8 @@ TEST_F(Fit, RefinesCameras) {
   ASSERT_TRUE(truth.ok());
   job.start = truth->mesh;
   job.config.parameters[Parameter::kCamera] = true;
-  job.config.perturb_cameras = 5, job.config.steps = 200;
+  job.config.perturb_cameras = 5;
+  job.config.steps = 200;
   const auto outcome = Run(job);
   ASSERT_TRUE(outcome.ok()) << outcome.status().message();
   EXPECT_NEAR(outcome->camera_error_before.value_or(0), 5, 1e-2);
@@ -301,8 +309,10 @@ TEST_F(Fit, EveryParameterCanBeFitted) {
     job.config.parameters[parameter] = true;
     job.config.parameters[Parameter::kPositions] = parameter == Parameter::kUv;
     if (parameter == Parameter::kUv) job.config.parameters[Parameter::kTexture] = true;
-    job.config.lighting = lighting, job.config.steps = 30;
-    job.config.views_per_step = 8, job.config.levels = 1;  // every step sees the same
+    job.config.lighting = lighting;
+    job.config.steps = 30;
+    job.config.views_per_step = 8;
+    job.config.levels = 1;  // every step sees the same
     job.config.vertex_colors = parameter == Parameter::kColors;
     const bool sphere = parameter == Parameter::kTexture || parameter == Parameter::kUv;
     if (!sphere) job.start = truth->mesh;
@@ -325,7 +335,8 @@ TEST_F(Fit, ThePageSaysWhichViewsItShows) {
   ASSERT_TRUE(Run(job).ok());
   EXPECT_NE(ReadText(job.out / "report.html")->find(">Held-out views<"), std::string::npos);
   job = Job("fitted");
-  job.config.steps = 1, job.input.held_out.clear();
+  job.config.steps = 1;
+  job.input.held_out.clear();
   ASSERT_TRUE(Run(job).ok());
   EXPECT_NE(ReadText(job.out / "report.html")->find(">Fitted views, the first 6 of 8<"),
             std::string::npos);
@@ -348,7 +359,8 @@ TEST_F(Fit, ErrorsNameTheCure) {
   job.config.timelapse = -1;
   ExpectMessage(Run(job).status(), "timelapse is -1");
   job = Job("run");
-  job.config.lighting = Lighting::kLambert, job.config.light_direction = {0, 0, 0};
+  job.config.lighting = Lighting::kLambert;
+  job.config.light_direction = {0, 0, 0};
   ExpectMessage(Run(job).status(), "light_direction is 0 0 0");
   EXPECT_EQ(ReadFitFolder(folder_ / "none", 0).status().code(), StatusCode::kNotFound);
   Write("broken/transforms.json", std::string("{\"frames\": [{\"file_path\": \"a.png\"}]}"));
@@ -441,8 +453,10 @@ TEST(FitScore, AlignmentFindsASimilarity) {
   const double angle = 0.4;
   truth.scale = 1.3;
   truth.rotation[0] = truth.rotation[4] = std::cos(angle);
-  truth.rotation[1] = -std::sin(angle), truth.rotation[3] = std::sin(angle);
-  truth.offset[0] = 0.2, truth.offset[2] = -0.5;
+  truth.rotation[1] = -std::sin(angle);
+  truth.rotation[3] = std::sin(angle);
+  truth.offset[0] = 0.2;
+  truth.offset[2] = -0.5;
   std::vector<Camera> from, to;
   for (int i = 0; i < 5; ++i) {
     from.push_back(OrbitCamera({50, 40, 30}, 70 * i, 10 * i, 2));

@@ -50,7 +50,8 @@ TEST(TextureFill, UnseenTexelsTakeTheColoursOfTheirChart) {
   AddSquare({2, 0}, {2.25f, 1}, {0.75f, 0}, &scene);  // columns 6 and 7
   std::vector<bool> seen(64, false);
   for (int row = 0; row < 8; ++row) {
-    Red(&scene, 0, row) = 1, Red(&scene, 7, row) = 0;
+    Red(&scene, 0, row) = 1;
+    Red(&scene, 7, row) = 0;
     seen[static_cast<std::size_t>(8 * row)] = seen[static_cast<std::size_t>(8 * row + 7)] = true;
   }
   FillUnseenTexels(seen, &scene);
@@ -68,8 +69,10 @@ TEST(TextureFill, ColoursDoNotCrossCharts) {
   AddSquare({0, 0}, {0.5f, 1}, {0, 0}, &scene);     // columns 0 to 3
   AddSquare({2, 0}, {2.5f, 1}, {0.5f, 0}, &scene);  // columns 4 to 7
   std::vector<bool> seen(64, false);
-  seen[0] = true, Red(&scene, 0, 0) = 1;
-  seen[63] = true, Red(&scene, 7, 7) = 0;
+  seen[0] = true;
+  Red(&scene, 0, 0) = 1;
+  seen[63] = true;
+  Red(&scene, 7, 7) = 0;
   FillUnseenTexels(seen, &scene);
   for (int at = 0; at < 64; ++at)
     EXPECT_EQ(Red(&scene, at % 8, at / 8), at % 8 < 4 ? 1 : 0) << at % 8 << " " << at / 8;

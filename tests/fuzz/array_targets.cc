@@ -141,7 +141,9 @@ void WalkMat(const io::MatFile& file) {
     for (const std::string& field : place->array().fields) {
       const auto inner = place->Field(0, field);
       if (!inner.ok()) continue;
-      (void)inner->Number(), (void)inner->Text(), (void)inner->Numbers(4);
+      (void)inner->Number();
+      (void)inner->Text();
+      (void)inner->Numbers(4);
     }
   }
 }

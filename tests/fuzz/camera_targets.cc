@@ -9,7 +9,10 @@ namespace tilegrad::fuzz::camera_targets {
 
 std::vector<io::CameraView> SampleViews() {
   Camera64 camera;
-  camera.fx = 500, camera.fy = 510, camera.cx = 320, camera.cy = 240;
+  camera.fx = 500;
+  camera.fy = 510;
+  camera.cx = 320;
+  camera.cy = 240;
   camera.translation[2] = -3;
   return {{"a.png", camera, {640, 480}}, {"b c.png", camera, {640, 480}}};
 }
@@ -64,15 +67,21 @@ void Put(const T& value, std::string* out) {
 
 std::vector<Bytes> BinarySeeds() {
   std::string cameras, images;
-  Put(std::uint64_t{1}, &cameras), Put(std::int32_t{7}, &cameras), Put(std::int32_t{1}, &cameras);
-  Put(std::uint64_t{640}, &cameras), Put(std::uint64_t{480}, &cameras);
+  Put(std::uint64_t{1}, &cameras);
+  Put(std::int32_t{7}, &cameras);
+  Put(std::int32_t{1}, &cameras);
+  Put(std::uint64_t{640}, &cameras);
+  Put(std::uint64_t{480}, &cameras);
   for (const double x : {500.0, 510.0, 320.0, 240.0}) Put(x, &cameras);
-  Put(std::uint64_t{1}, &images), Put(std::int32_t{1}, &images);
+  Put(std::uint64_t{1}, &images);
+  Put(std::int32_t{1}, &images);
   for (const double x : {1.0, 0.0, 0.0, 0.0, 0.5, 1.0, 3.0}) Put(x, &images);
   Put(std::int32_t{7}, &images);
   images.append("a.png", 6);
-  Put(std::uint64_t{1}, &images), Put(2.0, &images), Put(3.0, &images),
-      Put(std::int64_t{-1}, &images);
+  Put(std::uint64_t{1}, &images);
+  Put(2.0, &images);
+  Put(3.0, &images);
+  Put(std::int64_t{-1}, &images);
   return {JoinFiles({cameras, images})};
 }
 

@@ -146,7 +146,8 @@ std::vector<Bytes> PnmSeeds() {
 std::vector<Bytes> SgiSeeds() {
   const auto header = [](char encoded, char sample_bytes, char channels) {
     std::string out("\x01\xda", 2);
-    out += encoded, out += sample_bytes;
+    out += encoded;
+    out += sample_bytes;
     out.append("\0\3\0\2\0\1\0", 7) += channels;
     out.resize(512, '\0');
     return out;

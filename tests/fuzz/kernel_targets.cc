@@ -28,8 +28,10 @@ test::ExtremeScene SceneOf(Numbers* in) {
   test::ExtremeScene e;
   e.kind = "fuzzed";
   RenderOptions& o = e.options;
-  o.width = 1 + static_cast<int>(in->Below(20)), o.height = 1 + static_cast<int>(in->Below(20));
-  o.delta = kDeltas[in->Below(7)], o.max_alpha_error = kErrors[in->Below(5)];
+  o.width = 1 + static_cast<int>(in->Below(20));
+  o.height = 1 + static_cast<int>(in->Below(20));
+  o.delta = kDeltas[in->Below(7)];
+  o.max_alpha_error = kErrors[in->Below(5)];
   o.interpolation = in->Below(2) == 0 ? Interpolation::kPerspective : Interpolation::kScreenLinear;
   o.culling = in->Below(4) == 0 ? FaceCulling::kBack : FaceCulling::kNone;
   e.scene.camera = {.fx = 1, .fy = 1, .cx = 0, .cy = 0, .near_plane = 0.1f};  // pixels are world

@@ -22,10 +22,15 @@ std::string TargetOf(Numbers* in) {
 
 nn::Conv2dShape ShapeOf(Numbers* in) {
   nn::Conv2dShape s;
-  s.batch = 1 + in->Below(3), s.in_channels = 1 + in->Below(9), s.out_channels = 1 + in->Below(12);
-  s.kernel_height = 1 + in->Below(5), s.kernel_width = 1 + in->Below(5);
-  s.stride = 1 + in->Below(3), s.padding = in->Below(4);
-  s.in_height = 1 + in->Below(14), s.in_width = 1 + in->Below(14);
+  s.batch = 1 + in->Below(3);
+  s.in_channels = 1 + in->Below(9);
+  s.out_channels = 1 + in->Below(12);
+  s.kernel_height = 1 + in->Below(5);
+  s.kernel_width = 1 + in->Below(5);
+  s.stride = 1 + in->Below(3);
+  s.padding = in->Below(4);
+  s.in_height = 1 + in->Below(14);
+  s.in_width = 1 + in->Below(14);
   return s;
 }
 
@@ -70,7 +75,8 @@ float CoordinateOf(Numbers* in, bool* usual) {
 
 std::array<float, 3> Sample(const shade::TexturePyramid& pyramid, float u, float v, float level) {
   shade::RunPlane uv[2], levels, color[3];
-  std::fill_n(uv[0].at, shade::kRunPad, u), std::fill_n(uv[1].at, shade::kRunPad, v);
+  std::fill_n(uv[0].at, shade::kRunPad, u);
+  std::fill_n(uv[1].at, shade::kRunPad, v);
   std::fill_n(levels.at, shade::kRunPad, level);
   const shade::TextureView& view = pyramid.view();
   shade::SampleTexture(1, {pyramid.levels(), view.wrap, view.filter, uv, &levels}, color);

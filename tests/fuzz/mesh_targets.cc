@@ -159,13 +159,17 @@ void Imported(Input input) {
 std::vector<Bytes> ImportedSeeds() {
   io::ImportedScene scene;
   io::ImportedPart part;
-  part.name = "p", part.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  part.normals.assign(3, {0, 0, 1}), part.uvs.assign(3, {0, 1}),
-      part.colors.assign(3, {1, 1, 1, 1});
+  part.name = "p";
+  part.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  part.normals.assign(3, {0, 0, 1});
+  part.uvs.assign(3, {0, 1});
+  part.colors.assign(3, {1, 1, 1, 1});
   part.triangles = {{0, 1, 2}};
-  scene.parts = {part}, scene.materials = {{"m", {1, 0, 0, 1}, "t.png", 0, ""}};
+  scene.parts = {part};
+  scene.materials = {{"m", {1, 0, 0, 1}, "t.png", 0, ""}};
   scene.images = {{"t.png", *io::EncodePng(ImageU8(1, 1, 3, 5))}};
-  scene.instances = {{0, glm::dmat4x3(1)}}, scene.warnings = {"w"};
+  scene.instances = {{0, glm::dmat4x3(1)}};
+  scene.warnings = {"w"};
   const auto bytes = [](Result<io::ImportedScene> s) { return io::EncodeScene(s); };
   return {bytes(scene), bytes(io::ImportedScene()),
           bytes(Status(StatusCode::kDataLoss, "broken in the child"))};

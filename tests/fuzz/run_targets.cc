@@ -131,7 +131,9 @@ void Dataset(Input input) {
 
 std::vector<Bytes> DatasetSeeds() {
   train::DatasetInfo info;
-  info.source = "folder", info.classes = {"chair", "table"}, info.credits = {"c"};
+  info.source = "folder";
+  info.classes = {"chair", "table"};
+  info.credits = {"c"};
   info.recipe = "0123456789abcdef";
   const Path folder = ScratchFolder() / "seed";
   const std::vector<train::ModelInfo> models = {
@@ -160,9 +162,15 @@ void Evaluation(Input input) {
 std::vector<Bytes> EvaluationSeeds() {
   train::Evaluation e;
   train::Score score;
-  score.iou = 0.5, score.f_score = 0.25;
-  e.predictor = "p", e.split = "test", e.dataset_source = "folder", e.views_per_model = 2;
-  e.classes = {"chair"}, e.class_models = {1}, e.rows = {{"tilegrad", {score}, score}};
+  score.iou = 0.5;
+  score.f_score = 0.25;
+  e.predictor = "p";
+  e.split = "test";
+  e.dataset_source = "folder";
+  e.views_per_model = 2;
+  e.classes = {"chair"};
+  e.class_models = {1};
+  e.rows = {{"tilegrad", {score}, score}};
   e.models = {{"chair", "a", score}};
   return {ToBytes(train::EvaluationJson(e).dump())};
 }

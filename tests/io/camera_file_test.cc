@@ -21,7 +21,10 @@ class CameraFiles : public TempFolderTest {
     std::vector<CameraView> views;
     for (int i = 0; i < 3; ++i) {
       Camera64 c = CameraCast<double>(OrbitCamera({}, 100.0 * i, 20, 2));
-      c.fx = 500.25 + i, c.fy = 400.5, c.cx = 300.75, c.cy = 200.125;
+      c.fx = 500.25 + i;
+      c.fy = 400.5;
+      c.cx = 300.75;
+      c.cy = 200.125;
       views.push_back({"image " + std::to_string(i) + ".png", c, {640, 480 + i}});
     }
     return views;

@@ -223,7 +223,8 @@ TEST_F(GltfSkins, WeightsOfAnySum) {
 }
 
 TEST_F(GltfSkins, AMeshWithoutJointsStandsAtItsNode) {
-  Attributes().erase("JOINTS_0"), Attributes().erase("WEIGHTS_0");
+  Attributes().erase("JOINTS_0");
+  Attributes().erase("WEIGHTS_0");
   ExpectPositions({{100, 0, 0}, {101, 0, 0}, {100, 1, 0}});
 }
 

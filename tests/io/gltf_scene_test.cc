@@ -141,7 +141,8 @@ TEST_F(GltfScene, MaterialsComeBackAsTheyWere) {
 // The light's node turns +z, against which it shines, to the sun: also straight behind.
 TEST_F(GltfScene, LightsPointToTheSun) {
   Mesh triangle;
-  triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, triangle.faces = {{0, 1, 2}};
+  triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  triangle.faces = {{0, 1, 2}};
   for (const glm::dvec3& sun :
        {glm::dvec3(0, 0, 2), {0, 0, -1}, {1, 2, -3}, {-0.1, 0, -0.9}, {0, 1, 0}}) {
     const auto bytes = io::EncodeLitGlb(triangle, sun);

@@ -101,8 +101,10 @@ class FlatJpeg {
     std::string frame = Big(8, 1) + Big(8, 2) + Big(static_cast<std::uint32_t>(width), 2),
                 scan = Big(count, 1);
     frame += Big(count, 1);
-    for (std::uint32_t c = 1; c <= count; ++c)
-      frame += Big(c, 1) + "\x11" + Big(0, 1), scan += Big(c, 1) + Big(0, 1);
+    for (std::uint32_t c = 1; c <= count; ++c) {
+      frame += Big(c, 1) + "\x11" + Big(0, 1);
+      scan += Big(c, 1) + Big(0, 1);
+    }
     // Means: twelve codes of 4 bits, for 0 to 11 bits. The rest: one code of one bit, "no more".
     std::string means = Big(0, 1) + Big(0, 3) + Big(12, 1) + std::string(12, '\0');
     for (int i = 0; i < 12; ++i) means += static_cast<char>(i);
@@ -274,7 +276,8 @@ TEST(Image, GreyBecomesColor) {
   ImageU8 grey(1, 1, 2);
   grey.pixels = {70, 90};
   EXPECT_EQ(ToColor(grey).pixels, (std::vector<std::uint8_t>{70, 70, 70, 90}));
-  grey.channels = 1, grey.pixels = {70};
+  grey.channels = 1;
+  grey.pixels = {70};
   EXPECT_EQ(ToColor(grey).pixels, (std::vector<std::uint8_t>{70, 70, 70}));
 }
 

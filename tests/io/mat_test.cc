@@ -35,7 +35,8 @@ Bytes operator+(Bytes a, const Bytes& b) {
 // A data element with its padding.
 Bytes Element(std::uint32_t type, const Bytes& data) {
   Bytes out;
-  Put(out, type), Put(out, static_cast<std::uint32_t>(data.size()));
+  Put(out, type);
+  Put(out, static_cast<std::uint32_t>(data.size()));
   out = out + data;
   out.resize((out.size() + 7) / 8 * 8);
   return out;
@@ -66,7 +67,8 @@ Bytes Packed(const Bytes& bytes) {
   Bytes data(size), out;
   EXPECT_EQ(compress(data.data(), &size, bytes.data(), bytes.size()), Z_OK);
   data.resize(size);
-  Put(out, 15), Put(out, static_cast<std::uint32_t>(size));
+  Put(out, 15);
+  Put(out, static_cast<std::uint32_t>(size));
   return out + data;
 }
 
@@ -178,7 +180,8 @@ TEST(Mat, ErrorsNameFileAndPlace) {
 TEST(Mat, RefusesOtherFiles) {
   Bytes old(200, 0), hdf = Header(), big = Header();
   hdf[125] = 2;
-  big[126] = 'M', big[127] = 'I';
+  big[126] = 'M';
+  big[127] = 'I';
   ExpectMessage(ReadMat(old, "v4.mat").status(), "v4.mat", "version 5");
   ExpectMessage(ReadMat(hdf, "new.mat").status(), "7.3", "-v7");
   ExpectMessage(ReadMat(big, "sun.mat").status(), "big-endian");

@@ -229,7 +229,9 @@ TEST_F(ObjTest, NormalsThatAreNoneAreTheSurfaces) {
 
 TEST_F(ObjTest, LibrariesByEveryName) {
   const std::string a = "newmtl a\nKd 1 0 0\n", b = "newmtl b\nKd 0 0 1\n";
-  Write("a.mtl", a), Write("b.mtl", "\xef\xbb\xbf" + b), Write("my lib.mtl", a + b);
+  Write("a.mtl", a);
+  Write("b.mtl", "\xef\xbb\xbf" + b);
+  Write("my lib.mtl", a + b);
   Write("sub/c.mtl", a + b);
   for (const std::string libraries :
        {"mtllib a.mtl b.mtl", "mtllib a.mtl\nmtllib b.mtl", "mtllib my lib.mtl",

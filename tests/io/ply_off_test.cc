@@ -40,10 +40,15 @@ std::string BinaryBody(bool big_endian) {
   const float xy[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   const std::uint8_t rgb[4][3] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {51, 51, 51}};
   for (int i = 0; i < 4; ++i) {
-    add(xy[i][0]), add(xy[i][1]), add(0.5);
+    add(xy[i][0]);
+    add(xy[i][1]);
+    add(0.5);
     for (const std::uint8_t c : rgb[i]) add(c);
     add(std::uint8_t(i == 1 ? 2 : 0));
-    if (i == 1) add(std::int16_t{7}), add(std::int16_t{8});
+    if (i == 1) {
+      add(std::int16_t{7});
+      add(std::int16_t{8});
+    }
   }
   add(std::uint8_t{4});
   for (std::int32_t i = 0; i < 4; ++i) add(i);

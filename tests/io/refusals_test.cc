@@ -24,11 +24,22 @@ TEST_F(Refusals, ImagesAboveTheLimitAreCalledSo) {
                       7,    0x4e, 0x20, 1,    1,    0x11, 0,  0xff, 0xd9};
   ExpectTooLarge(jpeg, "20000 x 7");
   Bytes bmp(60);
-  bmp[0] = 'B', bmp[1] = 'M', bmp[10] = 54, bmp[14] = 40, bmp[18] = 0x20, bmp[19] = 0x4e;
-  bmp[22] = 5, bmp[26] = 1, bmp[28] = 24;
+  bmp[0] = 'B';
+  bmp[1] = 'M';
+  bmp[10] = 54;
+  bmp[14] = 40;
+  bmp[18] = 0x20;
+  bmp[19] = 0x4e;
+  bmp[22] = 5;
+  bmp[26] = 1;
+  bmp[28] = 24;
   ExpectTooLarge(bmp, "20000 x 5");
   Bytes tga(40);
-  tga[2] = 2, tga[12] = 3, tga[14] = 0x20, tga[15] = 0x4e, tga[16] = 24;
+  tga[2] = 2;
+  tga[12] = 3;
+  tga[14] = 0x20;
+  tga[15] = 0x4e;
+  tga[16] = 24;
   ExpectTooLarge(tga, "3 x 20000");
 }
 

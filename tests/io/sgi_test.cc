@@ -110,8 +110,10 @@ TEST(Sgi, OneAndTwoDimensionsAreARowAndGrey) {
 TEST(Sgi, RunsRepeatAndSixteenBitsAreRounded) {
   const Picture p{.width = 100, .height = 1, .channels = 1, .sample_bytes = 2, .dimensions = 2};
   Bytes file = Header(p, 1);
-  PutBig(file, 520, 4), PutBig(file, 6, 4);
-  PutBig(file, 100, 2), PutBig(file, 0x0180, 2);  // 384 * 255 / 65535 = 1.49
+  PutBig(file, 520, 4);
+  PutBig(file, 6, 4);
+  PutBig(file, 100, 2);
+  PutBig(file, 0x0180, 2);  // 384 * 255 / 65535 = 1.49
   PutBig(file, 0, 2);
   const auto image = DecodeImage(file, "a.rgb");
   ASSERT_TRUE(image.ok()) << image.status().message();

@@ -19,7 +19,9 @@ std::vector<ImageU8> MovingSquare(int count, int channels) {
     ImageU8& image = frames.emplace_back(48, 32, channels, std::uint8_t{200});
     for (int y = 8; y < 24; ++y) {
       for (int x = 2 * i; x < 2 * i + 16; ++x) {
-        image.at(x, y)[0] = 220, image.at(x, y)[1] = 30, image.at(x, y)[2] = 40;
+        image.at(x, y)[0] = 220;
+        image.at(x, y)[1] = 30;
+        image.at(x, y)[2] = 40;
       }
     }
   }

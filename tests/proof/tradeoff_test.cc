@@ -17,7 +17,8 @@ struct SphereJob {
     const Mesh mesh = Icosphere(2, 0.5f);
     for (const auto& p : mesh.positions) positions.insert(positions.end(), {p.x, p.y, p.z});
     for (const Face& f : mesh.faces) faces.insert(faces.end(), f.begin(), f.end());
-    job.scene.positions = positions, job.scene.faces = faces;
+    job.scene.positions = positions;
+    job.scene.faces = faces;
     job.scene.camera = OrbitCamera({30.0, 32, 32}, 30, 20, 2.732);
     job.options.width = job.options.height = 32;
     job.errors = {0, 1e-4, 1e-1};

@@ -37,32 +37,42 @@ ScreenMeshBuffers JitteredGrid(int width, int height, Rng* rng) {
   const auto add = [&](int a, int b, int c) {
     if (rng->Uniform() < 0.2) return;
     out.source_face.push_back(static_cast<std::int32_t>(out.v0.size()));
-    out.v0.push_back(a), out.v1.push_back(b), out.v2.push_back(c);
+    out.v0.push_back(a);
+    out.v1.push_back(b);
+    out.v2.push_back(c);
     out.reject.push_back(kFaceDrawn);
   };
   for (int i = 0; i < rows; ++i) {
     for (int j = 0; j < columns; ++j) {
       const int a = i * (columns + 1) + j, c = a + columns + 1;
-      add(a, a + 1, c), add(a + 1, c + 1, c);
+      add(a, a + 1, c);
+      add(a + 1, c + 1, c);
     }
   }
   out.packed.resize(out.x.size());
   out.Pack(0, out.x.size());
   out.source_vertices = static_cast<std::int32_t>(out.x.size());
   out.source_faces = static_cast<std::int32_t>(out.v0.size());
-  out.width = width, out.height = height;
+  out.width = width;
+  out.height = height;
   return out;
 }
 
 ScreenMeshBuffersT<double> ToDouble(const ScreenMeshBuffers& m) {
   ScreenMeshBuffersT<double> out;
-  out.x.assign(m.x.begin(), m.x.end()), out.y.assign(m.y.begin(), m.y.end());
+  out.x.assign(m.x.begin(), m.x.end());
+  out.y.assign(m.y.begin(), m.y.end());
   out.depth.assign(m.depth.begin(), m.depth.end());
   out.inverse_depth.assign(m.inverse_depth.begin(), m.inverse_depth.end());
-  out.v0 = m.v0, out.v1 = m.v1, out.v2 = m.v2, out.source_face = m.source_face;
+  out.v0 = m.v0;
+  out.v1 = m.v1;
+  out.v2 = m.v2;
+  out.source_face = m.source_face;
   out.reject = m.reject;
-  out.source_vertices = m.source_vertices, out.source_faces = m.source_faces;
-  out.width = m.width, out.height = m.height;
+  out.source_vertices = m.source_vertices;
+  out.source_faces = m.source_faces;
+  out.width = m.width;
+  out.height = m.height;
   return out;
 }
 
@@ -104,7 +114,8 @@ struct Case {
     const ScreenMeshT<double> view = buffers.View();
     const std::vector<double> values(attributes.begin(), attributes.end());
     const AttributeViewT<const double> in{values, channels, rate};
-    d_attributes.assign(values.size(), 0), vertex_scale.assign(mesh.x.size(), 0);
+    d_attributes.assign(values.size(), 0);
+    vertex_scale.assign(mesh.x.size(), 0);
     std::vector<double> d[3], none;
     for (auto& array : d) array.assign(mesh.x.size(), 0);
     for (std::size_t i = 0; i < faces.size(); ++i) {

@@ -143,7 +143,8 @@ TEST(NearClip, AttributesWithoutChannelsAreNotRead) {
   ASSERT_TRUE(buffers.View().was_clipped());
   for (const Rate rate : {Rate::kVertex, Rate::kCorner}) {
     AttributeViewT<const float> none;
-    none.channels = 0, none.rate = rate;
+    none.channels = 0;
+    none.rate = rate;
     ClipAttributes<float>(buffers.View(), points.faces, none, {});
     ClipAttributesBackward<float>(buffers.View(), points.faces, none, {}, {}, {});
   }

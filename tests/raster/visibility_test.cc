@@ -36,12 +36,15 @@ struct Flat {
   }
   void AddFace(std::int32_t a, std::int32_t b, std::int32_t c) {
     const auto f = static_cast<std::int32_t>(buffers.v0.size());
-    buffers.v0.push_back(a), buffers.v1.push_back(b), buffers.v2.push_back(c);
+    buffers.v0.push_back(a);
+    buffers.v1.push_back(b);
+    buffers.v2.push_back(c);
     buffers.source_face.push_back(f);
     buffers.reject.push_back(kFaceDrawn);
   }
   ScreenMesh Finish() {
-    buffers.width = width, buffers.height = height;
+    buffers.width = width;
+    buffers.height = height;
     buffers.packed.resize(buffers.x.size());
     buffers.Pack(0, buffers.x.size());
     buffers.source_vertices = static_cast<std::int32_t>(buffers.x.size());
@@ -249,7 +252,8 @@ TEST_P(VisibilityOnEveryTarget, PeelingShowsAllLayersInTheirOrder) {
         const auto at = static_cast<std::size_t>(i);
         behind[at] = bin.inverse_depth[i];
         if (bin.face[i] == kNoFace) continue;
-        seen[at].push_back(bin.face[i]), more = true;
+        seen[at].push_back(bin.face[i]);
+        more = true;
       }
     }
     EXPECT_FALSE(more);

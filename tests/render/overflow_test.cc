@@ -23,7 +23,8 @@ OwnedScene<float> Triangle(float color) {
   s.mesh.faces = {0, 1, 2};
   s.mesh.channels = 0;
   Lens lens;
-  lens.width = test::kTrialWidth, lens.height = test::kTrialHeight;
+  lens.width = test::kTrialWidth;
+  lens.height = test::kTrialHeight;
   s.mesh.camera = OrbitCamera(lens, 90, 0, 3);
   s.colors.assign(9, color);
   s.surfaces.resize(1);

@@ -39,7 +39,8 @@ inline void AddTextures(Rng* rng, OwnedScene<float>* s) {
   RandomVectors(rows, -0.7, 1.7, 2, rng, &s->uvs);
   for (int k = 0; k < 2; ++k) {
     OwnedTexture<float> t;
-    t.width = 1 + static_cast<int>(rng->Below(6)), t.height = 1 + static_cast<int>(rng->Below(6));
+    t.width = 1 + static_cast<int>(rng->Below(6));
+    t.height = 1 + static_cast<int>(rng->Below(6));
     t.wrap = static_cast<Wrap>(rng->Below(9));
     t.filter = static_cast<Filter>(rng->Below(3));
     RandomVectors(static_cast<std::size_t>(t.width * t.height), 0, 1, 3, rng, &t.texels);

@@ -14,11 +14,7 @@ namespace tilegrad::renderer_contract_test {
 constexpr int kWidth = 150, kHeight = 100;  // several bins and bands
 constexpr std::size_t kPixels = kWidth * kHeight;
 
-RenderOptions Options() {
-  RenderOptions options;
-  options.width = kWidth, options.height = kHeight;
-  return options;
-}
+RenderOptions Options() { return {.width = kWidth, .height = kHeight}; }
 
 // A textured sphere with colours, under `lighting`.
 OwnedScene<float> Sphere(Lighting lighting) {
@@ -28,10 +24,8 @@ OwnedScene<float> Sphere(Lighting lighting) {
   test::RandomAttributes(2, Rate::kVertex, &rng, &s.mesh);
   test::RandomVectors(s.mesh.vertex_count(), 0, 1, 3, &rng, &s.colors);
   test::RandomVectors(s.mesh.faces.size(), 0, 1, 2, &rng, &s.uvs);
-  s.textures.resize(1);
-  auto& t = s.textures[0];
-  t.width = 16, t.height = 8, t.filter = Filter::kTrilinear;
-  test::RandomVectors(128, 0, 1, 3, &rng, &t.texels);
+  s.textures = {{.texels = {}, .width = 16, .height = 8, .filter = Filter::kTrilinear}};
+  test::RandomVectors(128, 0, 1, 3, &rng, &s.textures[0].texels);
   s.surfaces.push_back({{1, 1, 1}, 0, {0.1f, 0.1f, 0.1f}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
   s.shading.lighting = lighting;
   if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
@@ -44,14 +38,15 @@ OwnedScene<float> Sphere(Lighting lighting) {
 // Nothing but geometry.
 OwnedScene<float> Bare() {
   OwnedScene<float> s = Sphere(Lighting::kNone);
-  s.colors.clear(), s.uvs.clear(), s.textures.clear(), s.surfaces.clear();
+  s.colors.clear();
+  s.uvs.clear();
+  s.textures.clear();
+  s.surfaces.clear();
   return s;
 }
 
 Outputs Request(bool color, bool alpha) {
-  Outputs request;
-  request.color = color, request.alpha = alpha, request.attributes = false;
-  return request;
+  return {.color = color, .alpha = alpha, .attributes = false};
 }
 
 std::int64_t Foreground(const PipelineFrame& frame) {
@@ -80,9 +75,8 @@ struct Session {
     Rng rng(4, 4);
     const OwnedCotangents<float> all(kPixels, 2, &rng);
     OwnedGradients<float> gradients(scene);
-    auto d_frame = all.View();
-    d_frame.uv = {}, d_frame.normals = {}, d_frame.depth = {}, d_frame.attributes = {};
-    d_frame.alpha = {};
+    FrameGradients d_frame;
+    d_frame.color = all.color;
     const SceneGradients every_gradient = gradients.View();
     SceneGradients d_scene;
     chosen = &every_gradient;
@@ -166,7 +160,8 @@ TEST(ShadedPlan, NothingIsPulledThatDoesNotRequireIt) {
   EXPECT_EQ(report.count("recompute"), seen * 11);
   // Alpha alone visits no foreground pixel.
   report = session.Backward([&](auto& d_frame, auto& d) {
-    d_frame.color = {}, d.positions = chosen->positions;
+    d_frame.color = {};
+    d.positions = chosen->positions;
     static const std::vector<float> d_alpha(kPixels, 1.0f);
     d_frame.alpha = d_alpha;
   });
@@ -201,7 +196,9 @@ TEST(ShadedPlan, AlphaIsNamedByItsRule) {
     EXPECT_EQ(StageOf(report, "alpha").what.find("pairs") == std::string::npos,
               rule == AlphaRule::kPaper);
     report = session.Backward([&](auto& d_frame, auto& d) {
-      d_frame.color = {}, d_frame.alpha = d_alpha, d.positions = session.chosen->positions;
+      d_frame.color = {};
+      d_frame.alpha = d_alpha;
+      d.positions = session.chosen->positions;
     });
     EXPECT_TRUE(StageOf(report, "alpha").what.starts_with(backward))
         << StageOf(report, "alpha").what;

@@ -16,12 +16,15 @@ OwnedScene<float> Sphere(Lighting lighting = Lighting::kPhong) {
   Rng rng(5, 5);
   OwnedScene<float> s;
   s.mesh = test::BumpySphere(6, 8, test::kTrialWidth, test::kTrialHeight, &rng);
-  s.mesh.attributes.clear(), s.mesh.channels = 0;
+  s.mesh.attributes.clear();
+  s.mesh.channels = 0;
   s.uvs_rate = Rate::kVertex;
   test::RandomVectors(s.mesh.vertex_count(), 0, 1, 2, &rng, &s.uvs);
   s.textures.resize(1);
   auto& t = s.textures[0];
-  t.width = 4, t.height = 3, t.filter = Filter::kTrilinear;
+  t.width = 4;
+  t.height = 3;
+  t.filter = Filter::kTrilinear;
   test::RandomVectors(12, 0, 1, 3, &rng, &t.texels);
   s.surfaces.push_back({{1, 1, 1}, 0, {0, 0, 0}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
   s.shading.lighting = lighting;
@@ -117,9 +120,21 @@ const Extreme kExtremes[] = {
        s.lights[0].direction = {0, -1, 0};
      }},
     {"uv_1e6", [](auto& s) { SetUvs(s, 1e6f); }},
-    {"uv_1e6_clamp", [](auto& s) { SetUvs(s, -1e6f), s.textures[0].wrap = Wrap::kClamp; }},
-    {"uv_1e6_mirror", [](auto& s) { SetUvs(s, 1e6f), s.textures[0].wrap = Wrap::kMirror; }},
-    {"uv_1e30", [](auto& s) { SetUvs(s, 1e30f), s.textures[0].filter = Filter::kBilinear; }},
+    {"uv_1e6_clamp",
+     [](auto& s) {
+       SetUvs(s, -1e6f);
+       s.textures[0].wrap = Wrap::kClamp;
+     }},
+    {"uv_1e6_mirror",
+     [](auto& s) {
+       SetUvs(s, 1e6f);
+       s.textures[0].wrap = Wrap::kMirror;
+     }},
+    {"uv_1e30",
+     [](auto& s) {
+       SetUvs(s, 1e30f);
+       s.textures[0].filter = Filter::kBilinear;
+     }},
     {"one_texel",
      [](auto& s) {
        s.textures[0].width = s.textures[0].height = 1;

@@ -44,7 +44,7 @@ struct Compared {
 void Compare(double got, double expected, Compared* c) {
   if (std::isinf(expected) && got == expected) return;
   c->finite = c->finite && std::isfinite(got) && std::isfinite(expected);
-  c->off = std::max(c->off, std::abs(got - expected)),
+  c->off = std::max(c->off, std::abs(got - expected));
   c->most = std::max(c->most, std::abs(expected));
 }
 
@@ -100,7 +100,8 @@ void Check(const SceneRecipe& recipe, std::uint64_t seed, Tally* tally) {
       far |= c.relative() > kTolerance;
     }
   }
-  ++tally->trials, tally->far += far;
+  ++tally->trials;
+  tally->far += far;
 }
 
 class ShadedSimd : public testing::TestWithParam<SceneRecipe> {

@@ -24,7 +24,8 @@ struct Square {
 
   Scene View() const {
     Scene scene;
-    scene.positions = positions, scene.faces = faces;
+    scene.positions = positions;
+    scene.faces = faces;
     const float eye[3] = {0, 0, 2}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
     scene.camera = LookAtCamera({2 * std::atan(0.5) * 180 / M_PI, kSize, kSize}, eye, target, up);
     return scene;
@@ -117,20 +118,25 @@ TEST(Engine, DirectionsThatAreGivenMayHaveAnyLength) {
     for (float& x : n) x = std::ldexp(x, power);
     for (float& x : l) x = std::ldexp(x, -power);
     Scene scene = square.View();
-    scene.normals = {n, Rate::kVertex}, scene.light_directions = l;
-    scene.shading.normals = Normals::kGiven, scene.shading.lighting = Lighting::kLambert;
+    scene.normals = {n, Rate::kVertex};
+    scene.light_directions = l;
+    scene.shading.normals = Normals::kGiven;
+    scene.shading.lighting = Lighting::kLambert;
     const FrameImages frame = Draw(scene);
     const std::vector<float> d_color(3 * kPixels, 0x1p-10f);
     FrameGradients d_frame;
     d_frame.color = d_color;
     SceneGradients d_scene;
-    d_scene.normals = d_n, d_scene.light_directions = d_l;
+    d_scene.normals = d_n;
+    d_scene.light_directions = d_l;
     const Status status = renderer.Backward({&scene, 1}, Options(), frame, d_frame, {&d_scene, 1});
     ASSERT_TRUE(status.ok()) << status.message();
     for (float& x : d_n) x = std::ldexp(x, power);
     for (float& x : d_l) x = std::ldexp(x, -power);
     if (power == 0) {
-      color.assign(frame.color.begin(), frame.color.end()), d_normals = d_n, d_lights = d_l;
+      color.assign(frame.color.begin(), frame.color.end());
+      d_normals = d_n;
+      d_lights = d_l;
       EXPECT_GT(color[0], 0.5f);
       EXPECT_NE(d_normals[0], 0.0f);
       continue;
@@ -144,7 +150,8 @@ TEST(Engine, DirectionsThatAreGivenMayHaveAnyLength) {
 TEST(Engine, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
   Square square;
   for (float& p : square.positions) p *= 0.5f;
-  std::swap(square.faces[0], square.faces[1]), std::swap(square.faces[3], square.faces[4]);
+  std::swap(square.faces[0], square.faces[1]);
+  std::swap(square.faces[3], square.faces[4]);
   Scene scene = square.View();
   const Light light{{0, 0, 1}, 1};
   scene.lights = {&light, 1};

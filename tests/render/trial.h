@@ -31,8 +31,10 @@ inline constexpr std::size_t kTrialPixels = kTrialWidth * kTrialHeight;
 
 inline RenderOptions TrialOptions() {
   RenderOptions options;
-  options.width = kTrialWidth, options.height = kTrialHeight;
-  options.delta = 1e-2, options.max_alpha_error = 1e-7;
+  options.width = kTrialWidth;
+  options.height = kTrialHeight;
+  options.delta = 1e-2;
+  options.max_alpha_error = 1e-7;
   return options;
 }
 

@@ -95,8 +95,10 @@ struct SharedScene {
     d.resize(5 * static_cast<std::size_t>(scene.size * scene.size));
     scene.options.reduction =
         of["anti_aliasing"].get<bool>() ? N3mrReduction::kMean : N3mrReduction::kNone;
-    scene.options.fill_back = of["fill_back"], scene.options.eps = eps;
-    scene.options.near_plane = of["near"], scene.options.far_plane = of["far"];
+    scene.options.fill_back = of["fill_back"];
+    scene.options.eps = eps;
+    scene.options.near_plane = of["near"];
+    scene.options.far_plane = of["far"];
     const auto background = Numbers(of["background"]);
     std::copy_n(background.begin(), 3, scene.colors.background);
     const double texels = static_cast<double>(3 * textures.size() / corners.size());

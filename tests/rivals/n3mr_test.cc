@@ -49,7 +49,9 @@ N3mrOptions OptionsOf(const Json& scene, double eps) {
                       : reduction.get<bool>() ? N3mrReduction::kMean
                                               : N3mrReduction::kNone;
   options.fill_back = scene["fill_back"];
-  options.near_plane = scene["near"], options.far_plane = scene["far"], options.eps = eps;
+  options.near_plane = scene["near"];
+  options.far_plane = scene["far"];
+  options.eps = eps;
   return options;
 }
 
@@ -178,7 +180,8 @@ TEST(N3mr, DepthDecidesAndTiesGoToTheFirst) {
   const N3mrDrawingRef<double> nearer(corners, 4, kPlain);
   EXPECT_EQ(nearer.owner[0], 1);
   N3mrOptions options = kPlain;
-  options.near_plane = 1.5, options.far_plane = 2;  // both excluded
+  options.near_plane = 1.5;
+  options.far_plane = 2;  // both excluded
   const N3mrDrawingRef<double> none(corners, 4, options);
   EXPECT_EQ(none.owner, std::vector<std::int32_t>(16, -1));
 }

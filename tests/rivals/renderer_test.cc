@@ -88,7 +88,8 @@ Images<T> Render(const Scene<T>& scene, const Options& options, const std::vecto
 
 std::vector<Options> AllRules() {
   std::vector<Options> out(4);
-  out[1].softras.distance = SoftDistance::kBarycentric, out[1].softras.sigma = 1e-2;
+  out[1].softras.distance = SoftDistance::kBarycentric;
+  out[1].softras.sigma = 1e-2;
   out[2].rule = out[3].rule = Rule::kN3mr;
   out[3].n3mr.reduction = N3mrReduction::kBilinear;
   return out;
@@ -102,8 +103,10 @@ TEST(RivalRenderer, GradientsGoThroughTheCamera) {
   Scene<double> scene(1, 16);
   scene.Color();
   Options options;
-  options.softras.sigma = 1e-3, options.softras.exact_product = true;
-  options.softras_colors.gamma = 1e-3, options.softras_colors.position_gradient = true;
+  options.softras.sigma = 1e-3;
+  options.softras.exact_product = true;
+  options.softras_colors.gamma = 1e-3;
+  options.softras_colors.position_gradient = true;
   const auto d = RandomPushes(scene);
   const auto at = Render(scene, options, d, workers);
   RendererT<double> renderer(workers);
@@ -141,7 +144,8 @@ TEST(RivalRenderer, ColorsOfFacesAreMeansOfTheirCorners) {
   scene.colors.assign(scene.positions.size(), 0.0f);
   for (std::size_t i = 0; i < scene.colors.size(); i += 3) scene.colors[i] = 0.75f;  // red
   std::vector<Options> rules(3);
-  rules[0].rule = Rule::kN3mr, rules[0].n3mr.reduction = N3mrReduction::kNone;
+  rules[0].rule = Rule::kN3mr;
+  rules[0].n3mr.reduction = N3mrReduction::kNone;
   rules[1].softras_colors.texture = SoftTexture::kSurface;
   rules[1].softras_colors.color = SoftColor::kHard;
   rules[2].softras_colors.color = SoftColor::kHard;  // of vertices, which are all the same here
@@ -172,7 +176,10 @@ TEST(RivalRenderer, FloatIsDouble) {
   Scene<float> scene(2, 32);
   Scene<double> exact(2, 32);
   for (const bool color : {false, true}) {
-    if (color) scene.Color(), exact.Color();
+    if (color) {
+      scene.Color();
+      exact.Color();
+    }
     for (const Options& options : AllRules()) {
       const auto d = RandomPushes(scene);
       const auto got = Render(scene, options, d, workers);

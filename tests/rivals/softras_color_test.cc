@@ -87,11 +87,14 @@ struct SharedCase {
     SoftRasOptions& o = scene.options;
     o.distance =
         one["dist_func"] == "barycentric" ? SoftDistance::kBarycentric : SoftDistance::kEuclidean;
-    o.sigma = one["sigma"], o.dist_eps = one["dist_eps"];
-    o.near_plane = of["near"], o.far_plane = of["far"];
+    o.sigma = one["sigma"];
+    o.dist_eps = one["dist_eps"];
+    o.near_plane = of["near"];
+    o.far_plane = of["far"];
     SoftRasColors& c = scene.colors;
     c.color = one["aggr_func_rgb"] == "hard" ? SoftColor::kHard : SoftColor::kSoftmax;
-    c.gamma = one["gamma"], c.double_side = one["double_side"];
+    c.gamma = one["gamma"];
+    c.double_side = one["double_side"];
     std::copy_n(background.begin(), 3, c.background);
     if (one["texture_type"] == "vertex") return;
     c.texture = SoftTexture::kSurface;
@@ -183,8 +186,12 @@ TEST(SoftRasColors, GradientsAreDerivatives) {
     SCOPED_TRACE(trial);
     Rng rng(7);
     SoftRasColors colors{.gamma = 0.02, .background = {0.2, 0.5, 0.7}};
-    colors.position_gradient = trial > 0, colors.inverse_depth = trial == 2;
-    if (trial >= 3) colors.texture = SoftTexture::kSurface, colors.resolution = 3;
+    colors.position_gradient = trial > 0;
+    colors.inverse_depth = trial == 2;
+    if (trial >= 3) {
+      colors.texture = SoftTexture::kSurface;
+      colors.resolution = 3;
+    }
     if (trial == 4) colors.color = SoftColor::kHard;
     const SoftRasOptions options{.sigma = 2e-3, .far_plane = 4};
     const auto corners = RandomCorners<double>(8, 0.6, &rng);
@@ -223,12 +230,20 @@ TEST(SoftRasColors, FloatIsTheReference) {
     Rng rng(11);
     SoftRasOptions options{.sigma = 1e-3, .far_plane = 4};
     SoftRasColors colors{.gamma = 1e-2, .background = {0.2, 0.5, 0.7}};
-    colors.position_gradient = trial == 1 || trial == 3, colors.inverse_depth = trial == 1;
-    colors.background_once = trial == 2, colors.double_side = trial != 2;
-    if (trial >= 3) colors.texture = SoftTexture::kSurface, colors.resolution = 3;
+    colors.position_gradient = trial == 1 || trial == 3;
+    colors.inverse_depth = trial == 1;
+    colors.background_once = trial == 2;
+    colors.double_side = trial != 2;
+    if (trial >= 3) {
+      colors.texture = SoftTexture::kSurface;
+      colors.resolution = 3;
+    }
     if (trial == 4) colors.color = SoftColor::kHard;
     if (trial == 5) options.distance = SoftDistance::kHard;
-    if (trial == 6) options.distance = SoftDistance::kBarycentric, options.sigma = 1e-2;
+    if (trial == 6) {
+      options.distance = SoftDistance::kBarycentric;
+      options.sigma = 1e-2;
+    }
     const auto corners = RandomCorners<double>(30, 0.3, &rng);
     const auto textures = Random<double>(30 * colors.texels() * 3, 0, 1, &rng);
     const auto d_color = Random<double>(3 * kSide * kSide, -1, 1, &rng);

@@ -24,8 +24,10 @@ SoftDistance DistanceOf(const std::string& name) {
 SoftRasOptions OptionsOf(const Json& scene, const Json& one) {
   SoftRasOptions options;
   options.distance = DistanceOf(one["dist_func"]);
-  options.sigma = one["sigma"], options.dist_eps = one["dist_eps"];
-  options.near_plane = scene["near"], options.far_plane = scene["far"];
+  options.sigma = one["sigma"];
+  options.dist_eps = one["dist_eps"];
+  options.near_plane = scene["near"];
+  options.far_plane = scene["far"];
   return options;
 }
 

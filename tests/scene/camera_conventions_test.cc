@@ -59,9 +59,14 @@ Case RandomCase(Rng& rng, bool centred) {
       RotationFromVector({rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-3, 3)});
   std::copy(r.begin(), r.end(), c.rotation);
   for (double& t : c.translation) t = rng.Uniform(-2, 2);
-  c.fx = rng.Uniform(20, 2000), c.fy = rng.Uniform(20, 2000);
-  c.cx = 0.5 * out.size.width, c.cy = 0.5 * out.size.height;
-  if (!centred) c.cx += rng.Uniform(-300, 300), c.cy += rng.Uniform(-300, 300);
+  c.fx = rng.Uniform(20, 2000);
+  c.fy = rng.Uniform(20, 2000);
+  c.cx = 0.5 * out.size.width;
+  c.cy = 0.5 * out.size.height;
+  if (!centred) {
+    c.cx += rng.Uniform(-300, 300);
+    c.cy += rng.Uniform(-300, 300);
+  }
   for (int i = 0; i < 8; ++i) {
     const Vec3Array at = {rng.Uniform(-2, 2), rng.Uniform(-2, 2), rng.Uniform(-6, -0.5)};
     Vec3Array world = {};  // R^T (at - t)
@@ -248,28 +253,37 @@ TEST(CameraConventions, WhatIsNoPinholeIsRefused) {
   OpenCvCamera cv;
   cv.k[1] = 0.5;
   ExpectRefused(FromOpenCv(cv), "skew");
-  cv = {}, cv.k[8] = 2;
+  cv = {};
+  cv.k[8] = 2;
   ExpectRefused(FromOpenCv(cv), "last row of K");
-  cv = {}, cv.k[0] = 0;
+  cv = {};
+  cv.k[0] = 0;
   ExpectRefused(FromOpenCv(cv), "focal");
-  cv = {}, cv.k[0] = nan;
+  cv = {};
+  cv.k[0] = nan;
   ExpectRefused(FromOpenCv(cv), "focal");
-  cv = {}, cv.k[2] = nan;
+  cv = {};
+  cv.k[2] = nan;
   ExpectRefused(FromOpenCv(cv), "principal point");
-  cv = {}, cv.rotation[0] = 1.01;
+  cv = {};
+  cv.rotation[0] = 1.01;
   ExpectRefused(FromOpenCv(cv), "rotation");
-  cv = {}, cv.rotation[0] = -1;
+  cv = {};
+  cv.rotation[0] = -1;
   ExpectRefused(FromOpenCv(cv), "mirror");
-  cv = {}, cv.rotation = {};
+  cv = {};
+  cv.rotation = {};
   ExpectRefused(FromOpenCv(cv), "rotation");
-  cv = {}, cv.translation[1] = nan;
+  cv = {};
+  cv.translation[1] = nan;
   ExpectRefused(FromOpenCv(cv), "finite");
   ExpectRefused(FromColmap({.quaternion = {0, 0, 0, 0}}), "quaternion");
   ExpectRefused(FromColmap({.quaternion = {nan, 0, 0, 0}}), "quaternion");
   NerfCamera nerf;
   nerf.camera_to_world[12] = 1;
   ExpectRefused(FromNerf(nerf), "row-major");
-  nerf = {}, nerf.camera_to_world[0] = 2;
+  nerf = {};
+  nerf.camera_to_world[0] = 2;
   ExpectRefused(FromNerf(nerf), "scale");
   const ImageSize size{64, 48};
   ExpectRefused(FromOpenGl({}, size), "perspective");
@@ -348,7 +362,10 @@ TEST_F(CameraVectors, OrbitCameraIsDibrs) {
 TEST_F(CameraVectors, N3mrIsTheMirrorImage) {
   for (const auto& view : data_["n3mr_softras"]) {
     Mat3Array rotation = Rows(view["rot"]);
-    for (int c = 0; c < 3; ++c) rotation[c] *= -1, rotation[6 + c] *= -1;
+    for (int c = 0; c < 3; ++c) {
+      rotation[c] *= -1;
+      rotation[6 + c] *= -1;
+    }
     const double focal = 1 / std::tan(std::numbers::pi / 12);
     const auto camera =
         FromKaolin({rotation, view["eye"].get<Vec3Array>(), {focal, focal, -1}}, {64, 64});

@@ -62,8 +62,13 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
   for (int trial = 0; trial < 1000; ++trial) {
     P64 p;
     for (double& x : p.rotation) x = random();
-    p.translation[0] = random(), p.translation[1] = random(), p.translation[2] = -3;
-    p.fx = 100 + 50 * random(), p.fy = 100 + 50 * random(), p.cx = 32, p.cy = 24;
+    p.translation[0] = random();
+    p.translation[1] = random();
+    p.translation[2] = -3;
+    p.fx = 100 + 50 * random();
+    p.fy = 100 + 50 * random();
+    p.cx = 32;
+    p.cy = 24;
     std::array<double, 3> point = {random(), random(), random()};
     std::array<double, 11> w;
     for (double& x : w) x = random();
@@ -72,7 +77,10 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
     PC step;
     std::copy_n(p.rotation, 6, step.rotation);
     std::copy_n(p.translation, 3, step.translation);
-    step.fx = p.fx, step.fy = p.fy, step.cx = p.cx, step.cy = p.cy;
+    step.fx = p.fx;
+    step.fy = p.fy;
+    step.cx = p.cx;
+    step.cy = p.cy;
     const auto entries = Entries<Complex>(step);
     const auto gradient = Entries<double>(d);
     ASSERT_EQ(entries.size(), 13u);
@@ -118,7 +126,8 @@ TEST(CameraParameters, WhatGivesNoRotationIsRefused) {
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "rotation");
   p.rotation[0] = std::numeric_limits<float>::infinity();
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "finite");
-  p = {}, p.fx = -1;
+  p = {};
+  p.fx = -1;
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "focal");
   ExpectMessage(CameraFromParameters({}, 0).status(), "near plane");
 }

@@ -71,7 +71,8 @@ TEST(Unwrap, SplitsWhatLiesOverItself) {
       screw.positions.emplace_back(r * std::cos(angle), y, r * std::sin(angle));
     if (i == 0) continue;
     const std::int32_t a = 2 * i - 2;
-    screw.faces.push_back({a, a + 2, a + 1}), screw.faces.push_back({a + 1, a + 2, a + 3});
+    screw.faces.push_back({a, a + 2, a + 1});
+    screw.faces.push_back({a + 1, a + 2, a + 3});
   }
   const auto quality = Unwrap({.width = 128, .height = 128}, &screw);
   ASSERT_TRUE(quality.ok()) << quality.status().message();

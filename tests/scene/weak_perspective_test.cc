@@ -119,8 +119,12 @@ TEST(WeakPerspective, AdjointOfThePinhole) {
     std::array<double, 16> w;
     for (double& x : w) x = rng.Normal();
     CameraT<double> d_pinhole;
-    std::copy_n(w.begin(), 9, d_pinhole.rotation), std::copy_n(&w[9], 3, d_pinhole.translation);
-    d_pinhole.fx = w[12], d_pinhole.fy = w[13], d_pinhole.cx = w[14], d_pinhole.cy = w[15];
+    std::copy_n(w.begin(), 9, d_pinhole.rotation);
+    std::copy_n(&w[9], 3, d_pinhole.translation);
+    d_pinhole.fx = w[12];
+    d_pinhole.fy = w[13];
+    d_pinhole.cx = w[14];
+    d_pinhole.cy = w[15];
     WeakPerspective d_camera;
     PinholeOfAdjoint(camera, 7.0, d_pinhole, &d_camera);
     for (int i = 0; i < 7; ++i) {

@@ -53,7 +53,8 @@ TEST(MeshNormals, TinyMeshesHaveTheNormalsOfLargeOnes) {
   std::vector<float> tiny = kCorner;
   for (float& p : tiny) p *= 0x1p-30f;
   AlignedVector<UnitVector<float>> units, expected;
-  SmoothNormals({tiny, kFaces}, &units), SmoothNormals({kCorner, kFaces}, &expected);
+  SmoothNormals({tiny, kFaces}, &units);
+  SmoothNormals({kCorner, kFaces}, &expected);
   for (std::size_t v = 0; v < units.size(); ++v) EXPECT_EQ(units[v].unit, expected[v].unit) << v;
 }
 
@@ -84,7 +85,8 @@ void ExpectNoNormalOfBothSides(const std::vector<std::int32_t>& back) {
 TEST(MeshNormals, BothSidesOfASheetHaveNoSmoothNormal) {
   for (const std::vector<std::int32_t>& back :
        {std::vector<std::int32_t>{0, 2, 1, 2, 3, 1}, {1, 0, 2, 1, 2, 3}, {2, 1, 0, 3, 1, 2}}) {
-    ExpectNoNormalOfBothSides<float>(back), ExpectNoNormalOfBothSides<double>(back);
+    ExpectNoNormalOfBothSides<float>(back);
+    ExpectNoNormalOfBothSides<double>(back);
   }
 }
 
@@ -95,7 +97,8 @@ void ExpectComplexStep(std::size_t rows, const Normals& normals, const Adjoint& 
   std::vector<double> positions(kCorner.size()), along(kCorner.size());
   std::vector<Complex> moved(kCorner.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    positions[i] = rng.Uniform(-1, 1), along[i] = rng.Uniform(-1, 1);
+    positions[i] = rng.Uniform(-1, 1);
+    along[i] = rng.Uniform(-1, 1);
     moved[i] = Complex(positions[i], kStep * along[i]);
   }
   std::vector<Vec3<double>> d_units(rows);

@@ -66,7 +66,8 @@ TEST(TextureLevels, GradientsOfAllLevelsArriveAtTheFinest) {
 // Lookups of one coordinate at a given level.
 Vec3<float> Sample(const TexturePyramid& pyramid, float u, float v, float level) {
   RunPlane uv[2], levels, color[3];
-  std::fill_n(uv[0].at, kRunPad, u), std::fill_n(uv[1].at, kRunPad, v);
+  std::fill_n(uv[0].at, kRunPad, u);
+  std::fill_n(uv[1].at, kRunPad, v);
   std::fill_n(levels.at, kRunPad, level);
   const TextureView& view = pyramid.view();
   SampleTexture(1, {pyramid.levels(), view.wrap, view.filter, uv, &levels}, color);

@@ -228,7 +228,8 @@ TEST(VectorsPhong, ColoursAndGradients) {
     LambertAdjointRef<double>({0, {&one, 1}}, v.normal, d_parts.light, d_v.normal, {&d_one, 1});
     ExpectNear({d_v.normal.begin(), d_v.normal.end()}, json.at("grad_normal")[i], "d_normal");
     ExpectNear({d_v.eye.begin(), d_v.eye.end()}, json.at("grad_eye")[i], "d_eye");
-    AddScaled(1.0, d_v.light, d_light), AddScaled(1.0, d_one.direction, d_light);
+    AddScaled(1.0, d_v.light, d_light);
+    AddScaled(1.0, d_one.direction, d_light);
     AddScaled(1.0, d_parts.texture, d_texture);
   }
   ExpectNear({d_light.begin(), d_light.end()}, json.at("grad_light"), "d_light");

@@ -35,8 +35,12 @@ __attribute__((visibility("default"))) int pthread_create(pthread_t* thread,
     return EAGAIN;
   }
   start* const call = malloc(sizeof *call);
-  call->run = run, call->argument = argument;
+  call->run = run;
+  call->argument = argument;
   const int error = create(thread, attributes, counted, call);
-  if (error != 0) free(call), atomic_fetch_sub(&running, 1);
+  if (error != 0) {
+    free(call);
+    atomic_fetch_sub(&running, 1);
+  }
   return error;
 }

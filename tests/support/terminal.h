@@ -26,7 +26,10 @@ class TerminalProgram {
     ::_exit(127);
   }
   ~TerminalProgram() {
-    if (child_ > 0 && exit_code_ == kRuns) ::kill(child_, SIGKILL), Finish();
+    if (child_ > 0 && exit_code_ == kRuns) {
+      ::kill(child_, SIGKILL);
+      Finish();
+    }
     ::close(terminal_);
   }
   TerminalProgram(const TerminalProgram&) = delete;
@@ -80,7 +83,8 @@ class TerminalProgram {
   static constexpr int kRuns = -1;
   static winsize SizeOf(int columns) {
     winsize size = {};
-    size.ws_row = 24, size.ws_col = static_cast<unsigned short>(columns);
+    size.ws_row = 24;
+    size.ws_col = static_cast<unsigned short>(columns);
     return size;
   }
   bool Read() {

@@ -118,7 +118,10 @@ TYPED_TEST(FaceVisibilityOf, OfTheSameCornersInAnyOrderTheFirstFaceWins) {
     Faces<T> faces;
     for (const auto& order : orders) {
       std::vector<T> xy, z;
-      for (const int k : order) xy.insert(xy.end(), {v[k][0], v[k][1]}), z.push_back(v[k][2]);
+      for (const int k : order) {
+        xy.insert(xy.end(), {v[k][0], v[k][1]});
+        z.push_back(v[k][2]);
+      }
       AddFace<T>(xy, z, &faces);
     }
     for (const std::int32_t id : SeenByBands(faces, 64, 64, 64)) {
@@ -153,7 +156,10 @@ TYPED_TEST(FaceVisibilityOf, OfFacesAtOneDepthTheFirstWins) {
       int count = 0;
       for (std::int32_t f = 5; f >= 0; --f) {
         const OrderedFace<T> face(faces.View(), static_cast<std::size_t>(f));
-        if (CoversCentre(face.xy, centres.x[p % 64], centres.y[p / 64])) first = f, ++count;
+        if (CoversCentre(face.xy, centres.x[p % 64], centres.y[p / 64])) {
+          first = f;
+          ++count;
+        }
       }
       ASSERT_EQ(seen[p], first) << trial << " pixel " << p;
       overlaps += count > 1;

@@ -146,7 +146,9 @@ TEST(Projected, GradientsOfTheMaskAreThoseOfDifferences) {
   const Workers workers(2);
   for (const AlphaRule rule : {AlphaRule::kAllFaces, AlphaRule::kPaper}) {
     Case c;
-    c.mask.rule = rule, c.mask.paper_box = 0.5, c.mask.paper_faces = 4,
+    c.mask.rule = rule;
+    c.mask.paper_box = 0.5;
+    c.mask.paper_faces = 4;
     c.mask.max_alpha_error = 1e-14;
     auto faces = Cast<double>(RandomFaces(2, 6, 0, 0.3, &rng));
     const auto images = Render(faces, c, workers);

@@ -164,7 +164,8 @@ TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
       if (surrounded) {
         EXPECT_EQ(out[p], color[p]) << x << "," << y;
       }
-      inside += surrounded, changed += out[p] != color[p];
+      inside += surrounded;
+      changed += out[p] != color[p];
     }
   }
   EXPECT_GT(inside, 100u);
@@ -253,7 +254,9 @@ TEST(AntialiasBackward, ByDifferences) {
 TEST(AntialiasBackward, SharedPositionsSumOverImages) {
   Scene<double> one = WavyGrid(2, 5, 17, 19);
   Scene<double> two = one;
-  two.shared = true, two.images = 2, two.ranges = {0, 8, 0, 8};
+  two.shared = true;
+  two.images = 2;
+  two.ranges = {0, 8, 0, 8};
   const EdgeRings rings = BuildEdgeRings(one.faces);
   const auto gradient = [&](const Scene<double>& scene, const Numbers<double>& color,
                             const Numbers<double>& d_out) {

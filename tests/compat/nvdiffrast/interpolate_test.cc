@@ -155,7 +155,8 @@ struct Results {
         d_rast(input.rast.size(), T(-7)),
         d_db(input.rast.size(), T(-7)) {
     const auto images = Interpolated(input);
-    out = images.out, out_da = images.out_da;
+    out = images.out;
+    out_da = images.out_da;
     const Status status =
         InterpolateBackward<T>(input, {d_out, d_da}, Workers(1), {d_attributes, d_rast, d_db});
     EXPECT_TRUE(status.ok()) << status.message();

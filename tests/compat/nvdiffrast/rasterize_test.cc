@@ -54,7 +54,8 @@ TEST(Rasterize, PerspectiveCorrectOverADeepFloor) {
   Scene<double> scene;
   scene.positions = {-1, -1, 0, 1, 1, -1, 0, 1, 0, 0, 0, 9};
   scene.faces = {0, 1, 2};
-  scene.height = 64, scene.width = 3;
+  scene.height = 64;
+  scene.width = 3;
   const auto out = Rasterize(scene);
   for (int y = 0; y < 31; ++y) {
     const double* pixel = &out.rast[static_cast<std::size_t>(4 * (3 * y + 1))];
@@ -80,7 +81,10 @@ std::optional<Truth> TruthAt(const Scene<double>& scene, int x, int y) {
     ClipCorners<double> c;
     for (int k = 0; k < 3; ++k) {
       const double* p = &scene.positions[4 * static_cast<std::size_t>(scene.faces[3 * f + k])];
-      c.x[k] = p[0], c.y[k] = p[1], c.z[k] = p[2], c.w[k] = p[3];
+      c.x[k] = p[0];
+      c.y[k] = p[1];
+      c.z[k] = p[2];
+      c.w[k] = p[3];
     }
     const auto b = BarycentricsAt(c, CentreOf(scene.grid(), x, y), SizeOf(scene.grid()));
     const double last = 1 - b.u - b.v;
@@ -132,7 +136,8 @@ TEST(Rasterize, ClippedQuadHasNoSeam) {
   scene.positions = {-50, -1, 30, 30, 50, -1, 30, 30, 50, -1, -40, -40, -50, -1, -40, -40};
   for (std::size_t v = 0; v < 4; ++v) scene.positions[4 * v + 2] -= 0.2;
   scene.faces = {0, 1, 2, 0, 2, 3};
-  scene.height = 50, scene.width = 70;
+  scene.height = 50;
+  scene.width = 70;
   const auto out = Rasterize(scene);
   for (int y = 0; y < scene.height; ++y) {
     const double at = CentreOf(scene.grid(), 0, y).y;
@@ -268,7 +273,9 @@ TEST(RasterizeBackward, BarycentricsByComplexStep) {
     ClipCorners<double> c;
     for (int k = 0; k < 3; ++k) {
       c.w[k] = rng.Uniform(0.5, 2);
-      c.x[k] = rng.Uniform(-1, 1), c.y[k] = rng.Uniform(-1, 1), c.z[k] = rng.Uniform(-1, 1);
+      c.x[k] = rng.Uniform(-1, 1);
+      c.y[k] = rng.Uniform(-1, 1);
+      c.z[k] = rng.Uniform(-1, 1);
     }
     const PixelCentre at{rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
     const PixelSize size{2.0 / 50, 2.0 / 40};
@@ -280,7 +287,10 @@ TEST(RasterizeBackward, BarycentricsByComplexStep) {
     for (int i = 0; i < 9; ++i) {
       ClipCorners<Complex> moved;
       for (int k = 0; k < 3; ++k) {
-        moved.x[k] = c.x[k], moved.y[k] = c.y[k], moved.z[k] = c.z[k], moved.w[k] = c.w[k];
+        moved.x[k] = c.x[k];
+        moved.y[k] = c.y[k];
+        moved.z[k] = c.z[k];
+        moved.w[k] = c.w[k];
       }
       Complex* const numbers[3] = {moved.x, moved.y, moved.w};
       const double* const gradients[3] = {gradient.x, gradient.y, gradient.w};
@@ -300,7 +310,8 @@ TEST(RasterizeBackward, BarycentricsByComplexStep) {
 TEST(RasterizeBackward, SumsOverPixelsAndImages) {
   for (const bool shared : {false, true}) {
     Scene<double> scene = WavyGrid(2, 9, 11, 13);
-    scene.images = 2, scene.shared = shared;
+    scene.images = 2;
+    scene.shared = shared;
     if (shared) scene.ranges = {0, 8, 3, 4};
     if (!shared) {
       const auto other = WavyGrid(2, 10, 11, 13).positions;

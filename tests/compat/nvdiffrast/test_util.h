@@ -130,7 +130,8 @@ Rasterized<T> Rasterize(const Scene<T>& scene, const Workers& workers = Workers(
 // Faces with corners of their own anywhere around the frustum, some behind the eye.
 inline Scene<double> Soup(std::size_t faces, std::uint64_t seed, int height, int width) {
   Scene<double> out;
-  out.height = height, out.width = width;
+  out.height = height;
+  out.width = width;
   Rng rng(seed, 1);
   for (std::size_t v = 0; v < 3 * faces; ++v) {
     const double w = rng.Uniform(-0.5, 2.0);
@@ -144,7 +145,8 @@ inline Scene<double> Soup(std::size_t faces, std::uint64_t seed, int height, int
 // A wavy grid of n x n quads, seen in perspective, within the image; faces share vertices.
 inline Scene<double> WavyGrid(int n, std::uint64_t seed, int height, int width) {
   Scene<double> out;
-  out.height = height, out.width = width;
+  out.height = height;
+  out.width = width;
   Rng rng(seed, 2);
   for (int i = 0; i <= n; ++i) {
     for (int j = 0; j <= n; ++j) {
@@ -167,9 +169,13 @@ inline Scene<double> WavyGrid(int n, std::uint64_t seed, int height, int width) 
 template <class T>
 Scene<T> AsScene(const Scene<double>& from) {
   Scene<T> out;
-  out.positions = As<T>(from.positions), out.faces = from.faces, out.ranges = from.ranges;
-  out.images = from.images, out.shared = from.shared;
-  out.height = from.height, out.width = from.width;
+  out.positions = As<T>(from.positions);
+  out.faces = from.faces;
+  out.ranges = from.ranges;
+  out.images = from.images;
+  out.shared = from.shared;
+  out.height = from.height;
+  out.width = from.width;
   return out;
 }
 

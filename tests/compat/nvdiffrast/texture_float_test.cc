@@ -39,8 +39,10 @@ struct FloatCase {
 
 Lookups<float> LookupsOf(const FloatCase& c) {
   Lookups<float> out;
-  out.filter = c.filter, out.boundary = c.boundary;
-  out.textures = c.textures, out.channels = c.channels;
+  out.filter = c.filter;
+  out.boundary = c.boundary;
+  out.textures = c.textures;
+  out.channels = c.channels;
   out.grid = {2, 70, 53};  // two bands, a part of a run
   out.Random(c.size, 20);
   const std::size_t n = c.boundary == TextureBoundary::kCube ? 3 : 2, pixels = out.grid.pixels();
@@ -74,7 +76,8 @@ struct PixelBounds {
     const bool cube = input.boundary == TextureBoundary::kCube;
     if (cube) major = std::max({Uv(0), Uv(1), Uv(2)});
     const MipSize& size = input.levels[lookup.choice.low].size;
-    side = std::max(size.width, size.height), place = 5 * r * side;
+    side = std::max(size.width, size.height);
+    place = 5 * r * side;
     kink = IsKink(lookup.point.st[0], size.width, input) ||
            IsKink(lookup.point.st[1], size.height, input);
     if (!texture_ref::UsesLevels(input)) return;
@@ -108,7 +111,8 @@ struct PixelBounds {
     const double b = w * w * s[1] * s[1] + h * h * s[3] * s[3];
     const double c = w * w * s[0] * s[1] + h * h * s[2] * s[3];
     const double root = std::hypot((a - b) / 2, c), square = (a + b) / 2 + root;
-    length = std::sqrt(square), skew = square / root;
+    length = std::sqrt(square);
+    skew = square / root;
     if (cube) level += 6 * r * 4 * std::max(w, h) * LargestDa() / major / length;
     return LevelOf(s, size);
   }
@@ -180,7 +184,8 @@ Numbers<double> TexelBounds(const TextureInput<double>& input,
         const std::size_t at = texels.texel[k];
         // Its own weight, and a third of that of a corner of a cube map.
         errors[at] += 4.0 / 3 * (2 * pixels[p].place + 4 * r) + pixels[p].level;
-        sums[at] += texels.weight[k], ++counts[at];
+        sums[at] += texels.weight[k];
+        ++counts[at];
       }
     }
   }

@@ -44,9 +44,15 @@ template <class T, class U>
 Lookups<T> In(const Lookups<U>& from) {
   Lookups<T> out;
   for (const auto& level : from.levels) out.levels.push_back(As<T>(level));
-  out.sizes = from.sizes, out.textures = from.textures, out.channels = from.channels;
-  out.filter = from.filter, out.boundary = from.boundary, out.grid = from.grid;
-  out.uv = As<T>(from.uv), out.uv_da = As<T>(from.uv_da), out.bias = As<T>(from.bias);
+  out.sizes = from.sizes;
+  out.textures = from.textures;
+  out.channels = from.channels;
+  out.filter = from.filter;
+  out.boundary = from.boundary;
+  out.grid = from.grid;
+  out.uv = As<T>(from.uv);
+  out.uv_da = As<T>(from.uv_da);
+  out.bias = As<T>(from.bias);
   return out;
 }
 

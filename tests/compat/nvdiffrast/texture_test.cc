@@ -13,7 +13,8 @@ namespace tilegrad::compat::nvdiffrast::texture_test {
 // 4 x 2 texels, 10 times the row plus the column.
 Lookups<double> Ramp(TextureFilter filter, TextureBoundary boundary) {
   Lookups<double> out;
-  out.filter = filter, out.boundary = boundary;
+  out.filter = filter;
+  out.boundary = boundary;
   out.sizes = {{2, 4}};
   out.levels = {{0, 1, 2, 3, 10, 11, 12, 13}};
   return out;
@@ -97,7 +98,8 @@ TEST(Texture, TheNearestLevelIsRoundedDown) {
                               {1.75, 1}, {2.25, 2}, {2.99, 2}, {3, 3},   {9.7, 3}};
   lookups.grid = {1, 1, static_cast<int>(std::size(levels))};
   for (const auto& level : levels) {
-    lookups.uv.insert(lookups.uv.end(), {0.3, 0.6}), lookups.bias.push_back(level[0]);
+    lookups.uv.insert(lookups.uv.end(), {0.3, 0.6});
+    lookups.bias.push_back(level[0]);
   }
   const auto out = Sampled(lookups);
   // The same by footprints of 2^level texels, and in float.
@@ -150,7 +152,8 @@ TEST(Mip, BackwardIsTheTransposed) {
 
 TEST(CubeMap, FacesAreThoseOfOpenGl) {
   Lookups<double> lookups;
-  lookups.boundary = TextureBoundary::kCube, lookups.filter = TextureFilter::kNearest;
+  lookups.boundary = TextureBoundary::kCube;
+  lookups.filter = TextureFilter::kNearest;
   lookups.sizes = {{2, 2}};
   lookups.levels = {Numbers<double>(24)};
   for (std::size_t i = 0; i < 24; ++i) lookups.levels[0][i] = static_cast<double>(i);
@@ -217,7 +220,8 @@ TEST(CubeMap, LinearLookupsHaveNoSeam) {
     Direction r = {rng.Uniform(-1, 1), rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
     const std::size_t a = rng.Below(3), b = (a + 1 + rng.Below(2)) % 3;
     const double side = rng.Uniform() < 0.5 ? -1 : 1;
-    r[a] = 1, r[b] = side;
+    r[a] = 1;
+    r[b] = side;
     if (round % 4 == 0) r[3 - a - b] = 1 - 1e-9 * rng.Uniform();
     double values[2];
     for (int i = 0; i < 2; ++i) {
@@ -286,8 +290,10 @@ TEST_P(TextureGradientsOf, EverythingByDifferences) {
   const Case& c = GetParam();
   const bool cube = c.boundary == TextureBoundary::kCube;
   Lookups<double> lookups;
-  lookups.filter = c.filter, lookups.boundary = c.boundary;
-  lookups.textures = c.textures, lookups.channels = 2;
+  lookups.filter = c.filter;
+  lookups.boundary = c.boundary;
+  lookups.textures = c.textures;
+  lookups.channels = 2;
   lookups.grid = {2, 5, 6};
   lookups.Random(cube ? MipSize{8, 8} : MipSize{8, 16}, 20);
   const std::size_t n = cube ? 3 : 2, pixels = lookups.grid.pixels();

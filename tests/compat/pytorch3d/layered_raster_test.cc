@@ -79,7 +79,8 @@ Layers<double> Naive(const std::vector<double>& v, const std::vector<FaceRange>&
         out.faces.push_back(f);
         LayeredFragment<double> at{{-1, -1, -1}, -1, -1, false};
         if (f >= 0) at = FragmentOf(v.data() + 9 * f, x, y, o.rule);
-        out.z.push_back(at.z), out.dists.push_back(at.dist);
+        out.z.push_back(at.z);
+        out.dists.push_back(at.dist);
         out.bary.insert(out.bary.end(), at.bary.begin(), at.bary.end());
       }
     }
@@ -92,8 +93,10 @@ TEST(LayeredRaster, IsTheNaiveOne) {
   const std::vector<FaceRange> images = {{0, 50}, {50, 70}, {20, 0}};
   for (int trial = 0; trial < 16; ++trial) {
     LayeredOptions o;
-    o.size = {trial % 2 == 0 ? 41 : 23, 23}, o.faces_per_pixel = trial % 3 == 0 ? 1 : 6;
-    o.blur_radius = trial % 4 < 2 ? 0 : 0.02, o.cull_backfaces = trial % 5 == 0;
+    o.size = {trial % 2 == 0 ? 41 : 23, 23};
+    o.faces_per_pixel = trial % 3 == 0 ? 1 : 6;
+    o.blur_radius = trial % 4 < 2 ? 0 : 0.02;
+    o.cull_backfaces = trial % 5 == 0;
     o.rule = {trial % 4 % 2 == 0, trial % 8 < 4};
     const auto v = RandomFaces<double>(120, trial % 7 == 0 ? 2 : 0.4, &rng);
     const auto expected = Naive(v, images, o);
@@ -107,7 +110,10 @@ TEST(LayeredRaster, IsTheNaiveOne) {
 TEST(LayeredRaster, FloatIsDouble) {
   Rng rng(5);
   LayeredOptions o;
-  o.size = {64, 48}, o.faces_per_pixel = 4, o.blur_radius = 1e-3, o.rule.clip_barycentrics = true;
+  o.size = {64, 48};
+  o.faces_per_pixel = 4;
+  o.blur_radius = 1e-3;
+  o.rule.clip_barycentrics = true;
   const auto v = RandomFaces<float>(200, 0.3, &rng);
   const auto single = Draw(v, {{0, 200}}, o);
   const auto exact = Draw(std::vector<double>(v.begin(), v.end()), {{0, 200}}, o);
@@ -125,7 +131,9 @@ TEST(LayeredRaster, FloatIsDouble) {
 TEST(LayeredRaster, SameBitsForAnyNumberOfWorkers) {
   Rng rng(6);
   LayeredOptions o;
-  o.size = {50, 70}, o.faces_per_pixel = 5, o.blur_radius = 0.01;
+  o.size = {50, 70};
+  o.faces_per_pixel = 5;
+  o.blur_radius = 0.01;
   const auto v = RandomFaces<float>(300, 0.3, &rng);
   const std::vector<FaceRange> images = {{0, 200}, {100, 200}};
   const auto one = Draw(v, images, o, 1);
@@ -149,7 +157,10 @@ TEST(LayeredRaster, SameBitsForAnyNumberOfWorkers) {
 TEST(LayeredRaster, GradientIsThatOfDifferences) {
   Rng rng(7);
   LayeredOptions o;
-  o.size = {21, 13}, o.faces_per_pixel = 3, o.blur_radius = 0.05, o.rule.clip_barycentrics = true;
+  o.size = {21, 13};
+  o.faces_per_pixel = 3;
+  o.blur_radius = 0.05;
+  o.rule.clip_barycentrics = true;
   auto v = RandomFaces<double>(12, 0.8, &rng);
   for (std::size_t i = 2; i < v.size(); i += 3) v[i] += 1;
   const std::vector<FaceRange> images = {{0, 8}, {4, 8}};
@@ -199,13 +210,17 @@ TEST(LayeredRaster, Errors) {
   EXPECT_EQ(message({{1, 2}}), "image 0 has faces [1, 1 + 2), there are 2");
   v[3] = std::numeric_limits<float>::infinity();
   EXPECT_EQ(message(), "face_vertices[3] is inf");
-  v[3] = 0, o.faces_per_pixel = 0;
+  v[3] = 0;
+  o.faces_per_pixel = 0;
   EXPECT_EQ(message(), "faces_per_pixel is 0, must be in 1..1024");
-  o.faces_per_pixel = 1, o.blur_radius = -1;
+  o.faces_per_pixel = 1;
+  o.blur_radius = -1;
   EXPECT_EQ(message(), "blur_radius is -1, must be finite and >= 0");
-  o.blur_radius = 0, o.size.width = 5;
+  o.blur_radius = 0;
+  o.size.width = 5;
   EXPECT_EQ(message(), "pix_to_face has 16 numbers, expected 20");
-  o.size.width = 4, out.faces[3] = 2;
+  o.size.width = 4;
+  out.faces[3] = 2;
   std::vector<float> d_v(18);
   EXPECT_EQ(RasterizeLayersBackward<float>(v, o, workers, {out.faces, {}, {}, {}, d_v}).message(),
             "pix_to_face[3] is 2, outside of [-1, 2)");

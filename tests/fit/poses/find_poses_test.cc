@@ -146,7 +146,8 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
 TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
   const FitInput input = Input(8);
   InputPosesJob job = Job();
-  job.options.starts = 2, job.options.sweeps = 1;
+  job.options.starts = 2;
+  job.options.sweeps = 1;
   FitInput whole = input, parts = input;
   ASSERT_TRUE(Find(job, &whole).ok());
   job.file = folder_ / "other" / "cameras_start.json";
@@ -160,7 +161,9 @@ TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
   FitInput stopped = input;
   EXPECT_EQ(FindInputPoses(job, &stopped, workers, tell, stop_).code(), StatusCode::kCancelled);
   EXPECT_EQ(searches, (std::vector<std::uint64_t>{0, 1}));
-  searches.clear(), stop_ = false, job.reuse = true;
+  searches.clear();
+  stop_ = false;
+  job.reuse = true;
   const auto listen = [&](const Progress& p) {
     if (p.stage == "looking for cameras") searches.push_back(p.done);
   };
@@ -174,7 +177,8 @@ TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
 TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
   FitInput input = Input(8);
   InputPosesJob job = Job();
-  job.options.starts = 2, job.options.sweeps = 1;
+  job.options.starts = 2;
+  job.options.sweeps = 1;
   const Workers workers(2);
   int begun = 0;
   const auto tell = [&](const Progress& p) {
@@ -184,7 +188,9 @@ TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
   };
   FitInput other = input;
   EXPECT_EQ(FindInputPoses(job, &other, workers, tell, stop_).code(), StatusCode::kCancelled);
-  input.images.color[3] += 0.25f, stop_ = false, job.reuse = true;
+  input.images.color[3] += 0.25f;
+  stop_ = false;
+  job.reuse = true;
   EXPECT_EQ(FindInputPoses(job, &input, workers, tell, stop_).code(), StatusCode::kCancelled);
   EXPECT_EQ(begun, 2);
 }
@@ -207,7 +213,8 @@ TEST_F(Poses, SaysWhatIsMissing) {
 TargetImages Picture(int side, int left, int top, int scale) {
   TargetImages out;
   out.width = out.height = side;
-  out.color.resize(3 * out.pixels()), out.alpha.resize(out.pixels());
+  out.color.resize(3 * out.pixels());
+  out.alpha.resize(out.pixels());
   for (int y = top; y < top + 10 * scale; ++y) {
     for (int x = left; x < left + 20 * scale; ++x) {
       const auto p = static_cast<std::size_t>(y * side + x);
@@ -240,7 +247,9 @@ TEST(PoseCrop, AlignedCamerasSeeItWhereItIsWanted) {
   const Camera from = OrbitCamera({45, 64, 64}, 30, 20, 2);
   Crop seen, wanted;
   seen.side = 0.5;
-  wanted.x = 0.2, wanted.y = -0.1, wanted.side = 0.25;
+  wanted.x = 0.2;
+  wanted.y = -0.1;
+  wanted.side = 0.25;
   const Camera camera = Aligned(seen, wanted, from);
   EXPECT_NEAR(-camera.translation[0] / camera.translation[2], 0.2, 1e-6);
   EXPECT_NEAR(-camera.translation[1] / camera.translation[2], -0.1, 1e-6);

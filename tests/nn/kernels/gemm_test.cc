@@ -30,11 +30,18 @@ struct Operands {
 
   GemmProblem<T> Problem(const GemmCase& g) {
     GemmProblem<T> p;
-    p.m = g.m, p.n = g.n, p.k = g.k;
-    p.transpose_a = g.transpose_a, p.transpose_b = g.transpose_b, p.accumulate = g.accumulate;
-    p.a = a.data(), p.lda = (g.transpose_a ? g.m : g.k) + g.slack;
-    p.b = b.data(), p.ldb = (g.transpose_b ? g.k : g.n) + g.slack;
-    p.c = c.data(), p.ldc = g.n + g.slack;
+    p.m = g.m;
+    p.n = g.n;
+    p.k = g.k;
+    p.transpose_a = g.transpose_a;
+    p.transpose_b = g.transpose_b;
+    p.accumulate = g.accumulate;
+    p.a = a.data();
+    p.lda = (g.transpose_a ? g.m : g.k) + g.slack;
+    p.b = b.data();
+    p.ldb = (g.transpose_b ? g.k : g.n) + g.slack;
+    p.c = c.data();
+    p.ldc = g.n + g.slack;
     p.bias = g.bias ? bias.data() : nullptr;
     return p;
   }

@@ -22,7 +22,8 @@ class Step {
  public:
   explicit Step(const Case& c) : case_(c) {
     Rng rng(c.m + c.n + c.k);
-    a_ = RandomFloats(rng, c.m * c.k), b_ = RandomFloats(rng, c.k * c.n);
+    a_ = RandomFloats(rng, c.m * c.k);
+    b_ = RandomFloats(rng, c.k * c.n);
     start_ = {RandomFloats(rng, c.m * c.n), RandomFloats(rng, c.m * c.n),
               RandomFloats(rng, c.m * c.n)};
     for (float& v : start_.v) v = std::abs(v);
@@ -34,7 +35,8 @@ class Step {
     State state = start_;
     std::vector<float> gradient(start_.p.size());
     GemmProblem<float> product = Product();
-    product.c = gradient.data(), product.ldc = case_.n;
+    product.c = gradient.data();
+    product.ldc = case_.n;
     Gemm(product, {workers, scratch});
     AdamProblem<float> adam = Problem(state);
     adam.gradient = gradient.data();
@@ -52,10 +54,15 @@ class Step {
  private:
   GemmProblem<float> Product() const {
     GemmProblem<float> product;
-    product.m = case_.m, product.n = case_.n, product.k = case_.k;
-    product.a = a_.data(), product.lda = case_.transpose_a ? case_.m : case_.k;
-    product.b = b_.data(), product.ldb = case_.transpose_b ? case_.k : case_.n;
-    product.transpose_a = case_.transpose_a, product.transpose_b = case_.transpose_b;
+    product.m = case_.m;
+    product.n = case_.n;
+    product.k = case_.k;
+    product.a = a_.data();
+    product.lda = case_.transpose_a ? case_.m : case_.k;
+    product.b = b_.data();
+    product.ldb = case_.transpose_b ? case_.k : case_.n;
+    product.transpose_a = case_.transpose_a;
+    product.transpose_b = case_.transpose_b;
     return product;
   }
   static AdamProblem<float> Problem(State& state) {

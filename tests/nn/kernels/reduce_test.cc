@@ -65,7 +65,8 @@ struct NormRun {
       gamma.push_back(static_cast<T>(0.5 + 0.25 * static_cast<double>(i % 4)));
       beta.push_back(static_cast<T>(0.25 * (static_cast<double>(i % 5) - 2)));
     }
-    y.resize(x.size()), dx.resize(x.size());
+    y.resize(x.size());
+    dx.resize(x.size());
     for (auto* v : {&mean, &variance, &d_gamma, &d_beta}) v->resize(gamma.size());
     const BatchNormParameters<T> parameters{gamma.data(), beta.data(), 1e-5, c.relu};
     const Workers workers(2);

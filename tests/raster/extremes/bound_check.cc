@@ -37,7 +37,10 @@ BoundScene MakeBoundScene(const BoundSceneNumber& scene) {
   const std::uint64_t places = 1 + rng.Below(4);
   const double spread = rng.Uniform(0.02, 0.7);
   double x[4], y[4];
-  for (std::size_t k = 0; k < 4; ++k) x[k] = rng.Uniform(-0.3, 1.3), y[k] = rng.Uniform(-0.3, 1.3);
+  for (std::size_t k = 0; k < 4; ++k) {
+    x[k] = rng.Uniform(-0.3, 1.3);
+    y[k] = rng.Uniform(-0.3, 1.3);
+  }
   for (std::size_t f = 0; f < faces; ++f) {
     const std::uint64_t at = rng.Below(places);
     const double cx = w * (x[at] + spread * rng.Uniform(-1, 1));
@@ -76,8 +79,11 @@ class BoundCheck {
     raster::Project(FaceSourceOf(view, o), o.width, o.height, &mesh);
     const SoftScene soft = SoftSceneOf(mesh, o);
     const SoftTruth truth(soft);
-    out_.scenes = 1, out_.faces = soft.options.faces;
-    Draw(&first_), Permute(&rng_, &scene_.scene.faces), Draw(&permuted_);
+    out_.scenes = 1;
+    out_.faces = soft.options.faces;
+    Draw(&first_);
+    Permute(&rng_, &scene_.scene.faces);
+    Draw(&permuted_);
     if (!out_.failed.empty()) return out_;
     for (const std::size_t i : SomeBackground()) Compare(truth.Bound(i), i);
     return out_;

@@ -25,11 +25,15 @@ struct BoundSummary {
   std::string failed;      // why a scene could not be drawn
 
   void Add(const BoundSummary& o) {
-    scenes += o.scenes, pixels += o.pixels, faces += o.faces, between += o.between;
+    scenes += o.scenes;
+    pixels += o.pixels;
+    faces += o.faces;
+    between += o.between;
     over_budget = std::max(over_budget, o.over_budget);
     over_spent = std::max(over_spent, o.over_spent);
     spent_over = std::max(spent_over, o.spent_over);
-    order = std::max(order, o.order), share = std::max(share, o.share);
+    order = std::max(order, o.order);
+    share = std::max(share, o.share);
     of_reported = std::max(of_reported, o.of_reported);
     if (failed.empty()) failed = o.failed;
   }

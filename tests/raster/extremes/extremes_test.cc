@@ -93,7 +93,8 @@ TEST(ExtremesLong, FaceIdsBeyondWhatFloatsCount) {
   TestScene<float> scene;
   scene.camera = {.fx = 1, .fy = 1, .cx = 0, .cy = 0, .near_plane = 0.5f};  // pixels are world
   scene.positions = {-20, 0, -1, -1, 1, -1, -1, -9, -1, 9, 1, -1};  // a point; half of the image
-  scene.channels = 1, scene.attributes.assign(scene.vertex_count(), 0.5f);
+  scene.channels = 1;
+  scene.attributes.assign(scene.vertex_count(), 0.5f);
   scene.faces.assign(3 * static_cast<std::size_t>(id), 0);
   scene.faces.insert(scene.faces.end(), {1, 2, 3});
   RenderOptions options;
@@ -122,7 +123,8 @@ class NonFinite : public testing::TestWithParam<float> {
     e_.scene = TriangleSoup(5, 0.5, 8, 8, &rng);
     e_.options = RenderOptions();
     e_.options.width = e_.options.height = 8;
-    d_attributes_.resize(3 * 64), d_alpha_.resize(64);
+    d_attributes_.resize(3 * 64);
+    d_alpha_.resize(64);
   }
   std::string Run() {
     const Workers one(1);

@@ -36,8 +36,11 @@ Status ReadLine(const std::string& line, ProofTally* tally) {
 }  // namespace
 
 void ProofRow::Add(const ProofRow& other) {
-  scenes += other.scenes, numbers += other.numbers, violations += other.violations;
-  ratio = std::max(ratio, other.ratio), share = std::max(share, other.share);
+  scenes += other.scenes;
+  numbers += other.numbers;
+  violations += other.violations;
+  ratio = std::max(ratio, other.ratio);
+  share = std::max(share, other.share);
 }
 
 void ProofTally::Add(const ProofTally& other) {

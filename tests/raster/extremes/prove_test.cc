@@ -48,7 +48,8 @@ TEST_F(ProveTest, CountsAndGoesOn) {
 
 TEST_F(ProveTest, AViolationIsKeptAndNamed) {
   ProofTally tally;
-  tally.next = 500, tally.rows[{"alpha", "x"}] = {500, 9000, 1, 1.25, 2};
+  tally.next = 500;
+  tally.rows[{"alpha", "x"}] = {500, 9000, 1, 1.25, 2};
   tally.violations = {"scene 7 on EMU128: beyond E"};
   ASSERT_TRUE(WriteTally(state_, tally).ok());
   EXPECT_EQ(Prove(), 1);

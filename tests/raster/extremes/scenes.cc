@@ -83,7 +83,8 @@ void Slivers(ExtremeScene* e, Rng* rng) {
     const Corner a = RandomCorner(e->options, rng), b = RandomCorner(e->options, rng);
     const double thickness = Log(rng, -12, 0), t = rng->Uniform();
     const double length = std::hypot(b.x - a.x, b.y - a.y) + 1e-9;
-    AddVertex(a, &e->scene), AddVertex(b, &e->scene);
+    AddVertex(a, &e->scene);
+    AddVertex(b, &e->scene);
     AddVertex({a.x + t * (b.x - a.x) - thickness * (b.y - a.y) / length,
                a.y + t * (b.y - a.y) + thickness * (b.x - a.x) / length, a.depth},
               &e->scene);
@@ -170,7 +171,8 @@ void Nothing(ExtremeScene* e, Rng* rng) {
 void LongRow(ExtremeScene* e, Rng* rng) {
   const int length = rng->Below(2) == 0 ? 16384 : 1 + static_cast<int>(rng->Below(16384));
   const bool row = rng->Below(2) == 0;
-  e->options.width = row ? length : 1, e->options.height = row ? 1 : length;
+  e->options.width = row ? length : 1;
+  e->options.height = row ? 1 : length;
   SetPixelCamera(0.1f, &e->scene);
   for (std::size_t v = 3 * FewFaces(rng); v-- > 0;) {
     AddVertex(RandomCorner(e->options, rng), &e->scene);
@@ -235,13 +237,15 @@ ExtremeScene MakeExtremeScene(std::uint64_t number, std::size_t most_faces) {
   RandomOptions(&e.options, &rng);
   const std::uint64_t rare = rng.Below(200);
   if (rare == 0) {
-    e.kind = "long row", LongRow(&e, &rng);
+    e.kind = "long row";
+    LongRow(&e, &rng);
   } else if (rare < 4) {
     e.kind = "heap";
     Heap(&e, &rng, static_cast<std::size_t>(std::pow(most_faces, rng.Uniform())));
   } else {
     const Kind& kind = kKinds[rng.Below(std::size(kKinds))];
-    e.kind = kind.name, kind.make(&e, &rng);
+    e.kind = kind.name;
+    kind.make(&e, &rng);
   }
   RandomChannels(&rng, &e.scene);
   return e;

@@ -58,13 +58,20 @@ class Comparison {
 template <class To, class From>
 raster::ScreenMeshBuffersT<To> MeshCast(const raster::ScreenMeshBuffersT<From>& m) {
   raster::ScreenMeshBuffersT<To> out;
-  out.x.assign(m.x.begin(), m.x.end()), out.y.assign(m.y.begin(), m.y.end());
+  out.x.assign(m.x.begin(), m.x.end());
+  out.y.assign(m.y.begin(), m.y.end());
   out.depth.assign(m.depth.begin(), m.depth.end());
   out.inverse_depth.assign(m.inverse_depth.begin(), m.inverse_depth.end());
-  out.v0 = m.v0, out.v1 = m.v1, out.v2 = m.v2, out.source_face = m.source_face;
+  out.v0 = m.v0;
+  out.v1 = m.v1;
+  out.v2 = m.v2;
+  out.source_face = m.source_face;
   for (const auto& c : m.clipped) out.clipped.push_back({c.a, c.b, To(c.t)});
-  out.reject = m.reject, out.source_vertices = m.source_vertices;
-  out.source_faces = m.source_faces, out.width = m.width, out.height = m.height;
+  out.reject = m.reject;
+  out.source_vertices = m.source_vertices;
+  out.source_faces = m.source_faces;
+  out.width = m.width;
+  out.height = m.height;
   return out;
 }
 
@@ -106,10 +113,12 @@ class Truth {
     raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
     mesh_ = buffers_.View();
     soft_ = SoftSceneOf(buffers_, e.options);
-    prepared_.buffers = MeshCast<Bounded>(buffers_), prepared_.mesh = prepared_.buffers.View();
+    prepared_.buffers = MeshCast<Bounded>(buffers_);
+    prepared_.mesh = prepared_.buffers.View();
     PrepareAttributes();
     pixels_ = PixelsToCheck(e, &rng_);
-    d_attributes_.resize(e.pixels() * Channels()), d_alpha_.resize(e.pixels());
+    d_attributes_.resize(e.pixels() * Channels());
+    d_alpha_.resize(e.pixels());
     for (const std::size_t i : pixels_) {
       d_alpha_[i] = static_cast<float>(rng_.Uniform(-1, 1));
       for (std::size_t c = 0; c < Channels(); ++c) {
@@ -344,13 +353,15 @@ void AllowLateDifferences(const raster::ScreenMesh& mesh, const PixelTruth& at, 
     const auto v = static_cast<std::size_t>(mesh.vertex(at.face, k));
     const double m = perspective ? static_cast<double>(mesh.inverse_depth[v]) : 1;
     const double d_b = (size.weight[k] + size.mean) * m / at.weights.q.value;
-    x += d_b * std::abs(at.plane.gx[k].value), y += d_b * std::abs(at.plane.gy[k].value);
+    x += d_b * std::abs(at.plane.gx[k].value);
+    y += d_b * std::abs(at.plane.gy[k].value);
   }
   for (int k = 0; k < 3; ++k) {
     const auto v = static_cast<std::size_t>(mesh.vertex(at.face, k));
     const Bounded& b = at.weights.b[k];
     const double error = b.error + 4 * kBits * std::abs(b.value);
-    d->screen.d_x[v] += Bounded(0, error * x), d->screen.d_y[v] += Bounded(0, error * y);
+    d->screen.d_x[v] += Bounded(0, error * x);
+    d->screen.d_y[v] += Bounded(0, error * y);
   }
 }
 
@@ -457,8 +468,11 @@ void Truth::CheckBackward(const PipelineFrame& frame, Pipeline* renderer, Compar
 }  // namespace
 
 void CheckCounts::Add(const CheckCounts& other) {
-  compared += other.compared, sharp += other.sharp, left_out += other.left_out;
-  gradients += other.gradients, overflows += other.overflows;
+  compared += other.compared;
+  sharp += other.sharp;
+  left_out += other.left_out;
+  gradients += other.gradients;
+  overflows += other.overflows;
   worst = std::max(worst, other.worst);
 }
 

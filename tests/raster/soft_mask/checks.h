@@ -113,7 +113,8 @@ inline void CheckScene(const SoftScene& scene, SoftMaskScratch* scratch, const S
     SCOPED_TRACE(target);
     ASSERT_TRUE(ForceTarget(target).ok());
     const SoftResult result = RunSoftMask(scene, d_alpha, scratch, run);
-    CheckAlpha(scene, truth, result), CheckTransmittance(scene, truth, result);
+    CheckAlpha(scene, truth, result);
+    CheckTransmittance(scene, truth, result);
     CheckGradient(scene, truth, d_alpha, result);
   }
   ASSERT_TRUE(ForceTarget("").ok());

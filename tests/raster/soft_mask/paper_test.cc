@@ -28,7 +28,8 @@ struct Image {
     for (const Json& corners : v["face_vertices_image"][batch]) {
       NdcFace<T> face;
       for (std::size_t k = 0; k < 3; ++k) {
-        face.x[k] = T(corners[k][0].get<double>()), face.y[k] = T(corners[k][1].get<double>());
+        face.x[k] = T(corners[k][0].get<double>());
+        face.y[k] = T(corners[k][1].get<double>());
       }
       faces.push_back(face);
     }
@@ -51,7 +52,8 @@ std::vector<T> IouGradient(const Image<T>& image, const PaperSoftMask& rule, int
       const bool hit = j + 5 < image.width && !image.background(i, j + 5);
       const T a = image.Alpha(i, j, rule), b = T(hit ? 1 : 0);
       target.push_back(b);
-      inside += a * b, all += a + b - a * b;
+      inside += a * b;
+      all += a + b - a * b;
     }
   }
   for (T& b : target) b = -(b * all - inside * (T(1) - b)) / (all * all) / T(batch);
@@ -61,7 +63,9 @@ std::vector<T> IouGradient(const Image<T>& image, const PaperSoftMask& rule, int
 template <class T>
 void CheckCase(const Json& v, const Json& c, double mask_tolerance, double gradient_tolerance) {
   PaperSoftMask rule;
-  rule.inverse_delta = c["sigmainv"], rule.box = c["boxlen"], rule.max_faces = v["knum"];
+  rule.inverse_delta = c["sigmainv"];
+  rule.box = c["boxlen"];
+  rule.max_faces = v["knum"];
   const auto batch = v["face_vertices_image"].size();
   double largest = 0;
   for (const Json& g : c["grad_face_vertices_image_golden"].flatten()) {
@@ -109,7 +113,8 @@ TEST(SoftMaskPaper, TakesTheFirstFacesOnly) {
   faces[0] = {{0.10, 0.11, 0.10}, {0, 0, 0.01}};
   faces[1] = {{0.01, 0.02, 0.01}, {0, 0, 0.01}};
   PaperSoftMask rule;
-  rule.box = 0.2, rule.max_faces = 1;
+  rule.box = 0.2;
+  rule.max_faces = 1;
   EXPECT_NEAR(PaperAlphaRef<double>(faces, 0.0, 0.0, rule), std::exp(-7000 * 0.01), 1e-15);
   rule.max_faces = 2;
   EXPECT_NEAR(PaperAlphaRef<double>(faces, 0.0, 0.0, rule), std::exp(-7000 * 0.0001), 1e-9)

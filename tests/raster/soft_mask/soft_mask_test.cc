@@ -59,8 +59,8 @@ SoftScene CrowdScene(std::uint64_t seed) {
   }
   for (const float side : {7.43f, 16.57f}) {  // of pixels whose centres are 0.07 away
     const float beyond = side < 12 ? side - 3 : side + 3;
-    scene.AddFace({side, side, beyond}, {6, 18, 12}),
-        scene.AddFace({6, 18, 12}, {side, side, beyond});
+    scene.AddFace({side, side, beyond}, {6, 18, 12});
+    scene.AddFace({6, 18, 12}, {side, side, beyond});
   }
   for (float& d : scene.d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
   return scene;
@@ -198,15 +198,19 @@ TEST(SoftMask, RejectedFacesDoNotTakePart) {
       SoftScene scene = RandomScene(seed, 60);
       scene.options.max_alpha_error = 0;
       SoftScene others = scene;
-      others.mesh.v0.clear(), others.mesh.v1.clear(), others.mesh.v2.clear();
+      others.mesh.v0.clear();
+      others.mesh.v1.clear();
+      others.mesh.v2.clear();
       others.mesh.reject.clear();
       for (std::size_t f = 0; f < scene.mesh.reject.size(); ++f) {
         if (f % 3 == 1) {
           scene.mesh.reject[f] = static_cast<std::uint8_t>(reject);
           continue;
         }
-        others.mesh.v0.push_back(scene.mesh.v0[f]), others.mesh.v1.push_back(scene.mesh.v1[f]);
-        others.mesh.v2.push_back(scene.mesh.v2[f]), others.mesh.reject.push_back(kFaceDrawn);
+        others.mesh.v0.push_back(scene.mesh.v0[f]);
+        others.mesh.v1.push_back(scene.mesh.v1[f]);
+        others.mesh.v2.push_back(scene.mesh.v2[f]);
+        others.mesh.reject.push_back(kFaceDrawn);
       }
       others.options.faces = others.mesh.reject.size();
       const SoftTruth truth(others);
@@ -243,7 +247,8 @@ TEST(SoftMask, DroppedNodesAreBooked) {
 TEST(SoftMask, FaintFacesAddUp) {
   SoftScene scene;
   scene.Resize(4, 4);
-  scene.options.delta = 0.1, scene.options.max_alpha_error = 0;
+  scene.options.delta = 0.1;
+  scene.options.max_alpha_error = 0;
   // z = d^2 / delta = 17.5, A = 2.5e-8 < 2^-25
   const auto x = static_cast<float>(0.5 + 2 * std::sqrt(1.75));
   for (int f = 0; f < 20000; ++f) scene.AddFace({x, x, x}, {0.5f, 0.5f, 0.5f});
@@ -259,7 +264,8 @@ TEST(SoftMask, FaintFacesAddUp) {
 TEST(SoftMask, GradientsOfFaintFacesAddUp) {
   SoftScene scene;
   scene.Resize(4, 4);
-  scene.options.delta = 0.1, scene.options.max_alpha_error = 1e-7;
+  scene.options.delta = 0.1;
+  scene.options.max_alpha_error = 1e-7;
   const auto x = static_cast<float>(0.5 + 2 * std::sqrt(1.8));  // A = 1.5e-8 < E/4
   for (int f = 0; f < 20000; ++f) scene.AddFace({x, x, x}, {0.5f, 0.5f, 0.5f});
   scene.d_alpha[0] = 1;
@@ -269,7 +275,8 @@ TEST(SoftMask, GradientsOfFaintFacesAddUp) {
   const SoftResult result = RunSoftMask(scene, scene.d_alpha, &scratch);
   double sum = 0, truth = 0;
   for (std::size_t i = 0; i < exact.size(); i += 2) {
-    sum += static_cast<double>(result.d_corners[i]), truth += exact[i];
+    sum += static_cast<double>(result.d_corners[i]);
+    truth += exact[i];
   }
   const double unit = 0.5 / std::sqrt(scene.options.delta);  // of exp(-z), z = 18, per pixel
   EXPECT_GT(std::abs(truth), 3e-3);
@@ -310,7 +317,8 @@ TEST(SoftMask, PixelOnTheBoundaryIsOpaqueAndStill) {
 TEST(SoftMask, GradientNearAnEdgeIsNotLost) {
   SoftScene scene;
   scene.Resize(4, 4);
-  scene.options.delta = 1, scene.options.max_alpha_error = 0;
+  scene.options.delta = 1;
+  scene.options.max_alpha_error = 0;
   scene.AddFace({-3, 9, 3}, {0.4999f, 0.4999f, -9});
   SoftMaskScratch scratch;
   std::vector<float> d_alpha(16, 0.0f);
@@ -368,16 +376,25 @@ TEST(SoftMaskRef, GradientIsThatOfAComplexStep) {
   Rng rng(11);
   for (int scene = 0; scene < 200; ++scene) {
     std::vector<double> x, y, d_x(4, 0.0), d_y(4, 0.0);
-    for (int v = 0; v < 4; ++v) x.push_back(rng.Uniform(0, 10)), y.push_back(rng.Uniform(0, 10));
+    for (int v = 0; v < 4; ++v) {
+      x.push_back(rng.Uniform(0, 10));
+      y.push_back(rng.Uniform(0, 10));
+    }
     const auto mesh = [&](auto& mx, auto& my, auto out) {
-      out.x = mx, out.y = my, out.v0 = v0, out.v1 = v1, out.v2 = v2, out.reject = reject;
+      out.x = mx;
+      out.y = my;
+      out.v0 = v0;
+      out.v1 = v1;
+      out.v2 = v2;
+      out.reject = reject;
       return out;
     };
     const auto real = mesh(x, y, ScreenMeshT<double>{});
     SoftAlphaRefBackward<double>(real, faces, 4.5, 5.5, scale, 1.0,
                                  [&](std::size_t n, int corner, double dx, double dy) {
                                    const auto v = static_cast<std::size_t>(real.vertex(n, corner));
-                                   d_x[v] += dx, d_y[v] += dy;
+                                   d_x[v] += dx;
+                                   d_y[v] += dy;
                                  });
     for (std::size_t v = 0; v < 8; ++v) {
       std::vector<Complex> cx(x.begin(), x.end()), cy(y.begin(), y.end());

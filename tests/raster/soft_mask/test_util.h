@@ -29,7 +29,8 @@ struct SoftScene {
     for (int k = 0; k < 3; ++k) {
       auto& index = k == 0 ? mesh.v0 : k == 1 ? mesh.v1 : mesh.v2;
       index.push_back(static_cast<std::int32_t>(mesh.x.size()));
-      mesh.x.push_back(x[k]), mesh.y.push_back(y[k]);
+      mesh.x.push_back(x[k]);
+      mesh.y.push_back(y[k]);
       mesh.packed.push_back({x[k], y[k], 1, 1});
     }
     mesh.source_face.push_back(static_cast<std::int32_t>(mesh.reject.size()));
@@ -37,7 +38,8 @@ struct SoftScene {
     options.faces = mesh.reject.size();
   }
   void Resize(int width, int height) {
-    mesh.width = options.width = width, mesh.height = options.height = height;
+    mesh.width = options.width = width;
+    mesh.height = options.height = height;
     face_ids.assign(static_cast<std::size_t>(width * height), -1);
     d_alpha.assign(face_ids.size(), 0.0f);
   }
@@ -54,12 +56,23 @@ inline void RandomFace(FaceKind kind, Rng* rng, SoftScene* scene) {
   for (int k = 0; k < 3; ++k) {
     x[k] = static_cast<float>(cx + rng->Uniform(-reach, reach));
     y[k] = static_cast<float>(cy + rng->Uniform(-reach, reach));
-    if (kind == FaceKind::kOnCentres)
-      x[k] = std::floor(x[k]) + 0.5f, y[k] = std::floor(y[k]) + 0.5f;
+    if (kind == FaceKind::kOnCentres) {
+      x[k] = std::floor(x[k]) + 0.5f;
+      y[k] = std::floor(y[k]) + 0.5f;
+    }
   }
-  if (kind == FaceKind::kSliver) x[2] = x[1] + 1e-5f, y[2] = y[1] - 1e-5f;
-  if (kind == FaceKind::kSegment || kind == FaceKind::kPoint) x[2] = x[1], y[2] = y[1];
-  if (kind == FaceKind::kPoint) x[1] = x[2] = x[0], y[1] = y[2] = y[0];
+  if (kind == FaceKind::kSliver) {
+    x[2] = x[1] + 1e-5f;
+    y[2] = y[1] - 1e-5f;
+  }
+  if (kind == FaceKind::kSegment || kind == FaceKind::kPoint) {
+    x[2] = x[1];
+    y[2] = y[1];
+  }
+  if (kind == FaceKind::kPoint) {
+    x[1] = x[2] = x[0];
+    y[1] = y[2] = y[0];
+  }
   scene->AddFace(x, y);
 }
 
@@ -91,8 +104,11 @@ class SoftTruth {
   explicit SoftTruth(const SoftScene& scene) : scene_(scene), faces_(scene.options.faces) {
     x_.assign(scene.mesh.x.begin(), scene.mesh.x.end());
     y_.assign(scene.mesh.y.begin(), scene.mesh.y.end());
-    mesh_.x = x_, mesh_.y = y_;
-    mesh_.v0 = scene.mesh.v0, mesh_.v1 = scene.mesh.v1, mesh_.v2 = scene.mesh.v2;
+    mesh_.x = x_;
+    mesh_.y = y_;
+    mesh_.v0 = scene.mesh.v0;
+    mesh_.v1 = scene.mesh.v1;
+    mesh_.v2 = scene.mesh.v2;
     mesh_.reject = scene.mesh.reject;
     std::iota(faces_.begin(), faces_.end(), 0);
     const SoftMaskOptions& o = scene.options;
@@ -101,7 +117,8 @@ class SoftTruth {
     radius_ = 3.5 * std::hypot(scale_.x * unit, scale_.y * unit);
     largest_unit_ = std::max(scale_.x, scale_.y) * unit;
     for (std::size_t f = 0; f < faces_.size(); ++f) {
-      cancelled_.push_back(CancelledIn(f)), edges_.push_back(LongestEdge(f));
+      cancelled_.push_back(CancelledIn(f));
+      edges_.push_back(LongestEdge(f));
     }
   }
   double X(std::size_t i) const {
@@ -191,14 +208,16 @@ class SoftTruth {
   // d_corners [faces][3][2] for d_alpha, and how far a float kernel may be from it.
   void Gradient(const std::vector<float>& d_alpha, std::vector<double>* d_corners,
                 std::vector<double>* tolerance) const {
-    d_corners->assign(6 * faces_.size(), 0), tolerance->assign(6 * faces_.size(), 0);
+    d_corners->assign(6 * faces_.size(), 0);
+    tolerance->assign(6 * faces_.size(), 0);
     for (std::size_t i = 0; i < scene_.pixels(); ++i) {
       if (scene_.face_ids[i] >= 0 || d_alpha[i] == 0) continue;
       const auto d = static_cast<double>(d_alpha[i]);
       SoftAlphaRefBackward<double>(mesh_, faces_, X(i), Y(i), scale_, d,
                                    [&](std::size_t n, int corner, double dx, double dy) {
                                      double* at = d_corners->data() + 6 * n + 2 * corner;
-                                     at[0] += dx, at[1] += dy;
+                                     at[0] += dx;
+                                     at[1] += dy;
                                    });
       AddTolerance(i, std::abs(d), tolerance);
     }
@@ -240,9 +259,15 @@ class SoftTruth {
   static std::vector<double> ProductsOfOthers(const std::vector<double>& factors) {
     std::vector<double> out(factors.size(), 1.0);
     double product = 1;
-    for (std::size_t f = 0; f < factors.size(); ++f) out[f] *= product, product *= factors[f];
+    for (std::size_t f = 0; f < factors.size(); ++f) {
+      out[f] *= product;
+      product *= factors[f];
+    }
     product = 1;
-    for (std::size_t f = factors.size(); f-- > 0;) out[f] *= product, product *= factors[f];
+    for (std::size_t f = factors.size(); f-- > 0;) {
+      out[f] *= product;
+      product *= factors[f];
+    }
     return out;
   }
   // Of faces that are set up in float; 0 of those with long edges.
@@ -321,7 +346,8 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
   const SquareGrid grid(scene.options.width, scene.options.height, run.region_bits);
   SoftResult out;
-  out.alpha.assign(scene.pixels(), -1.0f), out.transmittance.assign(scene.pixels(), -2.0f);
+  out.alpha.assign(scene.pixels(), -1.0f);
+  out.transmittance.assign(scene.pixels(), -2.0f);
   out.d_corners.assign(6 * mesh.faces(), 0.0f);
   AlignedVector<SoftFaceGradient> gradients;
   std::span<const float> known(out.transmittance);
@@ -335,7 +361,8 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
   for (const SoftFaceGradient& g : gradients) {
     float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(g.face);
     for (std::size_t k = 0; k < 3; ++k) {
-      to[2 * k] += g.d_corner[k][0], to[2 * k + 1] += g.d_corner[k][1];
+      to[2 * k] += g.d_corner[k][0];
+      to[2 * k + 1] += g.d_corner[k][1];
     }
   }
   return out;

@@ -19,9 +19,12 @@ using test::TestScene;
 
 RenderOptions PaperOptions() {
   RenderOptions options;
-  options.width = 37, options.height = 41;
-  options.delta = 1e-3, options.alpha_rule = AlphaRule::kPaper;
-  options.paper_box = 0.1, options.paper_faces = 5;
+  options.width = 37;
+  options.height = 41;
+  options.delta = 1e-3;
+  options.alpha_rule = AlphaRule::kPaper;
+  options.paper_box = 0.1;
+  options.paper_faces = 5;
   return options;
 }
 
@@ -62,7 +65,8 @@ void CheckAgainstReference(const RenderOptions& options, std::size_t most_differ
   for (std::size_t i = 0; i < frame.alpha.size(); ++i) {
     // kAlphaTolerance of renderer_test.cc, for a kernel of this width.
     const bool same = std::abs(static_cast<double>(frame.alpha[i]) - truth.alpha[i]) < 1e-4;
-    different += !same, between += frame.alpha[i] > 0 && frame.alpha[i] < 1;
+    different += !same;
+    between += frame.alpha[i] > 0 && frame.alpha[i] < 1;
     if (same) d_alpha[i] = static_cast<float>(rng.Uniform(-1, 1));
   }
   EXPECT_LE(different, most_different);
@@ -90,7 +94,8 @@ TEST(PaperAlpha, RendererIsTheReference) { CheckAgainstReference(PaperOptions(),
 // Several bins, some of them narrower than others.
 TEST(PaperAlpha, RendererIsTheReferenceOnLargeImages) {
   RenderOptions options = PaperOptions();
-  options.width = 150, options.height = 133;
+  options.width = 150;
+  options.height = 133;
   CheckAgainstReference(options, 100);
 }
 
@@ -116,7 +121,8 @@ TEST(PaperAlpha, AddsToTheGradientOfAttributes) {
 
 TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
   RenderOptions options = PaperOptions();
-  options.paper_box = 0.2, options.paper_faces = 1;
+  options.paper_box = 0.2;
+  options.paper_faces = 1;
   Rng rng(6);
   auto scene = test::TriangleSoup(30, 0.1, options.width, options.height, &rng);
   const Workers workers(1);

@@ -96,7 +96,8 @@ TEST_F(Layers, OpaqueMeshesHaveNoCover) {
 TEST_F(Layers, AMaskIsCutOutAndShowsWhatIsBehind) {
   AddWall(1, Paint(kRed), &mesh_);
   AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0, mesh_.materials[0].nearest = true;
+  mesh_.materials[0].base_color_texture = 0;
+  mesh_.materials[0].nearest = true;
   mesh_.materials[0].alpha_mode = AlphaMode::kMask;
   Picture picture = Draw();
   ExpectNear(At(picture, 1, 4), {0, 0, 0, 0});  // nothing is behind
@@ -121,7 +122,9 @@ TEST_F(Layers, TheCutoffHoldsForFactorTimesTextureTimesVertexColour) {
   EXPECT_EQ(At(Draw(), 4, 4).a, 1);
   mesh_.colors.assign(4, {1, 1, 1, 0.99f});
   EXPECT_EQ(At(Draw(), 4, 4).a, 0);
-  mesh_.textures.clear(), mesh_.colors.clear(), mesh_.materials[0].base_color_texture = -1;
+  mesh_.textures.clear();
+  mesh_.colors.clear();
+  mesh_.materials[0].base_color_texture = -1;
   mesh_.materials[0].alpha_cutoff = 0.5f;
   EXPECT_EQ(At(Draw(), 4, 4).a, 1);  // 0.5 of 0.5
 }
@@ -162,7 +165,8 @@ TEST_F(Layers, PanesThatCutEachOther) {
 TEST_F(Layers, SamplesOfAPixelAreAveraged) {
   AddWall(1, Paint(kRed), &mesh_);
   AddAlphaTexture({0, 255, 255, 255, 255, 255, 255, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0, mesh_.materials[0].nearest = true;
+  mesh_.materials[0].base_color_texture = 0;
+  mesh_.materials[0].nearest = true;
   mesh_.materials[0].alpha_mode = AlphaMode::kMask;
   const Picture fine = Draw({.supersampling = 4});
   float covered = 0;
@@ -185,7 +189,8 @@ TEST_F(Layers, SamplesOfAPixelAreAveraged) {
 TEST_F(Layers, ExactImagesLookThroughHoles) {
   AddWall(1, Paint(kRed), &mesh_);
   AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0, mesh_.materials[0].nearest = true;
+  mesh_.materials[0].base_color_texture = 0;
+  mesh_.materials[0].nearest = true;
   mesh_.materials[0].alpha_mode = AlphaMode::kMask;
   AddWall(-1, Glass(kGreen, 0.1f), &mesh_);
   const Picture picture = Draw({.depth = true, .normals = true, .uv = true, .face_ids = true});
@@ -210,7 +215,8 @@ TEST_F(Layers, DatasetsCutMasksOutAndDrawGlassOpaque) {
   ASSERT_TRUE(glass.ok());
   EXPECT_EQ(glass->at(4, 4)[3], 255);
   AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0, mesh_.materials[0].nearest = true;
+  mesh_.materials[0].base_color_texture = 0;
+  mesh_.materials[0].nearest = true;
   mesh_.materials[0].base_color.a = 1;
   mesh_.materials[0].alpha_mode = AlphaMode::kMask;
   const auto cut = renderer.RenderStraight(mesh_, FromAbove(), kSize);

@@ -35,7 +35,9 @@ TEST(PipelineFrames, BackwardNeedsFaceIdsAndWhatAlphaLeaves) {
           .ok());
   ASSERT_TRUE(backward().ok());
   const auto positions = batch.positions, attributes = batch.attributes;
-  frame.attributes.clear(), frame.depth.clear(), frame.barycentrics.clear();
+  frame.attributes.clear();
+  frame.depth.clear();
+  frame.barycentrics.clear();
   ASSERT_TRUE(backward().ok());
   EXPECT_EQ(batch.positions, positions);
   EXPECT_EQ(batch.attributes, attributes);

@@ -25,8 +25,10 @@ struct Case {
 
 RenderOptions Options(int width, int height, Interpolation mode, double delta) {
   RenderOptions options;
-  options.width = width, options.height = height;
-  options.interpolation = mode, options.delta = delta;
+  options.width = width;
+  options.height = height;
+  options.interpolation = mode;
+  options.delta = delta;
   return options;
 }
 

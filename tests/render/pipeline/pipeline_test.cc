@@ -59,8 +59,10 @@ const Case kCases[] = {
 
 RenderOptions OptionsOf(const Case& c) {
   RenderOptions options;
-  options.width = c.width, options.height = c.height;
-  options.interpolation = c.mode, options.delta = c.delta;
+  options.width = c.width;
+  options.height = c.height;
+  options.interpolation = c.mode;
+  options.delta = c.delta;
   options.max_alpha_error = 1e-7;
   return options;
 }

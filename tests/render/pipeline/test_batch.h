@@ -14,7 +14,9 @@ inline constexpr int kWidth = 40, kHeight = 36;
 
 inline RenderOptions Options(int width = kWidth, int height = kHeight) {
   RenderOptions options;
-  options.width = width, options.height = height, options.delta = 1e-3;
+  options.width = width;
+  options.height = height;
+  options.delta = 1e-3;
   return options;
 }
 

@@ -16,7 +16,8 @@ template <class T>
 using TestScene = OwnedMesh<T>;
 
 inline void RandomAttributes(int channels, Rate rate, Rng* rng, TestScene<float>* scene) {
-  scene->channels = channels, scene->rate = rate;
+  scene->channels = channels;
+  scene->rate = rate;
   const std::size_t rows = rate == Rate::kVertex ? scene->vertex_count() : scene->faces.size();
   scene->attributes.resize(rows * static_cast<std::size_t>(channels));
   for (float& a : scene->attributes) a = static_cast<float>(rng->Uniform());

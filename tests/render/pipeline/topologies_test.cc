@@ -111,8 +111,11 @@ std::string Bytes(Pipeline* renderer, const std::vector<PipelineScene>& views) {
     out.append(reinterpret_cast<const char*>(values.data()) + n * size, size);
   };
   for (std::size_t n = 0; n < count; ++n) {
-    add(frame.face_ids, n, count), add(frame.attributes, n, count), add(frame.alpha, n, count);
-    add(positions[n], 0, 1), add(attributes[n], 0, 1);
+    add(frame.face_ids, n, count);
+    add(frame.attributes, n, count);
+    add(frame.alpha, n, count);
+    add(positions[n], 0, 1);
+    add(attributes[n], 0, 1);
   }
   return out;
 }

@@ -19,7 +19,8 @@ constexpr int kWidth = 48, kHeight = 40;
 
 RenderOptions Options() {
   RenderOptions options;
-  options.width = kWidth, options.height = kHeight;
+  options.width = kWidth;
+  options.height = kHeight;
   return options;
 }
 
@@ -33,7 +34,9 @@ struct Wall {
   Wall(double reach, double near_plane, Rng* rng) {
     for (int i = 0; i < 9; ++i) positions.push_back(Number(rng->Uniform(-reach, reach)));
     for (int i = 0; i < 6; ++i) uvs.push_back(Number(rng->Uniform(0, 8)));
-    camera.fx = camera.fy = 20, camera.cx = kWidth / 2, camera.cy = kHeight / 2;
+    camera.fx = camera.fy = 20;
+    camera.cx = kWidth / 2;
+    camera.cy = kHeight / 2;
     camera.near_plane = Number(near_plane);
   }
   // What float holds.
@@ -44,13 +47,19 @@ struct Wall {
 
 // A screen mesh in double, number for number.
 void Widen(const raster::ScreenMeshBuffersT<float>& from, raster::ScreenMeshBuffersT<double>* to) {
-  to->x.assign(from.x.begin(), from.x.end()), to->y.assign(from.y.begin(), from.y.end());
+  to->x.assign(from.x.begin(), from.x.end());
+  to->y.assign(from.y.begin(), from.y.end());
   to->depth.assign(from.depth.begin(), from.depth.end());
   to->inverse_depth.assign(from.inverse_depth.begin(), from.inverse_depth.end());
-  to->v0 = from.v0, to->v1 = from.v1, to->v2 = from.v2;
-  to->source_face = from.source_face, to->reject = from.reject;
-  to->source_vertices = from.source_vertices, to->source_faces = from.source_faces;
-  to->width = from.width, to->height = from.height;
+  to->v0 = from.v0;
+  to->v1 = from.v1;
+  to->v2 = from.v2;
+  to->source_face = from.source_face;
+  to->reject = from.reject;
+  to->source_vertices = from.source_vertices;
+  to->source_faces = from.source_faces;
+  to->width = from.width;
+  to->height = from.height;
 }
 
 // Of one mesh the levels are the same in either type, up to a rounding of a logarithm below 32 and
@@ -93,8 +102,11 @@ template <class T>
 SceneT<T> TwoSided(const Wall<T>& wall) {
   SceneT<T> scene;
   const PipelineSceneT<T> mesh = wall.View();
-  scene.positions = mesh.positions, scene.faces = mesh.faces, scene.camera = mesh.camera;
-  scene.shading.normals = Normals::kFlat, scene.shading.two_sided = true;
+  scene.positions = mesh.positions;
+  scene.faces = mesh.faces;
+  scene.camera = mesh.camera;
+  scene.shading.normals = Normals::kFlat;
+  scene.shading.two_sided = true;
   return scene;
 }
 
@@ -104,7 +116,8 @@ TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
   const Workers workers(1);
   Engine renderer(workers);
   Outputs request;
-  request.color = request.alpha = false, request.normals = true;
+  request.color = request.alpha = false;
+  request.normals = true;
   int pixels = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     Rng rng(seed, 2), same(seed, 2);
