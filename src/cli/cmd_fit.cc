@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <string>
 
 #include "base/error.h"
 #include "base/folder_lock.h"
@@ -12,7 +14,6 @@
 #include "cli/console.h"
 #include "cli/fit_outcome.h"
 #include "cli/fit_parameters.h"
-#include "cli/fit_pictures.h"
 #include "cli/given_options.h"
 #include "cli/live_option.h"
 #include "cli/run_folder.h"
@@ -23,6 +24,46 @@
 
 namespace tilegrad::cli {
 namespace {
+
+struct FitPictures {
+  std::string background = "auto";
+  double fov = train::kUsualFov;
+  bool find_cameras = false;
+  std::optional<UpAxis> up;
+};
+
+train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
+  // OneOf has checked it.
+  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov, pictures.up, watch};
+}
+
+// Warnings of the input from the `first` on, a few of them.
+void PrintWarnings(const train::FitInput& input, std::size_t first) {
+  constexpr std::size_t kShown = 3;
+  const std::size_t count = input.warnings.size() - first;
+  for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
+    PrintNote("tilegrad: warning: {}\n", input.warnings[first + i]);
+  }
+  if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
+}
+
+void AddPictureOptions(Command* command, FitPictures* o) {
+  command->Add("--background", &o->background,
+               "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
+               "(plain), the former if there are any (auto); none: every pixel shows the object",
+               {OneOf{{"auto", "mask", "plain", "none"}}});
+  command->Add(
+      "--find-cameras", &o->find_cameras,
+      "look for the cameras in the images, though the folder has some; these judge the result");
+  command->Add("--up",
+               Choice<std::optional<UpAxis>>(
+                   &o->up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
+               "the axis of the cameras' world that points up: everything is turned to have y up, "
+               "as glTF wants it [what the cameras make plain, else y]",
+               {Excludes{{"--model"}}});
+  command->Add("--fov", &o->fov, "degrees that images without cameras see along their longer side",
+               {Range{5, 150}});
+}
 
 using train::FitConfig;
 using train::Parameter;

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and pictures of it all around from each image.
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/output_guard.h"
+#include "base/parallel.h"
+#include "base/progress.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/match_file.h"
 #include "cli/predict_light.h"
-#include "cli/predict_pictures.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
 #include "fit/background.h"
@@ -16,6 +19,11 @@
 #include "fit/refine.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "io/webp_animation.h"
+#include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
+#include "scene/mesh.h"
+#include "tilegrad/status.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/eval/training_pictures.h"
@@ -23,6 +31,76 @@
 
 namespace tilegrad::cli {
 namespace {
+
+constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableFrames = 36,
+              kTurntableSize = 256;
+constexpr int kTurntableFrameMilliseconds = 100, kTurntableQuality = 85;
+
+Result<std::vector<ImageU8>> DrawAround(const Mesh& mesh, int views, const Workers& workers) {
+  const train::CameraRule rule;
+  std::vector<Camera> cameras;
+  for (int i = 0; i < views; ++i)
+    cameras.push_back(OrbitCamera(rule.lens, -360.0 * i / views, rule.elevation, rule.distance));
+  return DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers);
+}
+
+// Eight views around the mesh in one PNG, from where cameras of datasets stand.
+Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers) {
+  TILEGRAD_ASSIGN(const auto views, DrawAround(mesh, kTurntableViews, workers));
+  return io::SavePng(file, TileImages(views, kTurntableColumns));
+}
+
+// The mesh turning once around in 36 frames, as an animated WebP that loops.
+Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers,
+                        const Watch& watch) {
+  TILEGRAD_ASSIGN(const auto frames, DrawAround(mesh, kTurntableFrames, workers));
+  return io::SaveWebpAnimation(
+      file, frames,
+      {.frame_ms = kTurntableFrameMilliseconds, .quality = kTurntableQuality, .watch = watch});
+}
+
+// What the picture, planar RGBA of kRefineSize, shows; the network's mesh and the refined one, from
+// where it was taken.
+Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
+                 const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
+  constexpr int size = train::kRefineSize;
+  const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
+                                        picture.subspan(3 * size * size), size, size};
+  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
+  for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
+                                     std::pair(&refined.mesh, &refined.camera)}) {
+    TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));
+    cells.push_back(std::move(views[0]));
+  }
+  return io::SavePng(file, TileImages(cells, static_cast<int>(cells.size())));
+}
+
+nlohmann::ordered_json CameraRecord(const Camera& camera) {
+  return {{"size", train::kRefineSize},
+          {"rotation", camera.rotation},
+          {"translation", camera.translation},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy}};
+}
+
+// {"silhouette_iou": [before, after], "color_l1": [before, after], "camera_doubtful": false}:
+// PictureMatch of the prediction and of the refined mesh, and whether RefinedMesh::rival is near.
+nlohmann::ordered_json ScoresOf(const train::RefinedMesh& refined) {
+  const train::PictureMatch &before = refined.before, &after = refined.after;
+  return {{"silhouette_iou", {before.silhouette_iou, after.silhouette_iou}},
+          {"color_l1", {before.color_l1, after.color_l1}},
+          {"camera_doubtful", refined.rival < train::kDoubtfulRival}};
+}
+
+// The same and "camera", which sees the refined mesh, in pixels of a picture of "size" pixels a
+// side.
+Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {
+  nlohmann::ordered_json record = ScoresOf(refined);
+  record["camera"] = CameraRecord(refined.camera);
+  return WriteTextAtomic(file, record.dump(1) + "\n");
+}
 
 struct PredictOptions {
   std::string run, out = ".", mask;
