@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/result.h"
 
+#include <span>
+#include <vector>
+
 #include "base/error.h"
 #include "base/file.h"
-#include "fit/camera_score.h"
 #include "fit/material.h"
+#include "fit/run.h"
 #include "fit/transforms.h"
 #include "io/image_file.h"
 #include "render/picture/composite.h"
@@ -13,6 +16,40 @@
 
 namespace tilegrad::train {
 namespace {
+
+double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += AngleBetween(a[i], b[i]);
+  return a.empty() ? 0 : sum / static_cast<double>(a.size());
+}
+
+std::vector<Camera> Choose(std::span<const Camera> cameras, std::span<const int> views) {
+  std::vector<Camera> out;
+  for (const int v : views) out.push_back(cameras[static_cast<std::size_t>(v)]);
+  return out;
+}
+
+// Cameras as the input gave them; those that were found live in a world of their own.
+const std::vector<Camera>& GivenCameras(const FitInput& input) {
+  return input.given_cameras.empty() ? input.cameras : input.given_cameras;
+}
+
+// camera_error_before and _after of the training views, where cameras were turned or found although
+// they were given; both after alignment, where that is free.
+void ScoreCameras(const FitJob& job, const FitScene& scene, FitOutcome* outcome) {
+  const bool found = !job.input.given_cameras.empty();
+  if (job.config.perturb_cameras == 0 && !found) return;
+  const std::vector<int>& views = job.input.training;
+  const std::vector<Camera> truth = Choose(GivenCameras(job.input), views);
+  std::vector<Camera> before = Choose(TurnedCameras(job, scene.pivot), views);
+  const Alignment first = found ? AlignCameras(before, truth) : Alignment();
+  for (Camera& camera : before) camera = Moved(camera, first);
+  outcome->camera_error_before = MeanAngle(before, truth);
+  std::vector<Camera> fitted = Choose(scene.cameras, views);
+  const Alignment alignment = AlignCameras(fitted, truth);
+  for (Camera& camera : fitted) camera = Moved(camera, alignment);
+  outcome->camera_error_after = MeanAngle(fitted, truth);
+}
 
 constexpr int kSheetColumns = 6;
 

@@ -7,11 +7,13 @@
 #include <set>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "fit/clock.h"
+#include "fit/hull/mask_distance.h"
+#include "fit/image_loss.h"
 #include "fit/result.h"
-#include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
@@ -19,6 +21,46 @@
 
 namespace tilegrad::train {
 namespace {
+
+// A soft silhouette (equation 5) reaches beyond its shape: held to a mask as it is, a shape comes
+// out too small, by about the softness on each side, which is much of a chair's leg. So it is held
+// to what the true shape's would be: 1 inside of the mask's outline, exp(-d^2 / delta) at a
+// distance d outside.
+class SoftTargets {
+ public:
+  SoftTargets(TargetImages images, const Workers& workers);
+
+  // The images, with `silhouette` set for these views. delta in squared NDC. Allocates nothing.
+  const TargetImages& At(double delta, std::span<const int> views, const Workers& workers);
+
+ private:
+  TargetImages images_;
+  std::vector<MaskDistance> distances_;  // of each view
+};
+
+SoftTargets::SoftTargets(TargetImages images, const Workers& workers)
+    : images_(std::move(images)), distances_(images_.alpha.size() / images_.pixels()) {
+  images_.silhouette.resize(images_.alpha.size());
+  workers.For(distances_.size(), [&](std::size_t v, std::size_t) {
+    const std::size_t plane = images_.pixels();
+    distances_[v] = DistanceOf(std::span(images_.alpha).subspan(v * plane, plane), images_.width,
+                               images_.height);
+  });
+}
+
+const TargetImages& SoftTargets::At(double delta, std::span<const int> views,
+                                    const Workers& workers) {
+  const double ndc = 2.0 / std::max(images_.width, images_.height);
+  const auto factor = static_cast<float>(ndc * ndc / delta);
+  workers.For(views.size(), [&](std::size_t i, std::size_t) {
+    const auto v = static_cast<std::size_t>(views[i]);
+    const std::vector<float>& d = distances_[v].values;
+    float* to = &images_.silhouette[v * images_.pixels()];
+    for (std::size_t p = 0; p < d.size(); ++p)
+      to[p] = d[p] >= 0 ? 1.0f : std::exp(-d[p] * d[p] * factor);
+  });
+  return images_;
+}
 
 constexpr std::int64_t kLogEvery = 10;
 constexpr const char* kInput = "input = ";

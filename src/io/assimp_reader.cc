@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Meshes by Assimp, which runs in a process of its own; its result becomes a mesh here.
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <glm/mat3x3.hpp>
 #include <optional>
+#include <string_view>
 #include <unordered_map>
 
 #include "base/error.h"
@@ -14,11 +16,41 @@
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
-#include "io/threemf_paint.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::io {
 namespace {
+
+// What stands in quotes behind `name`, which begins with a space and ends with "=".
+std::string_view ValueOf(std::string_view tag, std::string_view name) {
+  const std::size_t found = tag.find(name);
+  if (found == std::string_view::npos) return {};
+  const std::string_view rest = tag.substr(std::min(found + name.size() + 1, tag.size()));
+  return rest.substr(0, rest.find_first_of("\"'"));
+}
+
+// Whether triangles of one object of a 3MF model are painted differently, or colour groups are
+// used: Assimp 5.2 gives an object the material of its last triangle, and does not read the groups.
+bool HasPaintedTriangles(std::string_view model_xml) {
+  // Of the base materials' extension, and as slicers have it.
+  constexpr std::array<std::string_view, 6> kPaint = {
+      " pid=", " p1=", " p2=", " p3=", ":mmu_segmentation=", " paint_color="};
+  using Paint = std::array<std::string_view, kPaint.size()>;
+  std::optional<Paint> first;  // of this object
+  for (std::size_t at = model_xml.find('<'); at != std::string_view::npos;
+       at = model_xml.find('<', at + 1)) {
+    const std::string_view tag = model_xml.substr(at, model_xml.find('>', at) - at);
+    if (tag.find("colorgroup") != std::string_view::npos) return true;
+    if (tag.starts_with("<object")) first.reset();
+    if (!tag.starts_with("<triangle ")) continue;
+    Paint paint;
+    std::transform(kPaint.begin(), kPaint.end(), paint.begin(),
+                   [&](std::string_view name) { return ValueOf(tag, name); });
+    if (first && *first != paint) return true;
+    first = paint;
+  }
+  return false;
+}
 
 // Corners that agree in position and colour become one vertex; uv and normals stay per corner.
 class Welder {

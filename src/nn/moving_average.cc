@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/moving_average.h"
 
+#include <cstddef>
+#include <span>
 #include <string_view>
 #include <utility>
 
-#include "nn/kernels/update.h"
+#include "base/parallel.h"
 
 namespace tilegrad::nn {
 namespace {
 
 constexpr std::string_view kPrefix = "ema.";
+constexpr std::size_t kUpdateGrain = 65536;  // elements to a task
+
+// y = decay y + (1 - decay) x. Memory bounds it, and every compiler vectorises it.
+template <class T>
+void Blend(double decay, std::span<const T> x, std::span<T> y, const Workers& workers) {
+  const auto old = static_cast<T>(decay), rest = static_cast<T>(1 - decay);
+  workers.ForRanges(x.size(), kUpdateGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) y[i] = old * y[i] + rest * x[i];
+  });
+}
 
 }  // namespace
 
@@ -22,8 +34,7 @@ void MovingAverage::Update() {
   for (std::size_t i = 0; i < tensors_.size(); ++i) {
     const Tensor& from = tensors_[i].value;
     WithFloatType(from.dtype(), [&]<class T>(T) {
-      Blend({from.elements(), decay_}, from.data<T>(), averages_[i].value.data<T>(),
-            context_.workers());
+      Blend<T>(decay_, from.span<T>(), averages_[i].value.span<T>(), context_.workers());
     });
   }
 }
