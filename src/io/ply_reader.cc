@@ -1,16 +1,272 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stanford PLY, text and binary of both byte orders. Not read by Assimp, whose reader reads past
 // the end of a file with a wrong header or list.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "io/mesh_colors.h"
+#include "io/mesh_file.h"
 #include "io/mesh_readers.h"
-#include "io/ply_body.h"
+#include "io/ply_columns.h"
 #include "io/ply_header.h"
+#include "io/ply_values.h"
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
+
+struct PlyFace {
+  std::size_t first = 0, count = 0;  // among the corners of all faces
+  glm::vec4 color;
+  double image = -1;  // the number of its texture
+};
+
+// What follows the header: vertices, faces and strips of triangles become a mesh without materials.
+class PlyBody {
+ public:
+  PlyBody(const PlyHeader& header, const std::string& place, LoadedMesh& out)
+      : header_(header), place_(place), values_(header.data, header.encoding), out_(out) {}
+
+  Status Read() {
+    for (const PlyElement& element : header_.elements) {
+      if (element.name == "vertex")
+        TILEGRAD_TRY(Vertices(element));
+      else if (element.name == "face")
+        TILEGRAD_TRY(Faces(element));
+      else if (element.name == "tristrips")
+        TILEGRAD_TRY(Strips(element));
+      else
+        TILEGRAD_TRY(Skip(element));
+    }
+    AddFaces();
+    AddWarnings();
+    return {};
+  }
+
+  // Which of the header's images each triangle names, from 0; empty if no face names one.
+  const std::vector<double>& images() const { return images_; }
+
+ private:
+  using enum PlyColumns::Slot;
+
+  Status Error(const PlyElement& element, std::size_t row, const PlyProperty& property) const {
+    return DataLoss("{}: {} {}: \"{}\" is cut off or not a finite number", place_, element.name,
+                    row, property.name);
+  }
+
+  // What is left out of rows that are there is said.
+  PlyColumns ColumnsOf(const PlyElement& element, PlyColumns::Slot first, PlyColumns::Slot end) {
+    PlyColumns columns(element, first, end);
+    for (std::size_t k = 0; k < columns.of.size() && element.count > 0; ++k) {
+      if (columns.of[k].slot == kSlots && !columns.of[k].list)
+        properties_not_read_.insert(element.properties[k].name);
+    }
+    return columns;
+  }
+
+  // Normals may be anything: DropNonFiniteNormals comes later.
+  bool ReadNumber(const PlyProperty& property, const PlyColumns::Column& column, double& to) {
+    if (!values_.Next(property.type, to)) return false;
+    to /= column.scale;
+    return std::isfinite(to) || (column.slot >= kNx && column.slot <= kNz);
+  }
+
+  // The next row: numbers into `row` by slot, each list that is read to `take` with its property.
+  template <class Take>
+  Status ReadRow(const PlyElement& element, std::size_t i, const PlyColumns& columns,
+                 std::array<double, kSlots>& row, Take take) {
+    for (std::size_t k = 0; k < columns.of.size(); ++k) {
+      const PlyProperty& property = element.properties[k];
+      const PlyColumns::Column& column = columns.of[k];
+      const bool good = column.list ? values_.NextList(property, list_)
+                        : column.slot == PlyColumns::kSlots
+                            ? values_.Skip(property)
+                            : ReadNumber(property, column, row[column.slot]);
+      if (!good) return Error(element, i, property);
+      if (column.list) TILEGRAD_TRY(take(property));
+    }
+    return {};
+  }
+
+  Status Vertices(const PlyElement& element) {
+    Mesh& mesh = out_.mesh;
+    const PlyColumns columns = ColumnsOf(element, kRed, kSlots);
+    const auto& has = columns.has;
+    if (!has[kX]) return DataLoss("{}: the vertices have no x, y and z", place_);
+    std::array<double, kSlots> row{};
+    row[kAlpha] = 1;
+    for (std::size_t i = 0; i < element.count; ++i) {
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
+      out_.exact.emplace_back(row[kX], row[kY], row[kZ]);
+      if (has[kNx]) mesh.normals.emplace_back(row[kNx], row[kNy], row[kNz]);
+      if (has[kRed]) mesh.colors.emplace_back(row[kRed], row[kGreen], row[kBlue], row[kAlpha]);
+      if (has[kU]) vertex_uvs_.emplace_back(row[kU], row[kV]);
+    }
+    return {};
+  }
+
+  // Kept until all vertices are there: elements may come in any order.
+  Status Faces(const PlyElement& element) {
+    const PlyColumns columns = ColumnsOf(element, kTexNumber, kX);
+    const auto& has = columns.has;
+    has_images_ = has_images_ || has[kTexNumber];
+    has_face_colors_ = has_face_colors_ || has[kRed];
+    std::array<double, kSlots> row{};
+    row[kAlpha] = 1;
+    std::vector<double> uvs;
+    for (std::size_t i = 0; i < element.count; ++i) {
+      PlyFace face{corners_.size(), 0, kNoColor, -1};
+      uvs.clear();
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
+        if (property.name == "texcoord") uvs = list_;
+        if (IsPlyIndices(property)) return AddCorners(element, i);
+        return Status();
+      }));
+      face.count = corners_.size() - face.first;
+      if (has[kRed]) face.color = {row[kRed], row[kGreen], row[kBlue], row[kAlpha]};
+      if (has[kTexNumber]) face.image = row[kTexNumber];
+      AddCornerUvs(uvs, face);
+      faces_.push_back(face);
+    }
+    return {};
+  }
+
+  // The corners in list_.
+  Status AddCorners(const PlyElement& element, std::size_t row) {
+    for (const double index : list_) {
+      TILEGRAD_TRY(CheckIndex(element, row, index));
+      corners_.push_back(static_cast<std::int32_t>(index));
+    }
+    return {};
+  }
+
+  Status CheckIndex(const PlyElement& element, std::size_t row, double index) const {
+    const std::size_t vertices = header_.CountOf("vertex");
+    if (index >= 0 && index < static_cast<double>(vertices) && index == std::floor(index))
+      return {};
+    return DataLoss("{}: {} {} uses vertex {}, but the file has {}", place_, element.name, row,
+                    index, vertices);
+  }
+
+  // "texcoord": u and v of every corner of the polygon, in its order; 0 for a face without them.
+  void AddCornerUvs(const std::vector<double>& uvs, const PlyFace& face) {
+    if (uvs.empty()) return;
+    if (uvs.size() != 2 * face.count) {
+      odd_uvs_ = true;
+      return;
+    }
+    uvs_.resize(face.first, glm::vec2(0));
+    for (std::size_t k = 0; k < face.count; ++k) uvs_.emplace_back(uvs[2 * k], uvs[2 * k + 1]);
+  }
+
+  // Strips of triangles, one after the other, with -1 between them.
+  Status Strips(const PlyElement& element) {
+    const PlyColumns columns = ColumnsOf(element, kSlots, kSlots);
+    std::array<double, kSlots> row{};
+    for (std::size_t i = 0; i < element.count; ++i) {
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
+        return IsPlyIndices(property) ? AddStrips(element, i) : Status();
+      }));
+    }
+    return {};
+  }
+
+  Status AddStrips(const PlyElement& element, std::size_t row) {
+    std::size_t length = 0;
+    std::array<std::int32_t, 3> last{};
+    for (const double index : list_) {
+      if (index == -1) {
+        length = 0;
+        continue;
+      }
+      TILEGRAD_TRY(CheckIndex(element, row, index));
+      last = {last[1], last[2], static_cast<std::int32_t>(index)};
+      const auto [a, b, c] = last;
+      if (++length < 3 || a == b || b == c || c == a) continue;  // repeated to turn a corner
+      strip_faces_.push_back(length % 2 == 1 ? Face{a, b, c} : Face{b, a, c});
+    }
+    return {};
+  }
+
+  void AddFace(const PlyFace& face) {
+    Mesh& mesh = out_.mesh;
+    const std::span<const std::int32_t> corners(corners_.data() + face.first, face.count);
+    polygon_.corners.assign(corners.begin(), corners.end());
+    polygon_.AddTo(out_);
+    for (const Face& triangle : polygon_.triangles) {
+      if (has_images_) images_.push_back(face.image);
+      for (const std::int32_t k : triangle) {
+        if (!uvs_.empty())
+          mesh.corner_uvs.push_back(uvs_[face.first + static_cast<std::size_t>(k)]);
+        if (has_face_colors_) mesh.corner_colors.push_back(face.color);
+      }
+    }
+  }
+
+  void AddFaces() {
+    Mesh& mesh = out_.mesh;
+    uvs_.resize(uvs_.empty() ? 0 : corners_.size(), glm::vec2(0));
+    for (const PlyFace& face : faces_) AddFace(face);
+    mesh.faces.insert(mesh.faces.end(), strip_faces_.begin(), strip_faces_.end());
+    const std::size_t corners = 3 * mesh.faces.size();
+    if (!mesh.corner_uvs.empty()) mesh.corner_uvs.resize(corners, glm::vec2(0));
+    if (!mesh.corner_colors.empty()) mesh.corner_colors.resize(corners, kNoColor);
+    if (!images_.empty()) images_.resize(mesh.faces.size(), -1);
+    if (!mesh.corner_uvs.empty() || vertex_uvs_.empty()) return;
+    for (const Face& face : mesh.faces) {
+      for (const std::int32_t v : face) mesh.corner_uvs.push_back(vertex_uvs_[v]);
+    }
+  }
+
+  void AddWarnings() {
+    if (!out_.mesh.colors.empty() && !out_.mesh.corner_colors.empty()) {
+      out_.mesh.corner_colors.clear();
+      out_.warnings.push_back("colours of faces left out: the vertices have their own");
+    }
+    if (!uvs_.empty() && !vertex_uvs_.empty())
+      out_.warnings.push_back("texture coordinates of vertices left out: the faces have their own");
+    if (odd_uvs_) {
+      out_.warnings.push_back(
+          "texture coordinates of faces left out where there are not two for each corner");
+    }
+    for (const auto& [what, names] :
+         {std::pair("elements", &not_read_), std::pair("properties", &properties_not_read_)}) {
+      if (!names->empty())
+        out_.warnings.push_back(fmt::format("{} left out: {}", what, ShortList(*names)));
+    }
+  }
+
+  Status Skip(const PlyElement& element) {
+    if (element.count > 0) not_read_.insert(element.name);
+    for (std::size_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& property : element.properties) {
+        if (!values_.Skip(property)) return Error(element, i, property);
+      }
+    }
+    return {};
+  }
+
+  const PlyHeader& header_;
+  const std::string& place_;
+  PlyValues values_;
+  LoadedMesh& out_;
+  std::vector<glm::vec2> vertex_uvs_, uvs_;  // uvs_: of corners_, if any face has them
+  std::vector<std::int32_t> corners_;        // of faces_
+  std::vector<PlyFace> faces_;
+  std::vector<Face> strip_faces_;
+  std::vector<double> images_;
+  bool has_images_ = false, has_face_colors_ = false, odd_uvs_ = false;
+  std::set<std::string, std::less<>> not_read_, properties_not_read_;
+  std::vector<double> list_;  // scratch: the last list
+  Polygon polygon_;           // scratch: the last polygon
+};
 
 // A material for each image that faces name by their number, and a white one.
 class PlyTextures {
@@ -66,8 +322,9 @@ Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name) {
   const std::string place = source.Describe(name);
   TILEGRAD_ASSIGN(const PlyHeader header, ParsePlyHeader(TextOf(bytes), place));
   LoadedMesh out;
-  TILEGRAD_ASSIGN(const std::vector<double> images, ReadPlyBody(header, place, out));
-  PlyTextures(header, source, name, out).Add(images);
+  PlyBody body(header, place, out);
+  TILEGRAD_TRY(body.Read());
+  PlyTextures(header, source, name, out).Add(body.images());
   return out;
 }
 
