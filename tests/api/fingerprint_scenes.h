@@ -65,8 +65,10 @@ CameraT<T> MakeTestCamera(const Case& c, int n) {
   camera.translation[0] = Part<T>(30 + 50 * n);
   camera.translation[1] = Part<T>(-40);
   camera.translation[2] = inside ? T(0) : Part<T>(-2900 - 100 * n);
-  camera.fx = Part<T>(side * 1200), camera.fy = Part<T>(side * 1250);
-  camera.cx = Part<T>(c.options.width * 520), camera.cy = Part<T>(c.options.height * 505);
+  camera.fx = Part<T>(side * 1200);
+  camera.fy = Part<T>(side * 1250);
+  camera.cx = Part<T>(c.options.width * 520);
+  camera.cy = Part<T>(c.options.height * 505);
   camera.near_plane = Part<T>(inside ? 200 : 16);
   return camera;
 }

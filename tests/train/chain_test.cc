@@ -101,7 +101,9 @@ TEST(MeshNetwork, SymmetricPredictionsAre) {
   nn::Context context(workers);
   for (const bool fc_norm : {false, true}) {
     NetworkConfig config = TinyNetwork();
-    config.sphere.smoothing = 2, config.sphere.symmetric = true, config.fc_norm = fc_norm;
+    config.sphere.smoothing = 2;
+    config.sphere.symmetric = true;
+    config.fc_norm = fc_norm;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const Prediction out = network.Forward(images, nn::Mode::kEval);
@@ -217,7 +219,8 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
 
 TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   SmallProblem p;
-  p.config.network.sphere.symmetric = true, p.config.network.fc_norm = false;
+  p.config.network.sphere.symmetric = true;
+  p.config.network.fc_norm = false;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -229,7 +232,8 @@ TEST(Chain, SoDoThoseOfColorsLookedUpInThePicture) {
 
 TEST(Chain, SoDoThoseOfN3mrsVertices) {
   SmallProblem p;
-  p.config.network.sphere.n3mr_vertices = true, p.config.network.sphere.smoothing = 0;
+  p.config.network.sphere.n3mr_vertices = true;
+  p.config.network.sphere.smoothing = 0;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -379,10 +383,12 @@ TEST(Schedules, LearningRateAndSharpness) {
   EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 0), 0.1, 1e-9);
   EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 50), 0.55, 1e-12);
   EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 100), 0.1, 1e-12);
-  c.rivals.softras.sigma = 1e-4, c.rivals.softras_late_sigma = 0.3;
+  c.rivals.softras.sigma = 1e-4;
+  c.rivals.softras_late_sigma = 0.3;
   EXPECT_EQ(SoftRasSigmaAt(c.rivals, 0.59), 1e-4);
   EXPECT_NEAR(SoftRasSigmaAt(c.rivals, 0.6), 3e-5, 1e-18);
-  c.render.sharpness_start = 100, c.render.sharpness = 10000;
+  c.render.sharpness_start = 100;
+  c.render.sharpness = 10000;
   EXPECT_NEAR(SharpnessAt(c.render, 100, 0), 100, 1e-9);
   EXPECT_NEAR(SharpnessAt(c.render, 100, 25), 1000, 1e-9);
   EXPECT_NEAR(SharpnessAt(c.render, 100, 80), 10000, 1e-8);

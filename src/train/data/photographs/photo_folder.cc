@@ -54,8 +54,10 @@ Status SetMask(const ImageU8& rgba, Photograph* photo) {
       photo->mask.inside.push_back(inside);
       if (!inside) continue;
       PhotoBox& box = photo->box;
-      box.left = std::min(box.left, double(x)), box.right = std::max(box.right, x + 1.0);
-      box.top = std::min(box.top, double(y)), box.bottom = std::max(box.bottom, y + 1.0);
+      box.left = std::min(box.left, double(x));
+      box.right = std::max(box.right, x + 1.0);
+      box.top = std::min(box.top, double(y));
+      box.bottom = std::max(box.bottom, y + 1.0);
     }
   }
   if (photo->box.right > photo->box.left) return {};
@@ -236,8 +238,10 @@ class FolderReader {
   Status PlaceKeypoints() {
     std::vector<std::vector<Keypoint>> views;
     std::vector<WeakPerspective> cameras;
-    for (const Photograph& photo : set_.photographs)
-      views.push_back(photo.keypoints), cameras.push_back(*photo.camera);
+    for (const Photograph& photo : set_.photographs) {
+      views.push_back(photo.keypoints);
+      cameras.push_back(*photo.camera);
+    }
     set_.mean_keypoints = LocateKeypoints(views, cameras);
     return {};
   }

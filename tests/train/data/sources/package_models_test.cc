@@ -212,7 +212,8 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   ASSERT_TRUE(fewer.ok()) << fewer.status().message();
   EXPECT_EQ(fewer->models.size(), 2u);
   EXPECT_EQ(fewer->reused, 2);
-  options.liveries = 0, options.per_class = 1;
+  options.liveries = 0;
+  options.per_class = 1;
   const auto one = BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop);
   ASSERT_TRUE(one.ok()) << one.status().message();
   EXPECT_EQ(one->models.size(), 3u);

@@ -85,7 +85,10 @@ TEST(AxisWarp, GrowsByItsFactorsAndKeepsSymmetry) {
 
 TEST(ObjectDraw, FillsTheBoxAndStaysInRange) {
   StreamConfig config;
-  config.stretch = 1, config.recolor = 1, config.brightness = 1, config.taper = 1;
+  config.stretch = 1;
+  config.recolor = 1;
+  config.brightness = 1;
+  config.taper = 1;
   std::vector<glm::vec3> positions;
   const Mesh ball = Ball();
   bool deformed = false;
@@ -94,7 +97,10 @@ TEST(ObjectDraw, FillsTheBoxAndStaysInRange) {
     DrawShape(config, ball.positions, 0.45f, rng, &positions);
     const Recolor recolor(config, rng);
     glm::vec3 low(1), high(-1);
-    for (const glm::vec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
+    for (const glm::vec3& p : positions) {
+      low = glm::min(low, p);
+      high = glm::max(high, p);
+    }
     const glm::vec3 half = 0.5f * (high - low), centre = 0.5f * (high + low);
     EXPECT_NEAR(std::max({half.x, half.y, half.z}), 0.45f, 1e-6f);
     EXPECT_LT(glm::length(centre), 1e-6f);

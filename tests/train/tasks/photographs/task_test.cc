@@ -212,8 +212,11 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
                       .latent = 8,
                       .texture = texture,
                       .sphere = {.level = 1, .radius = 1, .smoothing = 2}};
-    config.size = 16, config.render.sharpness = config.render.sharpness_start = 50;
-    config.loss.iou = 1, config.camera = "predicted", config.schedule.steps = 10;
+    config.size = 16;
+    config.render.sharpness = config.render.sharpness_start = 50;
+    config.loss.iou = 1;
+    config.camera = "predicted";
+    config.schedule.steps = 10;
     const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
     const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop_);
     nn::Context context(workers_, nn::DType::kF64);

@@ -132,7 +132,8 @@ TEST(TexturedStep, GradientsUnderHarmonics) {
 
 TEST(TexturedStep, GradientsWithoutLightAndSkips) {
   TexturedImageConfig config = TinyConfig("none");
-  config.network.skips = false, config.network.sphere.symmetric = false;
+  config.network.skips = false;
+  config.network.sphere.symmetric = false;
   ExpectGradientsAgreeWithDifferences(config);
 }
 
