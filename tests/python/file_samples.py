@@ -82,3 +82,8 @@ class FolderTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="tilegrad_python_")
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
+        self.addCleanup(self._expect_nothing_hidden)
+
+    def _expect_nothing_hidden(self) -> None:
+        """Nothing that its owner would not see is left where somebody works."""
+        self.assertEqual(list(self.folder.rglob(".*")), [])

@@ -23,7 +23,7 @@ from unittest import mock
 import numpy as np
 
 import tilegrad
-from file_samples import dataset
+from file_samples import FolderTest, dataset
 from tilegrad import files, runs
 from tilegrad.images import save_image
 
@@ -42,11 +42,10 @@ MESH, CAMERAS, IMAGES = views()
 SMALL = {"steps": 60, "template_level": 2, "texture_size": 32}
 
 
-class Fit(unittest.TestCase):
+class Fit(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.out = pathlib.Path(folder.name) / "fit"
+        super().setUp()
+        self.out = self.folder / "fit"
 
     def test_finds_the_shape_and_reports(self):
         told = []
@@ -87,7 +86,7 @@ class Fit(unittest.TestCase):
     def test_finds_cameras_of_arrays_and_of_pictures_in_a_folder(self):
         with self.assertRaisesRegex(ValueError, "6 or more are needed"):
             tilegrad.fit(IMAGES[:3], fov=40, **SMALL)
-        folder = self.out.parent / "pictures"
+        folder = self.folder / "pictures"
         folder.mkdir()
         for i, image in enumerate(IMAGES):
             save_image(folder / f"{i}.png", image)
@@ -111,6 +110,12 @@ class Fit(unittest.TestCase):
         self.assertEqual(result.training["views"], 5)
         for message in ("fit: 2: its mask is full", "fit: 4: its mask is empty"):
             self.assertTrue(any(text.startswith(message) for text in said), said)
+
+    def test_up_turns_the_mesh(self):
+        given, turned = (np.ptp(tilegrad.fit(IMAGES, CAMERAS, up=up, **SMALL).mesh.positions, axis=0)
+                         for up in ("", "z"))
+        np.testing.assert_allclose(turned, given[[0, 2, 1]], atol=0.08)
+        self.assertGreater(abs(given[1] - given[2]), 0.1)
 
     def test_what_a_callback_raises_goes_on(self):
         with self.assertRaises(ZeroDivisionError):
@@ -173,7 +178,7 @@ class Fit(unittest.TestCase):
                 self.append(at.stage)
                 return at.stage == self.last
 
-        folder = self.out.parent / "pictures"
+        folder = self.folder / "pictures"
         folder.mkdir()
         for i, image in enumerate(IMAGES):
             save_image(folder / f"{i}.png", image)
