@@ -209,15 +209,21 @@ Status SaveResult(const train::Predictor& predictor, std::span<const std::uint8_
   return io::SaveLitGlb(glb, *mesh, SunOf(*lit, model.config().light));
 }
 
-Status Relight(const train::Predictor& predictor, std::span<const std::uint8_t> picture,
-               const Mesh& mesh, const Path& file) {
+// Before anything is predicted.
+Status CheckRelight(bool asked, const train::Predictor& predictor) {
+  if (!asked || PredictsLight(predictor)) return {};
+  return InvalidArgument(
+      "--relight: this network predicts no light; train one with --config texture_quick");
+}
+
+Status Relight(const Prediction& p, std::span<const std::uint8_t> picture, const Mesh& mesh,
+               const Path& file) {
+  const train::Predictor& predictor = p.network.predictor;
   TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));
-  if (!lit) {
-    return InvalidArgument(
-        "--relight: this network predicts no light; train one with --config texture_quick");
-  }
+  if (!lit) return InvalidArgument("--relight: this network predicts no camera");
   const auto& model = *predictor.model().textured();
-  return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size()}, file);
+  return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size(), p.watch},
+                           file);
 }
 
 // Where the results of an image go.
@@ -265,7 +271,7 @@ Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>
   }
   TILEGRAD_TRY(SaveResult(predictor, *input, files.glb, &meshes[0]));
   if (p.options.relight) {
-    TILEGRAD_TRY(Relight(predictor, *input, meshes[0], files.relit).Within(file));
+    TILEGRAD_TRY(Relight(p, *input, meshes[0], files.relit).Within(file));
     json["relit"] = files.relit.string();
   }
   TILEGRAD_TRY(Draw(p, file, files, meshes[0]));
@@ -284,6 +290,7 @@ Status RunPrediction(const PredictOptions& options) {
   const Watch watch = line.Watching();
   TILEGRAD_TRY(watch.At({"reading the network", 0, 0, ""}));
   TILEGRAD_ASSIGN(const TrainedNetwork network, LoadNetwork(run, workers));
+  TILEGRAD_TRY(CheckRelight(options.relight, network.predictor));
   OutputGuard guard(options.force);
   for (const std::string& image : options.images) guard.AddInput(image);
   guard.AddInput(options.mask);

@@ -29,12 +29,15 @@ std::array<float, 3> Turned(const std::array<float, 3>& d, double angle) {
 
 }  // namespace
 
+bool PredictsLight(const train::Predictor& predictor) {
+  const auto* const model = predictor.model().textured();
+  return model != nullptr && train::LightingOf(model->config().light) != Lighting::kNone;
+}
+
 Result<std::optional<train::PredictedObject>> PredictLit(const train::Predictor& predictor,
                                                          std::span<const std::uint8_t> picture) {
-  auto* model = predictor.model().textured();
-  if (model == nullptr || train::LightingOf(model->config().light) == Lighting::kNone)
-    return std::optional<train::PredictedObject>();
-  TILEGRAD_ASSIGN(auto objects, model->PredictObjects(picture));
+  if (!PredictsLight(predictor)) return std::optional<train::PredictedObject>();
+  TILEGRAD_ASSIGN(auto objects, predictor.model().textured()->PredictObjects(picture));
   if (!objects[0].camera) return std::optional<train::PredictedObject>();
   return std::optional(std::move(objects[0]));
 }
@@ -55,12 +58,15 @@ Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& fi
   const auto predicted = train::DirectionOf(job.object.light, train::LightingOf(job.light));
   std::vector<ImageU8> frames;
   for (int k = 0; k < kLightFrames; ++k) {
+    TILEGRAD_TRY(
+        job.watch.At({"moving the light", static_cast<std::uint64_t>(k), kLightFrames, ""}));
     view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kLightFrames);
     TILEGRAD_ASSIGN(const auto rgba, pictures.Draw(mesh, view, train::Appearance::kLit));
     frames.push_back(train::OnPaper(rgba, size));
   }
-  return io::SaveWebpAnimation(file, frames,
-                               {.frame_ms = kLightFrameMilliseconds, .quality = kLightQuality});
+  return io::SaveWebpAnimation(
+      file, frames,
+      {.frame_ms = kLightFrameMilliseconds, .quality = kLightQuality, .watch = job.watch});
 }
 
 }  // namespace tilegrad::cli

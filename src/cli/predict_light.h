@@ -5,11 +5,14 @@
 #include <optional>
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "train/predictor.h"
 #include "train/tasks/textured_image/model.h"
 
 namespace tilegrad::cli {
 
+// Whether its network says a light.
+bool PredictsLight(const train::Predictor& predictor);
 // Of one picture, [4][size][size] planar bytes; nothing where the network says no light, or no
 // camera that it is in the axes of.
 Result<std::optional<train::PredictedObject>> PredictLit(const train::Predictor& predictor,
@@ -24,6 +27,7 @@ struct Relighting {
   const train::PredictedObject& object;
   const train::LightConfig& light;
   int size;  // pixels a side of the network's pictures
+  const Watch& watch;
 };
 Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& file);
 

@@ -9,6 +9,7 @@
 #include "fit/refine.h"
 #include "io/image_file.h"
 #include "support/run_program.h"
+#include "support/terminal.h"
 
 namespace tilegrad::predict_test {
 
@@ -120,6 +121,20 @@ TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   EXPECT_GT(record["camera"]["fx"], 0);
 }
 
+TEST_F(Predict, TellsItsStagesAndEndsAtCtrlC) {
+  const std::string to =
+      " --force --run " + In("r") + " --out " + In("out") + " " + In("known.png");
+  TerminalProgram whole("predict --refine 20" + to, 200);
+  EXPECT_EQ(whole.Finish(), 0) << whole.said();
+  for (const char* stage : {"reading the network", "predicting from ", "looking for the camera",
+                            "refining", "drawing ", "coding the animation"})
+    EXPECT_NE(whole.said().find(stage), std::string::npos) << stage << "\n" << whole.said();
+  TerminalProgram cut("predict --refine 100000" + to, 200);
+  ASSERT_TRUE(cut.AwaitText("refining")) << cut.said();
+  EXPECT_LT(cut.Interrupt(), 2);  // one, on a machine that does other work, too
+  EXPECT_EQ(cut.Finish(), 130);
+}
+
 // Of a run that predicts light: in the GLB, and moving.
 TEST_F(Predict, WritesTheLightAndMovesIt) {
   ExpectDone("train --config " TILEGRAD_CONFIGS "/texture_quick.toml --data " + In("d") +
@@ -149,7 +164,7 @@ TEST_F(Predict, WritesTheLightAndMovesIt) {
                                      In("out") + " " + In("known.png"));
   EXPECT_NE(refined.exit_code, 0);
   EXPECT_NE(refined.output.find("use --refine 0"), std::string::npos) << refined.output;
-  // A run without light says so.
+  // A run without light says so, before it draws anything.
   const Outcome plain = RunProgram("predict --refine 0 --relight --force --run " + In("r") +
                                    " --out " + In("out") + " " + In("known.png"));
   EXPECT_NE(plain.exit_code, 0);
