@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/camera_file.h"
 
 namespace tilegrad::io {
@@ -40,8 +41,8 @@ ColmapModel LargestOf(const std::vector<Path>& models) {
     if (i != best) others += fmt::format(", {} ({})", models[i].filename().string(), counts[i]);
   }
   return {models[best],
-          fmt::format("{}: taken for its {} images; other models of the project are left out: {}",
-                      models[best].string(), counts[best], others.substr(2))};
+          fmt::format("{}: taken for its {}; other models of the project are left out: {}",
+                      models[best].string(), Count(counts[best], "image"), others.substr(2))};
 }
 
 }  // namespace

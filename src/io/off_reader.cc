@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
 
@@ -114,9 +115,9 @@ class OffReader {
     TILEGRAD_TRY(ReadFaces());
     AddFaceColors();
     if (odd_lines_ > 0) {
-      out_.warnings.push_back(fmt::format(
-          "{} lines of vertices or faces end with something that is no colour: left out",
-          odd_lines_));
+      out_.warnings.push_back(
+          fmt::format("left out what stands behind {} of vertices or faces: no colour",
+                      Count(odd_lines_, "line")));
     }
     return {};
   }

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/obj/obj_text.h"
@@ -208,9 +209,9 @@ class ObjParser {
     if (!out.colors.empty()) out.colors.resize(out.positions.size(), kNoColor);
     if (lines_or_points_) warn("points or lines left out");
     if (small_faces_ > 0)
-      warn(fmt::format("{} faces with fewer than three corners left out", small_faces_));
+      warn(tilegrad::Count(small_faces_, "face") + " with fewer than three corners left out");
     if (odd_vertices_ > 0) {
-      warn(fmt::format("{} vertices have 5 or more than 7 numbers, of which 3 or 7 are read",
+      warn(fmt::format("vertices with 5 or more than 7 numbers, of which 3 or 7 are read: {}",
                        odd_vertices_));
     }
     if (!not_read_.empty())
