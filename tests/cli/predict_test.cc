@@ -104,7 +104,8 @@ TEST_F(Predict, TheAnimationIsTheSameAgain) {
 
 TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   const std::string in = In("known.png"), to = " --run " + In("r") + " --out " + In("out") + " ";
-  const auto said = JsonOf(ExpectDone("predict --refine 40 --json" + to + in));
+  const std::string output = ExpectDone("predict --refine 40 --json" + to + in);
+  const auto said = JsonOf(output);
   const Bytes text = ReadFile(folder_ / "out/known_match.json").value();
   const auto record = nlohmann::json::parse(text.begin(), text.end());
   EXPECT_LT(record["silhouette_iou"][0], record["silhouette_iou"][1]);
@@ -113,6 +114,8 @@ TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   EXPECT_GT(record["color_l1"][0], record["color_l1"][1]);
   for (const char* score : {"silhouette_iou", "color_l1"})
     EXPECT_EQ(said[0][score], record[score]) << score;
+  EXPECT_EQ(output.find("the camera is doubtful") != std::string::npos,
+            said[0]["camera_doubtful"].get<bool>());
   EXPECT_EQ(record["camera"]["size"], train::kRefineSize);
   // A rotation: its rows have length 1.
   const auto rows = record["camera"]["rotation"].get<std::vector<double>>();

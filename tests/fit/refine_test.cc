@@ -130,6 +130,24 @@ TEST(RefineMesh, TheCameraSeesTheMeshThatIsGiven) {
   }
 }
 
+// Paint tells the sides of a ball apart; without it nothing does.
+TEST(RefineMesh, SaysHowWellAnotherSideFits) {
+  const Workers workers(1);
+  Mesh plain = Icosphere(3, 0.45f);
+  plain.colors.assign(plain.positions.size(), glm::vec4(0.5f, 0.5f, 0.5f, 1));
+  Mesh painted = plain;
+  for (std::size_t v = 0; v < painted.positions.size(); ++v)
+    painted.colors[v] = painted.positions[v].z < 0 ? glm::vec4(0.8f, 0.2f, 0.1f, 1)
+                                                   : glm::vec4(0.1f, 0.2f, 0.8f, 1);
+  const auto rival = [&](const Mesh& mesh) {
+    const auto refined = RefineMesh(mesh, PictureOf(mesh, CameraAt(30)), {.steps = 40}, workers);
+    EXPECT_TRUE(refined.ok()) << refined.status().message();
+    return refined.ok() ? refined->rival : 0;
+  };
+  EXPECT_LT(rival(plain), kDoubtfulRival);
+  EXPECT_GT(rival(painted), kDoubtfulRival);
+}
+
 TEST(RefineMesh, WorkersDoNotChangeTheResult) {
   const TargetImages picture = PictureOf(Figure({0.3f, 0.2f, 0.4f}), CameraAt(30));
   std::vector<Mesh> meshes;
