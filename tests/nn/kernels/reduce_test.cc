@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reductions, batch normalisation and Adam against their references, on every target.
+// Reductions and batch normalisation against their references, on every target.
 #include "nn/kernels/reduce.h"
 
 #include "nn/kernels/adam.h"
@@ -124,30 +124,7 @@ TEST(BatchNormKernel, HandValues) {
   EXPECT_EQ(y, (std::vector<double>{0, 0, 1, 4}));
 }
 
-TEST(AdamKernel, EqualsReferenceWithinRounding) {
-  Rng rng(9);
-  const AdamCoefficients c{0.5, 0.9, 0.999, 1e-8, 1e-3, 3.0};
-  for (std::size_t n : {1, 7, 8, 70001}) {
-    const auto p = RandomFloats(rng, n), g = RandomFloats(rng, n), m = RandomFloats(rng, n);
-    auto v = RandomFloats(rng, n);
-    for (float& value : v) value = 0.01f + std::abs(value);
-    auto wp = AsDoubles(p), wm = AsDoubles(m), wv = AsDoubles(v);
-    const auto wg = AsDoubles(g);
-    AdamStepRef(AdamProblem<double>{n, wp.data(), wg.data(), wm.data(), wv.data(), c}, 0, n);
-    for (const auto& target : RunnableTargets()) {
-      const OnTarget on(target);
-      auto gp = p, gm = m, gv = v;
-      AdamStep({n, gp.data(), g.data(), gm.data(), gv.data(), c}, Workers(2));
-      // Numbers of scale 1, fewer than ten roundings each (constants included).
-      const std::vector<double> one(n, 2.0);
-      ExpectWithinRounding(gm, wm, one, 10);
-      ExpectWithinRounding(gv, wv, one, 10);
-      ExpectWithinRounding(gp, wp, one, 10);
-    }
-  }
-}
-
-TEST(AdamKernel, SumOfSquaresIsExactToDouble) {
+TEST(Reduce, SumOfSquaresIsExactToDouble) {
   Rng rng(10);
   for (std::size_t n : {0, 1, 5, 13, 200003}) {
     const auto x = RandomFloats(rng, n);
