@@ -159,21 +159,6 @@ TEST_F(Input, TransformsSayWhatTheySay) {
   ExpectMessage(ReadFitFolder(folder_ / "t", 0).status(), "0.png", "focal lengths are 0");
 }
 
-// Of several reconstructions the one with the most images.
-TEST_F(Input, TheLargestColmapModelIsRead) {
-  Model("p/sparse/1");
-  Write("p/sparse/0/cameras.txt", std::string("1 PINHOLE 16 12 20 22 9 5\n"));
-  Write("p/sparse/0/images.txt", std::string("1 0 1 0 0 0 0 4 1 a.png\n3.5 4.5 -1\n"));
-  Images("p/images");
-  ExpectTwoViews("p", false);
-  const auto input = ReadFitFolder(folder_ / "p", 0);
-  ASSERT_EQ(input->warnings.size(), 1u);
-  EXPECT_NE(input->warnings[0].find("sparse/1: taken for its 2 images"), std::string::npos);
-  EXPECT_NE(input->warnings[0].find("0 (1)"), std::string::npos) << input->warnings[0];
-  std::filesystem::remove_all(folder_ / "p/sparse/0");
-  EXPECT_EQ(ReadFitFolder(folder_ / "p", 0)->warnings.size(), 0u);
-}
-
 TEST_F(Input, ColmapCamerasThatNoImageUsesMayBeOfAnyKind) {
   Model("p/sparse/0");
   Images("p/images");
