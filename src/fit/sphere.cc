@@ -13,9 +13,11 @@
 namespace tilegrad::train {
 namespace {
 
-// Degrees: in a narrower cone axes say little about where they meet, views little about depth, and
-// rays nothing.
-constexpr double kAxesCone = 30, kNarrowCone = 30, kLeastCone = 1;
+// Degrees: in a narrower cone axes say little about where they meet, and rays nothing.
+constexpr double kAxesCone = 30, kLeastCone = 1;
+// Half of a narrow cone of views of something small, as a tangent. What is seen under an angle
+// needs as much more: masks of cameras that are less apart than it is wide meet up to infinity.
+constexpr double kNarrowSlope = 0.268;
 constexpr double kUsualRadius = 0.5;  // where nothing is known
 constexpr double kFloatStep = 6e-8;   // of numbers, relative
 
@@ -220,7 +222,8 @@ class Guess {
     std::vector<Ray> lines;
     for (const Ray& ray : rays_) lines.push_back({ray.from, glm::normalize(centre_ - ray.from)});
     const double spread = ConeOf(lines);
-    if (!sphere_.doubt.empty() || spread >= kNarrowCone) return;
+    const double half = kNarrowSlope + RadiusAt([](const SeenView&) { return 1.0; });
+    if (!sphere_.doubt.empty() || spread >= 2 * std::atan(half) * 180 / std::numbers::pi) return;
     sphere_.doubt = fmt::format(
         "all views look at the object from within {:.0f} degrees, which says little about its "
         "depth",

@@ -156,6 +156,16 @@ TEST(FitStart, IsASphereWhereAllViewsLookOneWay) {
   EXPECT_EQ(PrepareFit(job, Workers(2)).value().note, "");
 }
 
+// A ball of a tenth of the distance, but not one of half of it, which the masks leave long.
+TEST(GuessSphere, WhatIsSeenLargeNeedsMoreViewsAround) {
+  for (const double radius : {0.1, 0.5}) {
+    const Ball ball{kBall.centre, radius};
+    const auto sphere = GuessSphere(InputOfBall(ball, Around(10, 45), kSize));
+    ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+    EXPECT_EQ(sphere->doubt.empty(), radius < 0.2) << sphere->doubt;
+  }
+}
+
 TEST(GuessUp, IsZWhereCamerasStandAboutIt) {
   // Of a ball, in a world with z up and turned to have y up.
   const Ball of_file{{0.1, 0.2, 0.3}, 0.5}, turned{{0.1, 0.3, -0.2}, 0.5};
