@@ -108,6 +108,7 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   const auto none = FolderSource(folder_ / "set");
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.status().message().find("deep/inner"), std::string::npos);
+  std::filesystem::remove(folder_ / "set/empty/.hidden");  // our own
 }
 
 TEST_F(SourcesTest, FoldersWithoutModelsAreErrors) {
