@@ -58,7 +58,7 @@ struct Apply {
     const auto check = whole ? CLI::Range(std::llround(range.low), std::llround(range.high))
                              : CLI::Range(range.low, range.high);
     option->check(
-        Saying(fmt::format(" is not in {:.10g} to {:.10g}", range.low, range.high), check));
+        Saying(fmt::format(" is not in {:.15g} to {:.15g}", range.low, range.high), check));
   }
   void operator()(const OneOf& choice) const {
     const std::string fault = fmt::format(" is not one of {}", fmt::join(choice.words, ","));
