@@ -79,15 +79,16 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
 };
 
 // Room of src/train -> rooms it may include besides itself. Losses, operations and metrics know
-// nothing of each other; a run knows no task; the report asks the task and names no loss.
+// nothing of each other, and a sum of losses the values that a step logs; a model makes jobs of the
+// render operation; a run knows no task; the report asks the task and names no loss.
 const std::map<std::string, std::set<std::string>> kMayIncludeInTrain = {
-    {"losses", {}},
+    {"losses", {"run"}},
     {"ops", {}},
     {"metrics", {}},
     {"ranks", {}},
     {"run", {}},  // knows no task, no loss and no data
     {"data", {"metrics", "ranks", "run"}},
-    {"models", {}},
+    {"models", {"ops"}},
     {"eval", {"metrics", "data", "ranks", "run"}},
     {"tasks", {"eval", "models", "losses", "ops", "metrics", "data", "ranks", "run"}},
     {"report", {"tasks", "eval", "metrics", "data", "run"}},
