@@ -150,7 +150,8 @@ SECOND = {
     "ply/quality_nan.ply": ("read", drawn, straight()),
     "obj_no_usemtl/mesh.obj": ("warned", said("usemtl"), straight()),
 }
-CAMERAS = {"tf_fisheye.json": refused("the lens is distorted"), "tf_isfisheye.json": refused("the lens bends rays"),
+CAMERAS = {"tf_fisheye.json": refused("the lens is distorted"),
+           "tf_isfisheye.json": refused("the lens is distorted"),
            "tf_ortho.json": refused("EQUIRECTANGULAR"), "tf_k1.json": refused("k1"),
            "tf_blenderscale.json": refused("rotation"), "tf_mirror.json": refused("rotation"),
            "colmapf": refused("a.png: the lens is distorted")}
