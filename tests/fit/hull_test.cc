@@ -112,6 +112,15 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
   EXPECT_TRUE(EditMesh::Make(hull->positions, hull->faces).ok());
 }
 
+// A long focal length makes pixels, and with them cells, far smaller than what the masks show.
+TEST_F(Hull, HasNoMoreCellsThanImagesResolve) {
+  FitInput input = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 16);
+  for (Camera& camera : input.cameras) camera.fx *= 100;
+  const auto grid = Carve(input, {.cell_pixels = 0.5}, Workers(1));
+  ASSERT_TRUE(grid.ok()) << grid.status().message();
+  EXPECT_LT(*std::max_element(grid->size.begin(), grid->size.end()), 2 * 16 / 0.5 + 9);
+}
+
 TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {
   const FitInput input = Views(Torus(0.3f, 0.12f, 24, 12), 64);
   const auto one = HullMesh(input, {}, Workers(1)), many = HullMesh(input, {}, Workers(5));

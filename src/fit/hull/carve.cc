@@ -214,6 +214,14 @@ Box FindHull(const Carver& carver, const Sphere& sphere, const Workers& workers)
                      workers);
 }
 
+// Along the longest side. Cameras that differ wildly can ask for cells far below what the images
+// resolve, and for minutes of work: no more than two images' width of them.
+float MostCells(const FitInput& input, const CarveOptions& options) {
+  const float pixels = static_cast<float>(2 * std::max(input.images.width, input.images.height));
+  return std::min(static_cast<float>(options.most_cells),
+                  pixels / static_cast<float>(options.cell_pixels));
+}
+
 Status NothingLeft() {
   return InvalidArgument(
       "no point lies inside of all masks, so there is no visual hull: check cameras and masks, "
@@ -234,7 +242,7 @@ Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options, con
   const glm::vec3 extent = box.high - box.low, middle = 0.5f * (box.low + box.high);
   const float longest = std::max({extent.x, extent.y, extent.z});
   const float cell = std::max(static_cast<float>(options.cell_pixels) * carver.PixelAt(middle),
-                              longest / static_cast<float>(options.most_cells));
+                              longest / MostCells(input, options));
   if (!(cell > 0 && std::isfinite(cell))) {
     return InvalidArgument(
         "the visual hull is {:.3g} across, in cells of {:.3g}: check the cameras", longest, cell);

@@ -11,7 +11,7 @@ namespace tilegrad::train {
 
 struct CarveOptions {
   double cell_pixels = 0.7;  // a cell's side, in pixels of an image where the object is
-  int most_cells = 320;      // along the longest side
+  int most_cells = 320;      // along the longest side; fewer where images are small
   // Pixels that masks are widened by, so that what is thin is not cut by one view that shows it
   // half a pixel off.
   double margin_pixels = 0.25;
