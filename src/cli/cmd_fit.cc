@@ -331,8 +331,8 @@ void AddFit(CommandList* list) {
   command->Add("--rate", &options->rates, "learning rate, NAME=NUMBER (repeatable)",
                {SplitAtCommas{}});
   command->Add("--resume", &options->resume,
-               "go on with the fit in --out, which knows what it was given; a finished one with "
-               "more --steps",
+               "resume the fit in --out with the settings saved there; extend a finished one by a "
+               "larger --steps",
                {Excludes{{"--force"}}});
   command->Add("--doctor", &options->doctor,
                "only say what gets a gradient at the start, and why not");

@@ -190,7 +190,7 @@ TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
     models.replace(at, 6, "\"validation\"");
   Write("copy/models.jsonl", models);
   ExpectRefused("eval --run " + run.string() + " --data " + copy.string(),
-                copy.string() + ": no models in its test split");
+                copy.string() + ": its test split has no models");
   EXPECT_EQ(RunProgram("dataset-view --split validation --data " + copy.string() + " --out " +
                        (folder_ / "view.png").string())
                 .exit_code,
@@ -202,7 +202,7 @@ TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
   ExpectRefused("eval --run " + run.string(), "elsewhere", "--data");
   // A relative name is also looked for in the folders above the run.
   Write("run/run.json", std::string(json).replace(at, Data().string().size(), "copy"));
-  ExpectRefused("eval --run " + run.string(), copy.string() + ": no models in its test split");
+  ExpectRefused("eval --run " + run.string(), copy.string() + ": its test split has no models");
 }
 
 TEST_F(BrokenInputs, DatasetsOfAnotherImageSize) {

@@ -40,7 +40,7 @@ class Evaluator {
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);
     if (held_out.empty()) {
-      return InvalidArgument("{}: no models in its {} split; `tilegrad dataset` makes the splits",
+      return InvalidArgument("{}: its {} split has no models; `tilegrad dataset` makes the splits",
                              data_.folder().string(), SplitName(job_.split));
     }
     const int views = data_.info().views;

@@ -63,7 +63,7 @@ class Examiner {
     const Split split = job_.split;
     const std::vector<int> models = data_.Select(split);
     if (models.empty()) {
-      return InvalidArgument("{}: no models in its {} split; `tilegrad dataset` makes the splits",
+      return InvalidArgument("{}: its {} split has no models; `tilegrad dataset` makes the splits",
                              data_.folder().string(), SplitName(split));
     }
     TILEGRAD_TRY(LearnBaselines());
@@ -188,7 +188,7 @@ Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel
                                       const StopFlag& stop) {
   if (job.change) return InvalidArgument("a classifier predicts no meshes that could be refined");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
-  if (job.oracle_steps > 0) return InvalidArgument("a classifier has no oracle");
+  if (job.oracle_steps > 0) return InvalidArgument("--oracle fits meshes; a classifier predicts none");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   TILEGRAD_TRY(CheckClasses(dataset, model));

@@ -29,7 +29,7 @@ ConfigFields FieldsOf(GanCriticConfig* c) {
       {"critic.updates", &c->updates, 1, 100, "of each critic in each step"},
       {"critic.penalty", &c->penalty, 0, kNoLimit, "weight of the gradient penalty"},
       {"critic.learning_rate", &c->learning_rate, 0, 1,
-       "of the critics' Adam, which else goes as [optimizer] says"},
+       "of the critics' Adam; its other settings are those of [optimizer]"},
       {"critic.texture_weight", &c->texture_weight, 0, kNoLimit,
        "of the critic of texture maps beside that of pictures; 0: there is none"},
   };

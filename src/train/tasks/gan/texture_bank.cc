@@ -53,8 +53,7 @@ class Extraction {
       const auto size = static_cast<int>(job_.maps.texture_size);
       if (texture.width % size != 0) {
         return InvalidArgument(
-            "its textures are {} texels a side, of which network.texture_size = "
-            "{} is no whole part",
+            "its textures are {} texels a side; network.texture_size = {} does not divide that",
             texture.width, size);
       }
       AppendMap(ShrunkImage(texture, size), job_.maps, bytes);

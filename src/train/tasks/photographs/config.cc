@@ -41,11 +41,11 @@ ConfigFields OwnFields(PhotographsConfig* c) {
       {"photographs.jitter", &c->crop.jitter, 0, CropRule::kMostJitter,
        "of the box's edges in training, in parts of it"},
       {"photographs.cutouts", &c->cutouts, 0, 1,
-       "share of the inputs whose background is black, as that of cut-outs"},
+       "share of inputs with a black background, like cut-outs"},
       {"photographs.camera", &c->camera, 0, 0,
-       "through which predictions are seen in training: \"given\" or \"predicted\""},
+       "cameras that render predictions in training: \"given\" or \"predicted\""},
       {"start.run", &c->start, 0, 0,
-       "folder of a run whose network this one starts as; \"\": a new one"},
+       "folder of a run whose weights this one starts from; \"\": none"},
       {"schedule.batch", &c->batch, 1, 65536, "photographs a step"},
   };
 }

@@ -43,8 +43,8 @@ Status CheckConfig(const SingleImageConfig& config) {
   const SphereConfig& n = config.network.sphere;
   if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
     return InvalidArgument(
-        "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
-        "about: leave these at 0 and false");
+        "network.n3mr_vertices has no offsets to smooth or mirror: network.smoothing must be 0 and "
+        "network.symmetric false");
   }
   return RivalOptions(config.render.rule, config.rivals).status();
 }

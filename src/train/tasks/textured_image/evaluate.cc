@@ -90,7 +90,7 @@ class TexturedEvaluator {
     const std::vector<int> models = dataset_.Select(job_.split);
     out_.split = SplitName(job_.split);
     if (models.empty()) {
-      return InvalidArgument("{}: no models in its {} split", dataset_.folder().string(),
+      return InvalidArgument("{}: its {} split has no models", dataset_.folder().string(),
                              out_.split);
     }
     TILEGRAD_ASSIGN(HeldOutViews views,
@@ -196,7 +196,7 @@ Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const Tas
                                     const StopFlag& stop) {
   if (job.change)
     return InvalidArgument(
-        "predictions of textures and lights are scored as they are: no --refine");
+        "--refine fits shapes only; predictions of textures and lights cannot be refined");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
