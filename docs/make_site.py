@@ -21,12 +21,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 STAGE, SITE = ROOT / "build/docs", ROOT / "docs/site"
 LINK = re.compile(r"\]\(([^()\s#]+)")
 # In the order of the menu; pages that are not named here follow by name.
-MENU = {"Use it": ["fit", "live", "predict", "datasets", "rendering", "cameras", "python", "files",
-                   "torch", "textured", "cutouts", "tradeoff", "rivals", "scaling"],
-        "Figures": ["results", "benchmarks", "nn-speed"],
+MENU = {"Use it": ["fit", "predict", "datasets", "training", "textured", "gan", "photographs", "rendering",
+                   "python", "files"],
+        "Figures": ["results", "benchmarks", "lab"],
         "Embed it": ["embedding", "conventions", "numerics"],
         "Port to it": ["porting"],
-        "Understand it": ["architecture", "math", "nn", "adversarial", "glossary"]}
+        "Understand it": ["architecture", "math", "adding"]}
 
 CONFIG = """\
 site_name: tilegrad

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`tilegrad predict` on cutouts that are not of its dataset: docs/cutouts.md.
+"""`tilegrad predict` on cutouts that are not of its dataset: docs/predict.md.
 
     sudo apt-get install --no-install-recommends tuxpaint-stamps-default ufoai-data
     PYTHONPATH=build/release/python python3 bench/cutouts/cutouts.py --run runs/mine --data datasets/mine \\

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Training over a slow network, on one machine: each rank in a network namespace of its own, behind a link of limited
-bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md says it should. As root, with Open MPI:
+bandwidth (tc's tbf). Prints what a step takes, measured and as docs/training.md says it should. As root, with Open MPI:
 
     bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4] [--set KEY=VALUE ...]
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The model of docs/scaling.md: what a step takes on many ranks, from what one rank needs.
+"""The model of docs/training.md: what a step takes on many ranks, from what one rank needs.
 
     bench/train/scaling_model.py NUMBERS COMPUTE UPDATE [--portions 64] [--gbits 10 100 200]
 

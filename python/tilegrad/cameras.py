@@ -31,7 +31,7 @@ class View:
 def load_cameras(path: Path, *, width: int = 0, height: int = 0,
                  opencv_centre: str = "integer") -> list[View]:
     """The cameras of a COLMAP folder (cameras and images, .txt or .bin), of NeRF's transforms.json,
-    or of a JSON file with OpenCV's K (docs/cameras.md).
+    or of a JSON file with OpenCV's K (docs/rendering.md).
 
     width, height: of the images, pixels, where the file does not say. opencv_centre: "integer" or
     "half", as pixel_centre of `Camera.from_opencv`.

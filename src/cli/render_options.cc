@@ -15,7 +15,7 @@ void AddViewOptions(Command* command, ViewSettings* view) {
       "pixels of the pictures, as 512 or 640x480 [what the cameras say; 512 without --cameras]");
   command->Add("--cameras", &view->camera_file,
                "a picture for each camera of: a COLMAP model or project (folder), a NeRF "
-               "transforms.json, or OpenCV's K and poses (.json; docs/cameras.md)");
+               "transforms.json, or OpenCV's K and poses (.json; docs/rendering.md)");
   command->Add("--opencv-centre", &view->opencv_centre,
                "where OpenCV's K has the centre of the first pixel: at (0,0), as OpenCV does, or "
                "at (0.5,0.5)",

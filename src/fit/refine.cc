@@ -22,7 +22,7 @@ namespace tilegrad::train {
 namespace {
 
 // Where no other reason is given, values were chosen by eye and by silhouette and colour on a few
-// furniture pictures and photographs: docs/lab/single-image.md, "Refinement on the picture".
+// furniture pictures and photographs: docs/lab.md, "Refinement on the picture".
 constexpr std::size_t kCoarseVertices = 2000;  // vertices below which faces are divided: the
                                                // template of level 3 becomes that of level 4
 constexpr int kSearchSide = 64;           // pixels a side of pictures that cameras are searched in

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Silhouettes of N3MR (H. Kato et al.: Neural 3D Mesh Renderer, CVPR 2018) as its published code
 // makes them: a z-buffer, and a hand-made gradient in its place, which moves edges along lines of
-// pixels (n3mr_sweep.h). What is published and what is repaired here: docs/rivals.md.
+// pixels (n3mr_sweep.h). What is published and what is repaired here: docs/training.md.
 #pragma once
 
 #include <cstddef>

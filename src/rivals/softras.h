@@ -5,7 +5,7 @@
 //   D_j = sigmoid(d_j / sigma),   alpha = 1 - prod over faces (1 - D_j)
 //
 // with d_j the squared distance to the face's boundary, positive inside. What is published, what is
-// repaired here, and where the code differs from the paper: docs/rivals.md.
+// repaired here, and where the code differs from the paper: docs/training.md.
 #pragma once
 
 #include <cmath>

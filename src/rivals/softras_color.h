@@ -5,7 +5,7 @@
 //   I = (sum_j D_j e^(zn_j / gamma) C_j + b C_background) / (sum_j D_j e^(zn_j / gamma) + b)
 //
 // with zn_j = (far - z) / (far - near) of the face at the pixel and b = e^(2 eps / gamma), or they
-// are those of the nearest face. What is published and what is repaired: docs/rivals.md.
+// are those of the nearest face. What is published and what is repaired: docs/training.md.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Converts other programs' cameras to and from the one camera of the project (camera.h).
-// docs/cameras.md has a picture and a number for each.
+// docs/rendering.md has a picture and a number for each.
 //
 // All matrices are row-major and act on column vectors unless said otherwise; all lengths are world
 // units. From... fails on what is not a pinhole camera: a number that is not finite, a matrix that

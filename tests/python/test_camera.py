@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras: where a world point lands (docs/cameras.md), there and back, batches, errors."""
+"""Cameras: where a world point lands (docs/rendering.md), there and back, batches, errors."""
 
 import pickle
 import unittest
@@ -9,7 +9,7 @@ import numpy as np
 import tilegrad
 from tilegrad import Camera
 
-# The camera and the point of docs/cameras.md.
+# The camera and the point of docs/rendering.md.
 SIZE = {"width": 640, "height": 480}
 POINT = np.array([0.4, 0.3, 0.0])
 EXPECTED = Camera(translation=(-1, 0, -4), fx=500, fy=500, cx=320, cy=240)

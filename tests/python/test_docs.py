@@ -29,9 +29,9 @@ class Docs(FolderTest):
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(self.folder)
 
-    def run_page(self, page: str) -> dict:
+    def run_page(self, page: str, language: str = "python") -> dict:
         names: dict = {}
-        exec(code_of(page), names)  # pylint: disable=exec-used
+        exec(code_of(page, language), names)  # pylint: disable=exec-used
         return names
 
     def test_readme(self) -> None:
@@ -43,7 +43,9 @@ class Docs(FolderTest):
 
     @unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
     def test_torch(self) -> None:
-        self.assertGreater(float(self.run_page("docs/torch.md")["positions"].grad.abs().max()), 0)
+        """Blocks of code that needs torch are marked py, all others python."""
+        names = self.run_page("docs/python.md", "py")
+        self.assertGreater(float(names["positions"].grad.abs().max()), 0)
 
     def test_files(self) -> None:
         for name, target in (("runs/demo", run()), ("datasets/furniture", dataset())):
@@ -61,7 +63,7 @@ class Docs(FolderTest):
     def test_cameras(self) -> None:
         """OpenCV's file has one camera in three forms, that of the table above it."""
         with open("opencv.json", "w", encoding="utf-8") as file:
-            file.write(code_of("docs/cameras.md", "json"))
+            file.write(code_of("docs/rendering.md", "json"))
         views = files.load_cameras("opencv.json")
         self.assertEqual([view.name for view in views], ["0001", "0002", "0003"])
         for view in views:

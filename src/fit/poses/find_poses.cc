@@ -19,7 +19,7 @@
 namespace tilegrad::train {
 namespace {
 
-// Chosen on twelve models (docs/lab/poses.md).
+// Chosen on twelve models (docs/lab.md).
 constexpr int kPoseSide = 64, kLevel = 3;       // pixels and template of the search
 constexpr int kFineSide = 128, kFineLevel = 4;  // of the last refinement
 // With a third of these steps half of the pictures are looked for around a mesh that tells nothing.

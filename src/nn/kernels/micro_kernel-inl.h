@@ -178,7 +178,7 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
  private:
   // If a register is left beside the sums, V vectors of columns and one of a row, two steps are
   // joined, so that the second one's loads may go first. Otherwise they would spill sums, and the
-  // exits of a run keep steps apart. docs/nn-speed.md has the effect of either.
+  // exits of a run keep steps apart. docs/lab.md has the effect of either.
   static constexpr bool kSparesRegister = R * V + V + 1 < kRegisters;
 
   template <std::size_t r>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A rule that makes alpha, as a stage of the pipeline beside PixelStage. How to add one:
-// docs/adding/alpha-rule.md.
+// docs/adding.md.
 //
 // A call of the pipeline runs Begin once; Prepare once per image; then Forward or Backward for each
 // bin, in any order and by any worker; then, if the rule asks for it, AddToScene once per image.

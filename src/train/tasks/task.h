@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a task is to the rest of the program: its configuration, its steps, its state, its
 // predictions, its scores and what a report shows. Training, eval, predict and report know tasks
-// through this file only. How to add one: docs/adding/task.md.
+// through this file only. How to add one: docs/adding.md.
 #pragma once
 
 #include <functional>

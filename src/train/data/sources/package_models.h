@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of Debian packages by lists of ours: data/README.md has their columns.
+// Models of Debian packages by lists of ours: docs/datasets.md has their columns.
 #pragma once
 
 #include <string>

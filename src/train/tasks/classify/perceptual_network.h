@@ -14,7 +14,7 @@ struct PerceptualSource {
   std::string kind = "classify";
   Path file;
   // Of "classify": the levels before this one are left out, as far as one remains. At the full and
-  // half size of the picture the network compares little more than pixels: docs/adversarial.md.
+  // half size of the picture the network compares little more than pixels: docs/gan.md.
   int first_level = 2;
 };
 
