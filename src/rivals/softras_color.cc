@@ -7,7 +7,6 @@
 #include <hwy/highway.h>
 
 #include "rivals/softras_color-inl.h"
-#include "rivals/softras_color_backward-inl.h"
 
 #if HWY_ONCE
 #include <algorithm>

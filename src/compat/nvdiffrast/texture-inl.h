@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of texture.h: where pixels read is found for runs of them, lanes are pixels
-// (texture_point-inl.h, texture_taps-inl.h); what they read are quads, lanes are channels
-// (texture_quads-inl.h).
+// (texture_taps-inl.h); what they read are quads, lanes are channels.
 #if defined(TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_
 #undef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_
@@ -14,18 +13,265 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
+#include "base/prefetch.h"
 #include "compat/nvdiffrast/quads-inl.h"
 #include "compat/nvdiffrast/texture.h"
-#include "compat/nvdiffrast/texture_quads-inl.h"
 #include "compat/nvdiffrast/texture_taps-inl.h"
-#include "compat/nvdiffrast/texture_texels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::compat::nvdiffrast {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+// What a run of pixels reads and what it pulls: lanes are channels (quads-inl.h).
+
+inline constexpr std::size_t kMostLevels = 33;
+
+// The levels of the texture that an image has, and the last numbers of each with zeros after them:
+// quads of the last texels are read there.
+struct ImageLevels {
+  static constexpr std::size_t kTail = 4;
+
+  const float *at[kMostLevels], *end[kMostLevels];
+  float tails[kMostLevels][2 * kTail];
+  std::size_t channels;
+
+  HWY_INLINE ImageLevels(const TextureInput<float>& input, std::size_t image)
+      : channels(input.channels) {
+    for (std::size_t l = 0; l < input.levels.size(); ++l) {
+      const std::size_t numbers = TexelsOf(input.levels[l].size, input.faces()) * channels;
+      at[l] = input.levels[l].texels.data() + (input.textures == 1 ? 0 : image) * numbers;
+      end[l] = at[l] + numbers;
+      const std::size_t some = HWY_MIN(numbers, kTail);
+      std::fill(std::copy(end[l] - some, end[l], tails[l] + kTail - some), tails[l] + 2 * kTail,
+                0.0f);
+    }
+  }
+  // From `from` on, which is before the end.
+  HWY_INLINE Quad Load(std::size_t level, const float* from) const {
+    const auto left = static_cast<std::size_t>(end[level] - from);
+    return hn::LoadU(QuadTag(), left < kTail ? tails[level] + kTail - left : from);
+  }
+};
+
+// Channels c to c + 3 of four taps.
+struct TapQuads {
+  Quad t[4];
+
+  HWY_INLINE TapQuads(const ImageLevels& levels, const TapRun& taps, std::size_t p, std::size_t c) {
+    const auto level = static_cast<std::size_t>(taps.level[p]);
+    const float* from = levels.at[level] + c;
+    if (HWY_UNLIKELY(taps.whole[p] < 0)) {
+      LoadSome(from, level, levels, taps, p);
+      return;
+    }
+    for (int k = 0; k < 4; ++k) {
+      t[k] =
+          hn::LoadU(QuadTag(), from + static_cast<std::size_t>(taps.texel[p][k]) * levels.channels);
+    }
+  }
+
+ private:
+  HWY_NOINLINE void LoadSome(const float* from, std::size_t level, const ImageLevels& levels,
+                             const TapRun& taps, std::size_t p) {
+    const QuadTag d;
+    Quad sum = hn::Zero(d);
+    int mean = -1;
+    for (int k = 0; k < 4; ++k) {
+      const std::int32_t texel = taps.texel[p][k];
+      if (texel == Taps::kMean) mean = k;
+      t[k] = texel < 0
+                 ? hn::Zero(d)
+                 : levels.Load(level, from + static_cast<std::size_t>(texel) * levels.channels);
+      sum = hn::Add(sum, t[k]);
+    }
+    if (mean >= 0) t[mean] = hn::Mul(sum, hn::Set(d, 1.0f / 3));
+  }
+};
+
+// Fetches what the pixel kAhead pixels after p reads: textures are larger than caches, and where
+// their texels are is known by then. levels: as ImageLevels::at; count: pixels of the run.
+inline constexpr std::size_t kAhead = 16;
+template <class Number>
+HWY_INLINE void FetchAhead(Number* const* levels, std::size_t channels, const LookupRun& run,
+                           std::size_t p, std::size_t count) {
+  if (p + kAhead >= count) return;
+  for (int i = 0; i < (run.mixes ? 2 : 1); ++i) {
+    const TapRun& taps = run.taps[i];
+    const std::int32_t level = taps.level[p + kAhead], *texel = taps.texel[p + kAhead];
+    if (level < 0 || HWY_MIN(texel[0], texel[2]) < 0) continue;
+    Number* at = levels[static_cast<std::size_t>(level)];
+    PrefetchLine(at + static_cast<std::size_t>(texel[0]) * channels);
+    PrefetchLine(at + static_cast<std::size_t>(texel[2]) * channels);
+  }
+}
+
+// Calls visit(first pixel, count) for the runs of a band, in order.
+template <class Visit>
+HWY_INLINE void ForRuns(const TextureInput<float>& input, const Band& band, const Visit& visit) {
+  const std::size_t end = input.grid.first(band.image, band.row_end);
+  for (std::size_t p = input.grid.first(band.image, band.row_begin); p < end; p += kRun) {
+    visit(p, HWY_MIN(kRun, end - p));
+  }
+}
+
+// Whether a pixel's cotangent has a number other than 0. Mostly the background has none, which
+// shows whatever stands at (0, 0) and is masked afterwards.
+HWY_INLINE bool HasCotangent(const float* d_out, std::size_t n, const float* end) {
+  for (std::size_t c = 0; c < n; c += 4) {
+    const auto some = hn::Ne(LoadQuad(d_out + c, end), hn::Zero(QuadTag()));
+    if (!hn::AllFalse(QuadTag(), hn::And(some, LanesBelow(c, n)))) return true;
+  }
+  return false;
+}
+
+// The gradient of texels.
+
+// Sums into the texels of an image's texture, of which a part belongs to this call: every parts-th
+// block of kBlock texels of a level. Quads that would reach beyond a block are added number by
+// number.
+class TexelSums {
+ public:
+  static constexpr std::uint32_t kBlock = 64;
+
+  HWY_INLINE TexelSums(const TextureInput<float>& input, const TexelPart& part,
+                       float* const* levels)
+      : levels_(levels), channels_(input.channels), part_(part) {
+    for (std::size_t l = 0; l < input.levels.size(); ++l) {
+      ends_[l] = levels[l] + TexelsOf(input.levels[l].size, input.faces()) * channels_;
+    }
+  }
+  std::size_t channels() const { return channels_; }
+  // v on channels from `first` on; it is 0 beyond the last one.
+  HWY_INLINE void Add(std::size_t level, std::int32_t texel, std::size_t first, Quad v) const {
+    const QuadTag d;
+    const std::uint32_t block = static_cast<std::uint32_t>(texel) / kBlock;
+    if (texel < 0 || (part_.parts > 1 && block % part_.parts != part_.part)) return;
+    float* to = levels_[level] + static_cast<std::size_t>(texel) * channels_ + first;
+    const float* of_block = levels_[level] + (std::size_t{block} + 1) * kBlock * channels_;
+    if (HWY_UNLIKELY(HWY_MIN(of_block, ends_[level]) - to < 4)) {
+      return AddSome(to, HWY_MIN(channels_ - first, std::size_t{4}), v);
+    }
+    hn::StoreU(Finite(hn::Add(hn::LoadU(d, to), v)), d, to);
+  }
+
+ private:
+  // Sums are kept finite; NaN stays.
+  static HWY_INLINE Quad Finite(Quad sum) {
+    const QuadTag d;
+    const Quad most = hn::Set(d, std::numeric_limits<float>::max());
+    const Quad capped = hn::IfThenElse(hn::Gt(sum, most), most, sum);
+    return hn::IfThenElse(hn::Lt(capped, hn::Neg(most)), hn::Neg(most), capped);
+  }
+  static HWY_NOINLINE void AddSome(float* to, std::size_t n, Quad v) {
+    const QuadTag d;
+    HWY_ALIGN float some[4] = {};
+    std::copy(to, to + n, some);
+    hn::Store(Finite(hn::Add(hn::Load(d, some), v)), d, some);
+    std::copy(some, some + n, to);
+  }
+
+  float* const* levels_;
+  const float* ends_[kMostLevels];
+  std::size_t channels_;
+  TexelPart part_;
+};
+
+// What the pixels at hand, which read the same texels, pull on four channels or fewer of each.
+class CellSums {
+ public:
+  HWY_INLINE explicit CellSums(const TexelSums& to) : to_(to) {
+    for (Quad& s : sum_) s = hn::Zero(QuadTag());
+  }
+
+  HWY_INLINE void Add(const TapRun& taps, std::size_t p, Quad g) {
+    const hn::RebindToSigned<QuadTag> di;
+    const QuadTag d;
+    const auto texel = hn::Load(di, taps.texel[p]);
+    if (pixels_ == kMostRun || taps.level[p] != level_ ||
+        !hn::AllTrue(di, hn::Eq(texel, hn::Load(di, texel_)))) {
+      Flush();
+      hn::Store(texel, di, texel_);
+      level_ = taps.level[p];
+    }
+    ++pixels_;
+    for (int k = 0; k < 4; ++k) sum_[k] = hn::MulAdd(hn::Set(d, taps.weight[p][k]), g, sum_[k]);
+  }
+  HWY_INLINE void Flush() {
+    const QuadTag d;
+    if (level_ >= 0) {
+      for (int mean = 0; mean < 4; ++mean) {
+        if (HWY_LIKELY(texel_[mean] != Taps::kMean)) continue;
+        const Quad third = hn::Mul(sum_[mean], hn::Set(d, 1.0f / 3));
+        for (Quad& s : sum_) s = hn::Add(s, third);
+      }
+      for (int k = 0; k < 4; ++k) {
+        to_.Add(static_cast<std::size_t>(level_), texel_[k], 0, sum_[k]);
+      }
+    }
+    for (Quad& s : sum_) s = hn::Zero(d);
+    level_ = -1;
+    pixels_ = 0;
+  }
+
+ private:
+  const TexelSums& to_;
+  std::int32_t level_ = -1;
+  int pixels_ = 0;
+  HWY_ALIGN std::int32_t texel_[4] = {};
+  Quad sum_[4];
+};
+
+// Up to four numbers of a pixel's n, from number c on; then zeros.
+HWY_INLINE Quad CotangentQuad(const float* g, std::size_t c, std::size_t n, const float* end) {
+  return hn::IfThenElseZero(LanesBelow(c, n), LoadQuad(g + c, end));
+}
+
+// A pixel of more than four channels.
+HWY_INLINE void AddManyChannels(const TapRun& taps, std::size_t p, const float* g, const float* end,
+                                const TexelSums& sums) {
+  const std::int32_t* texel = taps.texel[p];
+  float mean = 0;
+  for (int k = 0; k < 4; ++k) mean += texel[k] == Taps::kMean ? taps.weight[p][k] / 3 : 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    const Quad weight = hn::Set(QuadTag(), taps.weight[p][k] + mean);
+    for (std::size_t c = 0; c < sums.channels(); c += 4) {
+      sums.Add(static_cast<std::size_t>(taps.level[p]), texel[k], c,
+               hn::Mul(weight, CotangentQuad(g, c, sums.channels(), end)));
+    }
+  }
+}
+
+// Adds what the pixels of a band pull on the texels of `part`, in their order. d_levels: those of
+// the image's texture.
+void PullTexelsOfBand(const TextureInput<float>& input, const Band& band,
+                      std::span<const float> d_out, const TexelPart& part, float* const* d_levels) {
+  const TexelSums sums(input, part, d_levels);
+  const std::size_t n = input.channels;
+  const float* end = d_out.data() + d_out.size();
+  LookupRun run;
+  CellSums cells[2] = {CellSums(sums), CellSums(sums)};
+  ForRuns(input, band, [&](std::size_t first, std::size_t count) HWY_ATTR {
+    const RunCoordinates at(input, first, count);
+    LookUp(input, at, count, &run);
+    for (std::size_t p = 0; p < count; ++p) {
+      const float* g = d_out.data() + (first + p) * n;
+      FetchAhead(d_levels, n, run, p, count);
+      if (!HasCotangent(g, n, end)) continue;
+      for (int i = 0; i < 2 && run.taps[i].level[p] >= 0; ++i) {
+        if (n > 4) {
+          AddManyChannels(run.taps[i], p, g, end, sums);
+        } else {
+          cells[i].Add(run.taps[i], p, CotangentQuad(g, 0, n, end));
+        }
+      }
+    }
+  });
+  for (CellSums& c : cells) c.Flush();
+}
 
 HWY_INLINE Quad Mixture(const TapQuads& q, const float (&weight)[4], Quad sum) {
   for (int k = 0; k < 4; ++k) sum = hn::MulAdd(hn::Set(QuadTag(), weight[k]), q.t[k], sum);

@@ -14,7 +14,7 @@
 
 #include "base/prefetch.h"
 #include "base/simd_math-inl.h"
-#include "raster/soft_mask/compact-inl.h"
+#include "raster/soft_mask/tree-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -15,6 +15,7 @@
 
 #include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/conv2d/product-inl.h"
+#include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
@@ -194,6 +195,195 @@ void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* 
                             .stride = s.stride,
                             .cut = cut};
   RunConvProduct(product, context, product.taps.weight + s.kernel_area());
+}
+
+// Weight gradient of a convolution as an implicit matrix product: rows are (input channel, tap),
+// columns the output channels, k runs over pixels and images. The rows' factor is read as it lies
+// in the padded planes of x; d_y is packed transposed. Work items own a block of the weights for a
+// fixed share of the batch; the shares are added in order.
+
+constexpr std::size_t kWeightTaps = 400;     // rows of one work item, about
+constexpr std::size_t kWeightColumns = 128;  // output channels of one work item
+constexpr std::size_t kWeightPixels = 256;   // steps of k in one pass, about
+constexpr std::size_t kWeightItems = 16;     // work items wanted, where the batch allows
+
+struct WeightGradPlan {
+  WeightGradPlan(const Conv2dShape& shape, const float* x_data, const float* d_y_data)
+      : s(shape),
+        x(x_data),
+        d_y(d_y_data),
+        blocks(s.in_channels, std::max<std::size_t>(1, kWeightTaps / s.kernel_area())),
+        column_blocks(DivideUp(s.out_channels, kTileColumns), kWeightColumns / kTileColumns),
+        cut(s.batch, s.out_height(), s.out_width(), kWeightPixels),
+        shares(cut.pieces(), DivideUp(cut.pieces(), DivideUp(kWeightItems, blocks_count()))),
+        planes(InputPlanes(s, cut.bands.largest())) {}
+
+  std::size_t blocks_count() const { return blocks.count() * column_blocks.count(); }
+  std::size_t item_count() const { return blocks_count() * shares.count(); }
+  std::size_t columns() const { return column_blocks.largest() * kTileColumns; }
+  // Floats of one item's sums [taps of the block][columns()], of packed d_y, of planes, of a
+  // worker.
+  std::size_t sums_size() const { return blocks.largest() * s.kernel_area() * columns(); }
+  std::size_t piece_pixels() const { return cut.images * cut.bands.largest() * s.out_width(); }
+  std::size_t packed_size() const { return piece_pixels() * columns(); }
+  std::size_t image_size() const { return blocks.largest() * planes.channel_size(); }
+  std::size_t planes_size() const { return cut.images * image_size() + kTileColumns; }
+  std::size_t worker_size() const { return RoundUp(packed_size() + planes_size(), kAlignment); }
+
+  Conv2dShape s;
+  const float *x, *d_y;
+  Panels blocks;         // of input channels
+  Panels column_blocks;  // of panels of output channels
+  BatchCut cut;
+  Panels shares;  // of the pieces of the batch
+  PlaneGrid planes;
+  const std::size_t* offsets = nullptr;  // of each (channel of a block, tap) in the planes
+};
+
+struct WeightGradItem {
+  WeightGradItem(const WeightGradPlan& plan, std::size_t index)
+      : share(index / plan.blocks_count()),
+        block(index % plan.blocks.count()),
+        column(plan.column_blocks.begin(index / plan.blocks.count() % plan.column_blocks.count()) *
+               kTileColumns),
+        columns(std::min(
+            plan.s.out_channels - column,
+            plan.column_blocks.size(index / plan.blocks.count() % plan.column_blocks.count()) *
+                kTileColumns)) {}
+  std::size_t share, block;
+  std::size_t column, columns;  // output channels
+};
+
+// d_y of the piece, transposed: panels of [pixel][kTileColumns], zeros behind the last channel.
+inline void PackOutputGrad(const WeightGradPlan& plan, const WeightGradItem& item,
+                           const BatchPiece& piece, float* packed) {
+  const std::size_t pixels = piece.rows * plan.s.out_width();
+  for (std::size_t j = 0; j < item.columns; j += kTileColumns) {
+    const std::size_t columns = std::min(kTileColumns, item.columns - j);
+    for (std::size_t n = piece.image; n < piece.image_end; ++n, packed += pixels * kTileColumns) {
+      const float* d_y = plan.d_y +
+                         (n * plan.s.out_channels + item.column + j) * plan.s.out_pixels() +
+                         piece.row * plan.s.out_width();
+      if (columns < kTileColumns) std::fill_n(packed, pixels * kTileColumns, 0.0f);
+      TransposeStrip(d_y, plan.s.out_pixels(), columns, pixels, packed, kTileColumns);
+    }
+  }
+}
+
+// One pass over a piece of the batch, for one item.
+struct WeightGradPass {
+  const WeightGradPlan& plan;
+  const BatchPiece& piece;
+  const float* planes;
+  bool accumulate;
+};
+
+template <std::size_t R>
+HWY_INLINE void WeightGradTile(const WeightGradPass& pass, std::size_t row, PackedColumns columns,
+                               float* c) {
+  const WeightGradPlan& plan = pass.plan;
+  PlainRows<R> rows;
+  for (std::size_t r = 0; r < R; ++r) rows.data[r] = pass.planes + plan.offsets[row + r];
+  Tile<R> tile;
+  tile.Clear();
+  for (std::size_t n = 0; n < pass.piece.image_end - pass.piece.image; ++n) {
+    for (std::size_t y = 0; y < pass.piece.rows; ++y) {
+      rows.k = n * plan.image_size() + y * plan.planes.columns;
+      tile.Multiply(rows, columns, plan.s.out_width());
+    }
+  }
+  tile.Store({.c = c,
+              .ldc = plan.columns(),
+              .offset = {0, kLanes},
+              .count = {kLanes, kLanes},
+              .accumulate = pass.accumulate});
+}
+
+template <std::size_t R = kTileRows>
+HWY_INLINE void WeightGradTileOf(std::size_t rows, const WeightGradPass& pass, std::size_t row,
+                                 PackedColumns columns, float* c) {
+  if (rows == R) {
+    WeightGradTile<R>(pass, row, columns, c);
+  } else if constexpr (R > 1) {
+    WeightGradTileOf<R - 1>(rows, pass, row, columns, c);
+  }
+}
+
+inline void RunWeightGradPass(const WeightGradPass& pass, const WeightGradItem& item,
+                              const float* packed, float* sums) {
+  const WeightGradPlan& plan = pass.plan;
+  const Panels panels(plan.blocks.size(item.block) * plan.s.kernel_area(), kTileRows);
+  const std::size_t steps =
+      (pass.piece.image_end - pass.piece.image) * pass.piece.rows * plan.s.out_width();
+  for (std::size_t j = 0; j < item.columns; j += kTileColumns) {
+    for (std::size_t panel = 0; panel < panels.count(); ++panel) {
+      const std::size_t row = panels.begin(panel);
+      WeightGradTileOf(panels.size(panel), pass, row, PackedColumns{packed + j * steps},
+                       sums + row * plan.columns() + j);
+    }
+  }
+}
+
+inline void RunWeightGradItem(const WeightGradPlan& plan, std::size_t index, float* sums,
+                              float* memory) {
+  const WeightGradItem item(plan, index);
+  float* packed = memory;
+  float* planes = memory + plan.packed_size();
+  const std::size_t channel = plan.blocks.begin(item.block);
+  const std::size_t first = plan.shares.begin(item.share);
+  for (std::size_t i = first; i < first + plan.shares.size(item.share); ++i) {
+    const BatchPiece piece(plan.cut, i);
+    for (std::size_t n = piece.image; n < piece.image_end; ++n) {
+      CopyPlanes(plan.planes, plan.x + (n * plan.s.in_channels + channel) * plan.s.in_pixels(),
+                 plan.blocks.size(item.block), piece.row,
+                 planes + (n - piece.image) * plan.image_size());
+    }
+    PackOutputGrad(plan, item, piece, packed);
+    RunWeightGradPass({plan, piece, planes, i > first}, item, packed, sums);
+  }
+}
+
+// Adds the shares of one block in order and turns the sums into d_weight's layout.
+inline void FinishWeightGrad(const WeightGradPlan& plan, std::size_t index, float* sums,
+                             float* d_weight) {
+  const WeightGradItem item(plan, index);
+  float* total = sums + index * plan.sums_size();
+  for (std::size_t share = 1; share < plan.shares.count(); ++share) {
+    const float* part = total + share * plan.blocks_count() * plan.sums_size();
+    for (std::size_t i = 0; i < plan.sums_size(); ++i) total[i] += part[i];
+  }
+  const std::size_t area = plan.s.kernel_area(), row_size = plan.s.in_channels * area;
+  TransposeStrip(total, plan.columns(), plan.blocks.size(item.block) * area, item.columns,
+                 d_weight + item.column * row_size + plan.blocks.begin(item.block) * area,
+                 row_size);
+}
+
+inline void FillWeightGradOffsets(const WeightGradPlan& plan, std::size_t* offsets) {
+  for (std::size_t c = 0; c < plan.blocks.largest(); ++c) {
+    for (std::size_t tap = 0; tap < plan.s.kernel_area(); ++tap) {
+      *offsets++ =
+          c * plan.planes.channel_size() +
+          InputPlaneOffset(plan.planes, tap / plan.s.kernel_width, tap % plan.s.kernel_width);
+    }
+  }
+}
+
+void Conv2dWeightGradTarget(const Conv2dShape& s, const float* x, const float* d_y, float* d_weight,
+                            const KernelContext& context) {
+  WeightGradPlan plan(s, x, d_y);
+  std::size_t* offsets = context.scratch.Indices(plan.blocks.largest() * s.kernel_area());
+  FillWeightGradOffsets(plan, offsets);
+  plan.offsets = offsets;
+  const std::size_t sums_size = RoundUp(plan.item_count() * plan.sums_size(), kAlignment);
+  float* sums = context.scratch.Floats(
+      sums_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  context.workers.For(plan.item_count(), [&](std::size_t item, std::size_t worker) {
+    RunWeightGradItem(plan, item, sums + item * plan.sums_size(),
+                      sums + sums_size + worker * plan.worker_size());
+  });
+  context.workers.For(plan.blocks_count(), [&](std::size_t index, std::size_t) {
+    FinishWeightGrad(plan, index, sums, d_weight);
+  });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE

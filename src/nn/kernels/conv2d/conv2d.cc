@@ -6,7 +6,6 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 
 #include "nn/kernels/conv2d/conv2d-inl.h"
-#include "nn/kernels/conv2d/weight_grad-inl.h"
 
 #if HWY_ONCE
 #include <algorithm>

@@ -11,14 +11,142 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstddef>
 
-#include "nn/kernels/conv2d/winograd_portions-inl.h"
+#include "base/parallel.h"
 #include "nn/kernels/conv2d/winograd_product-inl.h"
 #include "nn/kernels/conv2d/winograd_tiles-inl.h"
+#include "nn/kernels/kernel_context.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
+
+// How a pass of winograd.h goes through the tiles: in portions, so that memory stays small.
+// If there are enough of them, each worker takes portions of its own, which stay in its caches and
+// need no synchronisation.
+
+// Transformed values of both sides in a portion that all workers share, about: 8 MB. A weight's
+// gradient is summed portion by portion, so its bits depend on this.
+constexpr std::size_t kSharedValues = std::size_t{1} << 21;
+// In a worker's own portion, about: 2 MB, the best of 1 to 8.
+constexpr std::size_t kOwnValues = std::size_t{1} << 19;
+// But so many tiles at least, since all weights are read again for each portion: with 38 and 19
+// tiles 256 to 512 channels took 1.14 and 1.5 times as long.
+constexpr std::size_t kOwnTiles = 64;
+
+// Rows of tiles, `unit` by `unit`, cut into portions.
+struct PortionCut {
+  bool own;  // a portion is one worker's; else all share it
+  std::size_t unit;
+  Panels units;
+};
+
+inline std::size_t ValuesOfRow(const WinogradPlan& plan) {
+  return (WinogradSide{plan, true}.total() + WinogradSide{plan, false}.total()) * plan.tiles_across;
+}
+
+// Does not depend on the number of workers.
+inline PortionCut SharedPortions(const WinogradPlan& plan) {
+  const std::size_t rows = std::max<std::size_t>(1, kSharedValues / ValuesOfRow(plan));
+  return {false, 1, Panels(plan.tile_rows(), rows)};
+}
+
+// Workers' own if there are two at least for each; `unit` rows of tiles stay together.
+inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
+  const auto count = static_cast<std::size_t>(workers.count());
+  const std::size_t units = plan.tile_rows() / unit;
+  const std::size_t rows =
+      std::max(DivideUp(kOwnTiles, plan.tiles_across), kOwnValues / ValuesOfRow(plan));
+  const std::size_t parts = std::max<std::size_t>(1, units / DivideUp(rows, unit));
+  if (unit * ValuesOfRow(plan) > kSharedValues || (count > 1 && parts < 2 * count)) {
+    return SharedPortions(plan);
+  }
+  return {true, unit, Panels::Parts(units, std::min(units, RoundUp(parts, count)))};
+}
+
+struct Portions {
+  Portions(const WinogradPlan& plan, const PortionCut& portions)
+      : input{plan, true},
+        output{plan, false},
+        cut(portions),
+        largest(plan, 0, cut.unit * cut.units.largest(), kTileColumns) {}
+  TileRows rows(std::size_t portion) const {
+    return {input.plan, cut.unit * cut.units.begin(portion), cut.unit * cut.units.size(portion),
+            kTileColumns};
+  }
+
+  WinogradSide input, output;
+  PortionCut cut;
+  TileRows largest;
+};
+
+// The scratch memory of a pass: packed weights (or sums), then for each worker (or once for all)
+// the values of both sides, then what each worker needs besides.
+struct WinogradMemory {
+  WinogradMemory(const Portions& portions, std::size_t weights_size, const KernelContext& context)
+      : inputs_size(RoundUp(SlotLayoutSize(portions.input, portions.largest), kAlignment)),
+        // In whole panels of channels, for the weight gradient.
+        values_size(inputs_size +
+                    RoundUp(SlotLayoutSize(portions.output, portions.largest) +
+                                portions.input.plan.slots() * kTileColumns * portions.largest.pitch,
+                            kAlignment)),
+        places_size(PlacesOfWorker(portions)) {
+    const auto count = static_cast<std::size_t>(context.workers.count());
+    const std::size_t first = RoundUp(weights_size, kAlignment);
+    const std::size_t all_values = (portions.cut.own ? count : 1) * values_size;
+    weights = context.scratch.Floats(first + all_values + count * places_size);
+    values = weights + first;
+    all_places = values + all_values;
+  }
+  static std::size_t PlacesOfWorker(const Portions& portions) {
+    const WinogradPlan& plan = portions.input.plan;
+    const std::size_t places = PlacesSize(plan, portions.largest) + PaddedRowsSize(plan);
+    return RoundUp(std::max(places, TileRowQuadsSize(plan)), kAlignment);
+  }
+  // `owner`: the worker whose portion it is, 0 where all share it.
+  float* inputs(std::size_t owner) const { return values + owner * values_size; }
+  float* outputs(std::size_t owner) const { return inputs(owner) + inputs_size; }
+  float* places(std::size_t worker) const { return all_places + worker * places_size; }
+
+  std::size_t inputs_size, values_size, places_size;
+  float *weights, *values, *all_places;
+};
+
+// The loops of a portion: all workers share them, or its owner goes through them, with workers that
+// have no portion left.
+struct SharedLoops {
+  const Workers& workers;
+  static constexpr std::size_t owner = 0;
+  template <class Task>
+  void For(std::size_t n, const Task& task) const {
+    workers.For(n, task);
+  }
+};
+
+struct OwnLoops {
+  const Workers::Part& part;
+  std::size_t owner;
+  template <class Task>
+  void For(std::size_t n, const Task& task) const {
+    part.For(n, task);
+  }
+};
+
+// Calls run(rows, loops) for each portion.
+template <class Run>
+void ForPortions(const Portions& portions, const Workers& workers, const Run& run) {
+  const std::size_t count = portions.cut.units.count();
+  if (portions.cut.own) {
+    workers.ForParts(count, [&](std::size_t portion, const Workers::Part& part) {
+      run(portions.rows(portion), OwnLoops{part, part.worker()});
+    });
+  } else {
+    for (std::size_t portion = 0; portion < count; ++portion) {
+      run(portions.rows(portion), SharedLoops{workers});
+    }
+  }
+}
 
 inline void TransformInput(const WinogradPlan& plan, const TileRows& rows, const SlotLayout& layout,
                            const float* x, std::size_t c, float* memory, float* values) {

@@ -11,15 +11,196 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 
 #include "base/parallel.h"
+#include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/conv2d/winograd_tiles-inl.h"
-#include "nn/kernels/conv2d/winograd_weights-inl.h"
+#include "nn/kernels/conv2d/winograd_transform-inl.h"
 #include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
+
+// The weights of winograd.h, transformed and packed as the row factor of each slot's
+// product.
+
+constexpr std::size_t kRowLanes = RoundUp(kTileRows, kLanes);
+constexpr std::size_t kMostTaps = 25;  // of a kernel of 5 x 5
+
+// Whether the vectors of a step never end behind the step after it, which overwrites what is not
+// theirs: FillPhase counts on it. Of more channels no panel is smaller.
+constexpr bool StepsEndInTheNext() {
+  for (std::size_t n = kLeastWinogradChannels; n < kLeastWinogradChannels + 4 * kTileRows; ++n) {
+    if (2 * (n / DivideUp(n, kTileRows)) < kRowLanes) return false;
+  }
+  return true;
+}
+static_assert(StepsEndInTheNext());
+
+struct SlotTargets {
+  float* data[4][4];
+};
+
+// Taps of one phase of `rows` kernels, transformed: row r to lane r of out(slot).
+template <std::size_t Ra, std::size_t Rb>
+struct TransformWeights {
+  // taps: tap (i, j) of the phase, kRowLanes each, lies at (i * kernel + j) * stride.
+  static HWY_INLINE void Run(const WinogradPlan& plan, const float* taps, const SlotTargets& out) {
+    for (std::size_t v = 0; v < kRowLanes; v += kLanes) {
+      Square in, result;
+      for (std::size_t i = 0; i < Ra; ++i) {
+        for (std::size_t j = 0; j < Rb; ++j) {
+          const std::size_t tap = (i * plan.kernel + j) * plan.stride;
+          in[i][j] = hn::LoadU(Tag(), taps + tap * kRowLanes + v);
+        }
+      }
+      Transform<WeightTransform<Ra>, WeightTransform<Rb>>(in, result);
+      for (std::size_t i = 0; i <= Ra; ++i) {
+        for (std::size_t j = 0; j <= Rb; ++j) {
+          hn::StoreU(result[i][j], Tag(), out.data[i][j] + v);
+        }
+      }
+    }
+  }
+};
+
+// Calls f(i, j) for the slots of a phase of ra x rb taps.
+template <class F>
+HWY_INLINE void ForSlots(std::size_t ra, std::size_t rb, const F& f) {
+  for (std::size_t i = 0; i <= ra; ++i) {
+    for (std::size_t j = 0; j <= rb; ++j) f(i, j);
+  }
+}
+
+// Whose weights a convolution is given: its own, [O,C,U,V], or those of the one that it is the
+// transpose of, [C,O,U,V] with kernels turned by 180 degrees.
+enum class WeightsOf { kItself, kTranspose };
+
+// The row factor of each slot's product: `rows` by `depth`, one of them the input's side. A group
+// of rows is a phase where the input's side is the rows.
+struct PackedWinogradWeights {
+  PackedWinogradWeights(const WinogradSide& rows_side, const WinogradSide& depth_side,
+                        WeightsOf weights_of = WeightsOf::kItself)
+      : plan(rows_side.plan),
+        rows(rows_side),
+        depth(depth_side),
+        of(weights_of),
+        panels(rows.channels(), kTileRows) {
+    std::size_t begin = 0;
+    for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
+      base[slot] = begin;
+      begin += panel_count(slot) * panel_size(slot);
+    }
+    total = begin;
+  }
+  std::size_t size() const { return total; }
+  std::size_t panel_count(std::size_t slot) const { return rows.groups(slot) * panels.count(); }
+  // A vector's store may run over the end of its row.
+  std::size_t panel_size(std::size_t slot) const {
+    return depth.size(slot) * kTileRows + kRowLanes;
+  }
+  // Panel `index` of all groups: where it lies, its rows among those of the slot.
+  const float* Panel(const float* packed, std::size_t slot, std::size_t index) const {
+    return packed + base[slot] + index * panel_size(slot);
+  }
+  std::size_t RowBegin(std::size_t index) const {
+    return index / panels.count() * rows.channels() + panels.begin(index % panels.count());
+  }
+  std::size_t RowCount(std::size_t index) const { return panels.size(index % panels.count()); }
+
+  void Fill(const float* weight, float* packed, const Workers& workers) const {
+    workers.For(panels.count(),
+                [&](std::size_t panel, std::size_t) { FillPanel(weight, panel, packed); });
+  }
+
+  const WinogradPlan& plan;
+  WinogradSide rows, depth;
+  WeightsOf of;
+  Panels panels;  // of the channels of a group
+  std::array<std::size_t, kMaxSlots> base{};
+  std::size_t total = 0;
+
+ private:
+  // Their taps stay in L1, and each slot is written in runs of some lines: 8 took a fifth longer,
+  // 64 no less.
+  static constexpr std::size_t kStepsAtATime = 32;
+  // Floats between asking for a line and writing it; 48 and 192 are no better.
+  static constexpr std::size_t kAhead = 96;
+
+  // Some steps of one panel; of one phase (a, b).
+  struct Strip {
+    std::size_t panel, k, steps;
+    std::size_t a, b;
+  };
+  using Taps = float[kMostTaps * kRowLanes];  // of one step
+
+  // Taps of some steps, side by side, then their phases: a vector that is loaded at once from
+  // numbers stored one by one waits for them.
+  void FillPanel(const float* weight, std::size_t panel, float* packed) const {
+    const std::size_t area = plan.kernel * plan.kernel;
+    const bool by_rows = rows.input == (of == WeightsOf::kTranspose);  // else by steps
+    const std::size_t row_stride = by_rows ? depth.channels() * area : area;
+    const std::size_t k_stride = by_rows ? area : rows.channels() * area;
+    const float* first = weight + panels.begin(panel) * row_stride;
+    Taps taps[kStepsAtATime] = {};
+    for (std::size_t k = 0; k < depth.channels(); k += kStepsAtATime) {
+      const std::size_t steps = std::min(kStepsAtATime, depth.channels() - k);
+      for (std::size_t i = 0; i < steps; ++i) {
+        TransposeStrip(first + (k + i) * k_stride, row_stride, panels.size(panel), area, taps[i],
+                       kRowLanes);
+      }
+      for (std::size_t a = 0; a < plan.stride; ++a) {
+        for (std::size_t b = 0; b < plan.stride; ++b) {
+          FillPhase({panel, k, steps, a, b}, taps, packed);
+        }
+      }
+    }
+  }
+
+  void FillPhase(const Strip& strip, const Taps* taps, float* packed) const {
+    const std::size_t ra = plan.taps(strip.a), rb = plan.taps(strip.b);
+    const std::size_t count = panels.size(strip.panel);
+    const std::size_t first = (strip.a * plan.kernel + strip.b) * kRowLanes;  // tap of the phase
+    SlotTargets to;
+    ForSlots(ra, rb,
+             [&](std::size_t i, std::size_t j) { to.data[i][j] = packed + At(strip, i, j); });
+    // What a store writes beyond its row, the next step overwrites; behind the last step lies the
+    // next phase, which may be there already.
+    const bool ends = strip.k + strip.steps == depth.channels();
+    for (std::size_t k = 0; k + ends < strip.steps; ++k) {
+      ForTaps<TransformWeights>(ra, rb, plan, taps[k] + first, to);
+      ForSlots(ra, rb, [&](std::size_t i, std::size_t j) HWY_ATTR {
+        to.data[i][j] += count;
+        PrefetchLineToWrite(to.data[i][j] + kAhead);
+      });
+    }
+    if (!ends) return;
+    float lanes[4][4][kRowLanes];
+    SlotTargets whole;
+    ForSlots(ra, rb, [&](std::size_t i, std::size_t j) { whole.data[i][j] = lanes[i][j]; });
+    ForTaps<TransformWeights>(ra, rb, plan, taps[strip.steps - 1] + first, whole);
+    ForSlots(ra, rb,
+             [&](std::size_t i, std::size_t j) { std::copy_n(lanes[i][j], count, to.data[i][j]); });
+  }
+
+  // Where taps in reverse order have the value that they have for slot i in theirs: at 0 and
+  // infinity each has the other's.
+  std::size_t SlotOf(std::size_t i) const {
+    return of == WeightsOf::kTranspose && i % 2 == 0 ? 2 - i : i;
+  }
+
+  // Where the strip's values of slot (i, j) lie.
+  std::size_t At(const Strip& strip, std::size_t i, std::size_t j) const {
+    const std::size_t slot = SlotOf(i) * plan.axis_slots + SlotOf(j);
+    const std::size_t phase = plan.phase_index(slot, strip.a, strip.b);
+    const std::size_t group = rows.input ? phase : 0;
+    const std::size_t k = strip.k + (rows.input ? 0 : phase * depth.channels());
+    return base[slot] + (group * panels.count() + strip.panel) * panel_size(slot) +
+           k * panels.size(strip.panel);
+  }
+};
 
 constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half of L1
 constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
@@ -64,7 +245,7 @@ inline void MultiplyItem(const SlotProduct& p, const SlotItem& item) {
   }
 }
 
-// loops: as in winograd_portions-inl.h.
+// loops: as in winograd-inl.h.
 template <class Loops>
 void MultiplySlots(const SlotProduct& p, const Loops& loops) {
   const WinogradPlan& plan = p.weights.plan;

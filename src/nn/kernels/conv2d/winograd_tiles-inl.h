@@ -17,7 +17,6 @@
 #include <cstddef>
 
 #include "nn/kernels/conv2d/winograd_plan.h"
-#include "nn/kernels/conv2d/winograd_rows-inl.h"
 #include "nn/kernels/conv2d/winograd_transform-inl.h"
 #include "nn/kernels/pack-inl.h"
 
