@@ -3,7 +3,6 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "bindings/load_within.h"
 #include "bindings/npy_arrays.h"
 #include "bindings/to_python.h"
 #include "io/exr_file.h"

@@ -3,7 +3,6 @@
 // float64.
 #include <vector>
 
-#include "base/array_checks.h"
 #include "bindings/calls.h"
 #include "scene/topology.h"
 #include "train/losses/edge_length.h"
@@ -18,14 +17,6 @@ void BindLosses(py::module_& m);
 namespace {
 
 using Outcome = std::pair<double, py::array>;
-
-template <class T>
-std::span<const T> Finite(const py::array& array, const char* function, const char* argument,
-                          const std::vector<py::ssize_t>& shape) {
-  const auto numbers = SpanOf<T>(array, function, argument, shape);
-  if (AllFinite(numbers)) return numbers;
-  throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
-}
 
 std::vector<Face> FacesOf(const char* function, const py::array& array, std::size_t vertices) {
   const auto corners = SpanOf<std::int32_t>(array, function, "faces", {kAny, 3});
@@ -45,7 +36,7 @@ template <class Loss>
 Outcome OfMesh(const char* function, const py::array& positions, const py::array& faces,
                const Loss& loss) {
   return Dispatch(positions, function, "positions", [&]<class T>(T) -> Outcome {
-    const auto p = Finite<T>(positions, function, "positions", {kAny, 3});
+    const auto p = FiniteSpanOf<T>(positions, function, "positions", {kAny, 3});
     const auto triangles = FacesOf(function, faces, p.size() / 3);
     py::array_t<T> gradient = NewArrayLike<T>(positions);
     const std::span<T> d_p = NumbersOf(gradient);
@@ -96,9 +87,9 @@ Outcome Laplacian(const py::array& movement, const py::array& faces) {
 // alpha, truth: [N, pixels].
 Outcome Iou(const py::array& alpha, const py::array& truth) {
   return Dispatch(alpha, "iou", "alpha", [&]<class T>(T) -> Outcome {
-    const auto predicted = Finite<T>(alpha, "iou", "alpha", {kAny, kAny});
+    const auto predicted = FiniteSpanOf<T>(alpha, "iou", "alpha", {kAny, kAny});
     const auto images = static_cast<std::size_t>(alpha.shape(0));
-    const auto wanted = Finite<T>(truth, "iou", "truth", {alpha.shape(0), alpha.shape(1)});
+    const auto wanted = FiniteSpanOf<T>(truth, "iou", "truth", {alpha.shape(0), alpha.shape(1)});
     py::array_t<T> gradient = NewArrayLike<T>(alpha);
     const std::span<T> d_alpha = NumbersOf(gradient);
     double sum = 0;

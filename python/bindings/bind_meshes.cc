@@ -3,7 +3,6 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "bindings/load_within.h"
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
 #include "io/glb_writer.h"

@@ -107,22 +107,15 @@ train::ParameterSet ParametersNamed(const Words& names) {
   return set;
 }
 
-Lighting LightingNamed(const std::string& name) {
-  constexpr std::array kNames = {"none", "lambert", "phong", "spherical_harmonics"};
-  const auto at = std::find(kNames.begin(), kNames.end(), name);
-  if (at == kNames.end())
+// The value whose name, in the order of the enumeration, request[argument] is.
+template <class Enum>
+Enum EnumNamed(const py::dict& request, const char* argument, const Words& names) {
+  const auto name = request[argument].cast<std::string>();
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at == names.end())
     throw py::value_error(
-        fmt::format("fit: lighting is '{}', expected one of {}", name, fmt::join(kNames, ", ")));
-  return static_cast<Lighting>(at - kNames.begin());
-}
-
-train::MaterialKind MaterialNamed(const std::string& name) {
-  constexpr std::array kNames = {"unlit", "lambert", "phong"};
-  const auto at = std::find(kNames.begin(), kNames.end(), name);
-  if (at == kNames.end())
-    throw py::value_error(
-        fmt::format("fit: material is '{}', expected one of {}", name, fmt::join(kNames, ", ")));
-  return static_cast<train::MaterialKind>(at - kNames.begin());
+        fmt::format("fit: {} is '{}', expected one of {}", argument, name, fmt::join(names, ", ")));
+  return static_cast<Enum>(at - names.begin());
 }
 
 train::ExistingRun ExistingOf(const py::dict& request) {
@@ -138,8 +131,10 @@ train::FitJob JobOf(const py::dict& request) {
     job.config.steps = ValueOrThrow(train::StepsOfQuality(quality));
   job.config.parameters = ParametersNamed(request["optimize"].cast<Words>());
   job.config.vertex_colors = job.config.parameters[train::Parameter::kColors];
-  job.config.material = MaterialNamed(request["material"].cast<std::string>());
-  job.config.lighting = LightingNamed(request["lighting"].cast<std::string>());
+  job.config.material =
+      EnumNamed<train::MaterialKind>(request, "material", {"unlit", "lambert", "phong"});
+  job.config.lighting =
+      EnumNamed<Lighting>(request, "lighting", {"none", "lambert", "phong", "spherical_harmonics"});
   ThrowIfError(train::OverrideFields(request["options"].cast<Words>(), train::FieldsOf(&job.config))
                    .Within("fit"));
   if (!request["start"].is_none()) job.start = MeshFromDict("fit", request["start"]);

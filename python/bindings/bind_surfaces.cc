@@ -2,9 +2,7 @@
 // Points and surfaces, for tilegrad.compat: batches of arrays, float32 or float64.
 #include <optional>
 
-#include "base/array_checks.h"
 #include "bindings/calls.h"
-#include "bindings/shared_workers.h"
 #include "train/metrics/face_tree.h"
 #include "train/metrics/metrics.h"
 #include "train/metrics/nearest_point.h"
@@ -19,15 +17,6 @@ using train::FaceTree;
 using train::Triangle;
 
 constexpr std::size_t kGrain = 64;  // queries of a task
-
-// The numbers of `array`, which must be finite. Errors as of SpanOf.
-template <class T>
-std::span<const T> FiniteSpanOf(const py::object& array, const char* function, const char* argument,
-                                const std::vector<py::ssize_t>& shape) {
-  const auto numbers = SpanOf<T>(array, function, argument, shape);
-  if (AllFinite(numbers)) return numbers;
-  throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
-}
 
 template <class T>
 std::vector<glm::dvec3> PointsOf(std::span<const T> numbers) {
@@ -81,57 +70,60 @@ void AskTrees(const Queries& how, std::span<const T> queries, const TreeOf& tree
   });
 }
 
-template <class T>
 py::array NearestPoints(const py::array& from, const py::array& to, int threads) {
   constexpr const char* kName = "sided_distance";
-  const auto queries = FiniteSpanOf<T>(from, kName, "p1", {kAny, kAny, 3});
-  const auto targets = FiniteSpanOf<T>(to, kName, "p2", {from.shape(0), kAny, 3});
-  py::array_t<std::int64_t> out(std::vector<py::ssize_t>{from.shape(0), from.shape(1)});
-  std::int64_t* index = out.mutable_data();
-  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(from.shape(0))};
-  AskTrees<train::NearestPoint>(
-      how, queries, [&](std::size_t b) { return PointsOf(Part(targets, how.batch, b)); },
-      [&](const auto& tree, const auto& query, std::size_t i) {
-        index[i] = tree.Find(query).index;
-      });
-  return out;
+  return Dispatch(from, kName, "p1", [&]<class T>(T) -> py::array {
+    const auto queries = FiniteSpanOf<T>(from, kName, "p1", {kAny, kAny, 3});
+    const auto targets = FiniteSpanOf<T>(to, kName, "p2", {from.shape(0), kAny, 3});
+    py::array_t<std::int64_t> out(std::vector<py::ssize_t>{from.shape(0), from.shape(1)});
+    std::int64_t* index = out.mutable_data();
+    const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(from.shape(0))};
+    AskTrees<train::NearestPoint>(
+        how, queries, [&](std::size_t b) { return PointsOf(Part(targets, how.batch, b)); },
+        [&](const auto& tree, const auto& query, std::size_t i) {
+          index[i] = tree.Find(query).index;
+        });
+    return out;
+  });
 }
 
-template <class T>
 py::tuple NearestFaces(const py::array& points, const py::array& corners, int threads) {
   constexpr const char* kName = "point_to_mesh_distance";
-  const auto queries = FiniteSpanOf<T>(points, kName, "pointclouds", {kAny, kAny, 3});
-  const auto faces =
-      FiniteSpanOf<T>(corners, kName, "face_vertices", {points.shape(0), kAny, 3, 3});
-  py::array_t<std::int64_t> faces_out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
-  auto weights_out = NewArrayLike<T>(points);
-  std::int64_t* index = faces_out.mutable_data();
-  T* weights = weights_out.mutable_data();
-  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
-  AskTrees<FaceTree>(
-      how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
-      [&](const FaceTree& tree, const auto& query, std::size_t i) {
-        const auto found = tree.Find(query);
-        index[i] = found.face;
-        for (std::size_t k = 0; k < 3; ++k) weights[3 * i + k] = static_cast<T>(found.weights[k]);
-      });
-  return py::make_tuple(faces_out, weights_out);
+  return Dispatch(points, kName, "pointclouds", [&]<class T>(T) {
+    const auto queries = FiniteSpanOf<T>(points, kName, "pointclouds", {kAny, kAny, 3});
+    const auto faces =
+        FiniteSpanOf<T>(corners, kName, "face_vertices", {points.shape(0), kAny, 3, 3});
+    py::array_t<std::int64_t> faces_out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
+    auto weights_out = NewArrayLike<T>(points);
+    std::int64_t* index = faces_out.mutable_data();
+    T* weights = weights_out.mutable_data();
+    const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
+    AskTrees<FaceTree>(
+        how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
+        [&](const FaceTree& tree, const auto& query, std::size_t i) {
+          const auto found = tree.Find(query);
+          index[i] = found.face;
+          for (std::size_t k = 0; k < 3; ++k) weights[3 * i + k] = static_cast<T>(found.weights[k]);
+        });
+    return py::make_tuple(faces_out, weights_out);
+  });
 }
 
-template <class T>
 py::array Enclosed(const py::array& points, const py::array& corners, int threads) {
   constexpr const char* kName = "check_sign";
-  const auto queries = FiniteSpanOf<T>(points, kName, "points", {kAny, kAny, 3});
-  const auto faces = FiniteSpanOf<T>(corners, kName, "faces", {points.shape(0), kAny, 3, 3});
-  py::array_t<bool> out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
-  bool* inside = out.mutable_data();
-  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
-  AskTrees<FaceTree>(
-      how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
-      [&](const FaceTree& tree, const auto& query, std::size_t i) {
-        inside[i] = tree.Encloses(query);
-      });
-  return out;
+  return Dispatch(points, kName, "points", [&]<class T>(T) -> py::array {
+    const auto queries = FiniteSpanOf<T>(points, kName, "points", {kAny, kAny, 3});
+    const auto faces = FiniteSpanOf<T>(corners, kName, "faces", {points.shape(0), kAny, 3, 3});
+    py::array_t<bool> out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
+    bool* inside = out.mutable_data();
+    const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
+    AskTrees<FaceTree>(
+        how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
+        [&](const FaceTree& tree, const auto& query, std::size_t i) {
+          inside[i] = tree.Encloses(query);
+        });
+    return out;
+  });
 }
 
 py::tuple SampleFaces(const py::object& areas, int count, std::uint64_t seed) {
@@ -164,32 +156,16 @@ double VoxelIou(const py::object& a, const py::array& b) {
 }  // namespace
 
 void BindSurfaces(py::module_& m) {
+  m.def("nearest_points", &NearestPoints, py::arg("from_points"), py::arg("to_points"),
+        py::arg("threads"),
+        "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
   m.def(
-      "nearest_points",
-      [](const py::array& from, const py::array& to, int threads) {
-        return Dispatch(from, "sided_distance", "p1",
-                        [&](auto t) { return NearestPoints<decltype(t)>(from, to, threads); });
-      },
-      py::arg("from_points"), py::arg("to_points"), py::arg("threads"),
-      "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
-  m.def(
-      "nearest_faces",
-      [](const py::array& points, const py::array& corners, int threads) {
-        return Dispatch(points, "point_to_mesh_distance", "pointclouds", [&](auto t) {
-          return NearestFaces<decltype(t)>(points, corners, threads);
-        });
-      },
-      py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
+      "nearest_faces", &NearestFaces, py::arg("points"), py::arg("face_vertices"),
+      py::arg("threads"),
       "(B, N, 3), (B, F, 3, 3) -> the nearest face (B, N) int64 and the weights of its corners in\n"
       "the nearest point (B, N, 3): 0 on the opposite edge.");
-  m.def(
-      "enclosed",
-      [](const py::array& points, const py::array& corners, int threads) {
-        return Dispatch(points, "check_sign", "points",
-                        [&](auto t) { return Enclosed<decltype(t)>(points, corners, threads); });
-      },
-      py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
-      "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
+  m.def("enclosed", &Enclosed, py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
+        "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
   m.def("sample_faces", &SampleFaces, py::arg("areas"), py::arg("count"), py::arg("seed"),
         "(F,) float64 -> faces (count,) int64, distributed by area, and weights of their corners\n"
         "(count, 3) float64.");

@@ -5,7 +5,6 @@
 
 #include <map>
 
-#include "bindings/load_within.h"
 #include "bindings/npy_arrays.h"
 #include "bindings/to_python.h"
 #include "nn/serialize.h"

@@ -3,14 +3,37 @@
 // float32, or all are float64.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "base/array_checks.h"
+#include "base/parallel.h"
 #include "bindings/arrays.h"
-#include "bindings/kept_memory.h"
 
 namespace tilegrad::python {
+
+// The process's Workers of `threads` threads (0: one for each core that it may use), made at the
+// first call; several threads may use them at the same time. A child of a fork has Workers of its
+// own.
+const Workers& SharedWorkers(int threads);
+
+// Memory for results that a program asks for again and again, as the steps of a training do: blocks
+// that arrays gave back are handed out again. Pages that come anew from the system may cost more
+// than what is computed into them.
+
+inline constexpr std::size_t kLeastKeptBytes = std::size_t{1} << 16;  // malloc keeps smaller ones
+// In all; beyond, those that were given back first go to the system.
+inline constexpr std::size_t kMostKeptBytes = std::size_t{256} << 20;
+
+// At least `bytes` uninitialised bytes, aligned for kernels, until the capsule dies. With the GIL
+// held, which is also held when the capsule dies.
+struct KeptBlock {
+  void* data;
+  py::capsule owner;
+};
+KeptBlock TakeKeptBlock(std::size_t bytes);
 
 // call(float()) or call(double()), by the numbers of `array`, which is the argument of that name.
 template <class Call>
@@ -52,6 +75,15 @@ template <class T>
 std::span<const T> OptionalSpanOf(const std::optional<py::array>& array, const char* function,
                                   const char* argument, const std::vector<py::ssize_t>& shape) {
   return array.has_value() ? SpanOf<T>(*array, function, argument, shape) : std::span<const T>();
+}
+
+// The numbers of `array`, which must be finite. Errors as of SpanOf.
+template <class T>
+std::span<const T> FiniteSpanOf(const py::object& array, const char* function, const char* argument,
+                                const std::vector<py::ssize_t>& shape) {
+  const auto numbers = SpanOf<T>(array, function, argument, shape);
+  if (AllFinite(numbers)) return numbers;
+  throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
 }
 
 // Engine work, other Python threads running.

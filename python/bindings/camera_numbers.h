@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "scene/camera.h"
 
@@ -14,25 +15,28 @@ namespace tilegrad::python {
 inline constexpr std::size_t kCameraNumbers = 17;
 using CameraRow = std::array<double, kCameraNumbers>;
 
-inline CameraRow NumbersOf(const Camera64& c) {
-  CameraRow out;
-  std::copy_n(c.rotation, 9, out.begin());
-  std::copy_n(c.translation, 3, out.begin() + 9);
-  const double rest[] = {c.fx, c.fy, c.cx, c.cy, c.near_plane};
-  std::copy_n(rest, 5, out.begin() + 12);
+template <class T>
+void PutCamera(const CameraT<T>& c, std::span<T> numbers) {
+  std::copy_n(c.rotation, 9, numbers.begin());
+  std::copy_n(c.translation, 3, numbers.begin() + 9);
+  const T rest[] = {c.fx, c.fy, c.cx, c.cy, c.near_plane};
+  std::copy_n(rest, 5, numbers.begin() + 12);
+}
+template <class T>
+CameraT<T> CameraOf(std::span<const T> numbers) {
+  CameraT<T> out;
+  std::copy_n(numbers.begin(), 9, out.rotation);
+  std::copy_n(numbers.begin() + 9, 3, out.translation);
+  T* const rest[] = {&out.fx, &out.fy, &out.cx, &out.cy, &out.near_plane};
+  for (std::size_t i = 0; i < 5; ++i) *rest[i] = numbers[12 + i];
   return out;
 }
 
-inline Camera64 CameraOfNumbers(const CameraRow& numbers) {
-  Camera64 out;
-  std::copy_n(numbers.begin(), 9, out.rotation);
-  std::copy_n(numbers.begin() + 9, 3, out.translation);
-  out.fx = numbers[12];
-  out.fy = numbers[13];
-  out.cx = numbers[14];
-  out.cy = numbers[15];
-  out.near_plane = numbers[16];
+inline CameraRow NumbersOf(const Camera64& c) {
+  CameraRow out;
+  PutCamera<double>(c, out);
   return out;
 }
+inline Camera64 CameraOfNumbers(const CameraRow& numbers) { return CameraOf<double>(numbers); }
 
 }  // namespace tilegrad::python

@@ -39,20 +39,6 @@ bool SceneArrays::at_corners(std::string_view name) const {
 }
 
 template <class T>
-CameraT<T> CameraOf(std::span<const T> numbers) {
-  CameraT<T> out;
-  const T* next = numbers.data();
-  ForEachCameraPart(Reader<T>(next), out);
-  out.near_plane = numbers.back();
-  return out;
-}
-template <class T>
-void PutCamera(const CameraT<T>& camera, std::span<T> numbers) {
-  T* next = numbers.data();
-  ForEachCameraPart(Writer<T>(next), camera);
-  numbers.back() = camera.near_plane;
-}
-template <class T>
 SurfaceT<T> SurfaceOf(std::span<const T> numbers) {
   SurfaceT<T> out;
   const T* next = numbers.data();
@@ -213,8 +199,6 @@ void SceneRecord<T>::SetLights() {
 }
 
 #define TILEGRAD_INSTANTIATE(T)                               \
-  template CameraT<T> CameraOf(std::span<const T>);           \
-  template void PutCamera(const CameraT<T>&, std::span<T>);   \
   template SurfaceT<T> SurfaceOf(std::span<const T>);         \
   template void PutSurface(const SurfaceT<T>&, std::span<T>); \
   template LightT<T> LightOf(std::span<const T>);             \

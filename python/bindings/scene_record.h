@@ -20,10 +20,6 @@ inline constexpr std::size_t kLightNumbers = 4;     // direction, intensity
 
 // The plain numbers of a record, in the order above. Surfaces: all but the texture.
 template <class T>
-CameraT<T> CameraOf(std::span<const T> numbers);
-template <class T>
-void PutCamera(const CameraT<T>& camera, std::span<T> numbers);
-template <class T>
 SurfaceT<T> SurfaceOf(std::span<const T> numbers);
 template <class T>
 void PutSurface(const SurfaceT<T>& surface, std::span<T> numbers);

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/escape_text.h"
+#include "base/read_budget.h"
 #include "bindings/arrays.h"
 
 namespace tilegrad::python {
@@ -29,6 +31,16 @@ template <class Work>
 auto WithoutGil(const Work& work) {
   const py::gil_scoped_release release;
   return work();
+}
+
+// What `load` returns, without the GIL. max_bytes: of ReadBudget; 0: the usual limit.
+template <class Load>
+auto LoadWithin(std::size_t max_bytes, const Load& load) {
+  return ValueOrThrow(WithoutGil([&] {
+    std::optional<ReadBudget> budget;
+    if (max_bytes > 0) budget.emplace(max_bytes);
+    return load();
+  }));
 }
 
 // As Python's warning; bytes that are no text are shown escaped.

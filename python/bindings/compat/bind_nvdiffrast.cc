@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "bindings/calls.h"
-#include "bindings/shared_workers.h"
 #include "compat/nvdiffrast/antialias.h"
 #include "compat/nvdiffrast/interpolate.h"
 #include "compat/nvdiffrast/rasterize.h"
@@ -59,40 +58,31 @@ std::span<const T> ImageOf(const OptionalArray& image, const char* function, con
 // The engine's rasterizer for any thread: who finds it at work takes one of his own.
 class NvdiffrastRasterizer {
  public:
-  struct Call {
-    py::array tri;
-    OptionalArray ranges;
-    int height, width;
-    OptionalArray peeled;
-    int threads;
-  };
-
-  template <class T>
-  py::tuple Rasterize(const py::array& pos, const Call& call) {
+  py::tuple Rasterize(const py::array& pos, const py::array& tri, const OptionalArray& ranges,
+                      int height, int width, const OptionalArray& peeled, int threads) {
     constexpr char kName[] = "rasterize";
-    const py::ssize_t n = call.ranges ? call.ranges->shape(0) : pos.shape(0);
-    nvdiffrast::RasterizeInput<T> input{
-        RowsOf<T>(pos, kName, "pos", n),
-        FacesOf(call.tri, kName),
-        OptionalSpanOf<std::int32_t>(call.ranges, kName, "ranges", {n, 2}),
-        {static_cast<std::size_t>(n), call.height, call.width}};
-    if (input.positions.channels != 4 || input.positions.shared != call.ranges.has_value()) {
-      throw py::value_error("rasterize: pos must be [N, V, 4], or [V, 4] with ranges");
-    }
-    auto rast = NewArray<T>({n, call.height, call.width, 4});
-    auto rast_db = NewArray<T>({n, call.height, call.width, 4});
-    nvdiffrast::RasterizeOutput<T> out{NumbersOf(rast), NumbersOf(rast_db), {}};
-    if (call.peeled) {
-      out.peeled =
-          MutableSpanOf<float>(*call.peeled, kName, "peeled", {n, call.height, call.width});
-    }
-    const Workers& workers = SharedWorkers(call.threads);
-    Run(kName, [&] {
-      const std::unique_lock lock(mutex_, std::try_to_lock);
-      nvdiffrast::Rasterizer own;
-      return (lock.owns_lock() ? rasterizer_ : own).Run(input, workers, out);
+    return Dispatch(pos, kName, "pos", [&]<class T>(T) {
+      const py::ssize_t n = ranges ? ranges->shape(0) : pos.shape(0);
+      nvdiffrast::RasterizeInput<T> input{
+          RowsOf<T>(pos, kName, "pos", n),
+          FacesOf(tri, kName),
+          OptionalSpanOf<std::int32_t>(ranges, kName, "ranges", {n, 2}),
+          {static_cast<std::size_t>(n), height, width}};
+      if (input.positions.channels != 4 || input.positions.shared != ranges.has_value()) {
+        throw py::value_error("rasterize: pos must be [N, V, 4], or [V, 4] with ranges");
+      }
+      auto rast = NewArray<T>({n, height, width, 4});
+      auto rast_db = NewArray<T>({n, height, width, 4});
+      nvdiffrast::RasterizeOutput<T> out{NumbersOf(rast), NumbersOf(rast_db), {}};
+      if (peeled) out.peeled = MutableSpanOf<float>(*peeled, kName, "peeled", {n, height, width});
+      const Workers& workers = SharedWorkers(threads);
+      Run(kName, [&] {
+        const std::unique_lock lock(mutex_, std::try_to_lock);
+        nvdiffrast::Rasterizer own;
+        return (lock.owns_lock() ? rasterizer_ : own).Run(input, workers, out);
+      });
+      return py::make_tuple(rast, rast_db);
     });
-    return py::make_tuple(rast, rast_db);
   }
 
  private:
@@ -100,28 +90,23 @@ class NvdiffrastRasterizer {
   nvdiffrast::Rasterizer rasterizer_;
 };
 
-struct RasterizeBackwardCall {
-  py::array tri, rast;
-  OptionalArray d_rast, d_rast_db;
-  int threads;
-};
-
-template <class T>
-py::array RasterizeBackward(const py::array& pos, const RasterizeBackwardCall& call) {
+py::array RasterizeBackward(const py::array& pos, const py::array& tri, const py::array& rast,
+                            const OptionalArray& d_rast, const OptionalArray& d_rast_db,
+                            int threads) {
   constexpr char kName[] = "rasterize's backward pass";
-  nvdiffrast::RasterizeInput<T> input{RowsOf<T>(pos, kName, "pos", call.rast.shape(0)),
-                                      FacesOf(call.tri, kName),
-                                      {},
-                                      GridOf(call.rast)};
-  const nvdiffrast::RasterizeCotangents<T> cotangents{
-      SpanOf<T>(call.rast, kName, "rast", {kAny, kAny, kAny, 4}),
-      ImageOf<T>(call.d_rast, kName, "the gradient of rast", call.rast, 4),
-      ImageOf<T>(call.d_rast_db, kName, "the gradient of rast_db", call.rast, 4)};
-  auto d_pos = NewArrayLike<T>(pos);
-  const auto to = NumbersOf(d_pos);
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return nvdiffrast::RasterizeBackward<T>(input, cotangents, workers, to); });
-  return d_pos;
+  return Dispatch(pos, kName, "pos", [&]<class T>(T) -> py::array {
+    nvdiffrast::RasterizeInput<T> input{
+        RowsOf<T>(pos, kName, "pos", rast.shape(0)), FacesOf(tri, kName), {}, GridOf(rast)};
+    const nvdiffrast::RasterizeCotangents<T> cotangents{
+        SpanOf<T>(rast, kName, "rast", {kAny, kAny, kAny, 4}),
+        ImageOf<T>(d_rast, kName, "the gradient of rast", rast, 4),
+        ImageOf<T>(d_rast_db, kName, "the gradient of rast_db", rast, 4)};
+    auto d_pos = NewArrayLike<T>(pos);
+    const auto to = NumbersOf(d_pos);
+    const Workers& workers = SharedWorkers(threads);
+    Run(kName, [&] { return nvdiffrast::RasterizeBackward<T>(input, cotangents, workers, to); });
+    return d_pos;
+  });
 }
 
 struct InterpolateCall {
@@ -144,19 +129,21 @@ nvdiffrast::InterpolateInput<T> InterpolateInputOf(const py::array& attr,
           SpanOf<std::int32_t>(call.diff_attrs, function, "diff_attrs", {kAny})};
 }
 
-template <class T>
 py::tuple Interpolate(const py::array& attr, const InterpolateCall& call) {
   constexpr char kName[] = "interpolate";
-  const auto input = InterpolateInputOf<T>(attr, call, kName);
-  const py::array& like = call.rast;
-  const auto channels = static_cast<py::ssize_t>(input.attributes.channels);
-  auto out = NewArray<T>({like.shape(0), like.shape(1), like.shape(2), channels});
-  auto out_da =
-      NewArray<T>({like.shape(0), like.shape(1), like.shape(2), 2 * call.diff_attrs.shape(0)});
-  const nvdiffrast::InterpolateOutput<T> to{NumbersOf(out), NumbersOf(out_da)};
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return nvdiffrast::Interpolate<T>(input, workers, to); });
-  return py::make_tuple(out, out_da);
+  return Dispatch(attr, kName, "attr", [&]<class T>(T) {
+    const auto input = InterpolateInputOf<T>(attr, call, kName);
+    const auto channels = static_cast<py::ssize_t>(input.attributes.channels);
+    std::vector<py::ssize_t> shape = {call.rast.shape(0), call.rast.shape(1), call.rast.shape(2),
+                                      channels};
+    auto out = NewArray<T>(shape);
+    shape[3] = 2 * call.diff_attrs.shape(0);
+    auto out_da = NewArray<T>(shape);
+    const nvdiffrast::InterpolateOutput<T> to{NumbersOf(out), NumbersOf(out_da)};
+    const Workers& workers = SharedWorkers(call.threads);
+    Run(kName, [&] { return nvdiffrast::Interpolate<T>(input, workers, to); });
+    return py::make_tuple(out, out_da);
+  });
 }
 
 // Which gradients to compute.
@@ -167,30 +154,30 @@ std::optional<py::array_t<T>> NewIf(bool wanted, const py::array& like) {
   return wanted ? std::optional(NewArrayLike<T>(like)) : std::nullopt;
 }
 
-template <class T>
 py::tuple InterpolateBackward(const py::array& attr, const InterpolateCall& call,
                               const OptionalArray& d_out, const OptionalArray& d_out_da,
                               const Wanted& wanted) {
   constexpr char kName[] = "interpolate's backward pass";
-  const auto input = InterpolateInputOf<T>(attr, call, kName);
-  const auto channels = static_cast<py::ssize_t>(input.attributes.channels);
-  const nvdiffrast::InterpolateCotangents<T> cotangents{
-      ImageOf<T>(d_out, kName, "the gradient", call.rast, channels),
-      ImageOf<T>(d_out_da, kName, "the gradient of out_da", call.rast,
-                 2 * call.diff_attrs.shape(0))};
-  auto d_attr = NewIf<T>(wanted.at(0), attr), d_rast = NewIf<T>(wanted.at(1), call.rast);
-  auto d_rast_db = NewIf<T>(wanted.at(2), call.rast);
-  const nvdiffrast::InterpolateGradients<T> to{NumbersOf(d_attr), NumbersOf(d_rast),
-                                               NumbersOf(d_rast_db)};
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return nvdiffrast::InterpolateBackward<T>(input, cotangents, workers, to); });
-  return py::make_tuple(d_attr, d_rast, d_rast_db);
+  return Dispatch(attr, kName, "attr", [&]<class T>(T) {
+    const auto input = InterpolateInputOf<T>(attr, call, kName);
+    const auto channels = static_cast<py::ssize_t>(input.attributes.channels);
+    const nvdiffrast::InterpolateCotangents<T> cotangents{
+        ImageOf<T>(d_out, kName, "the gradient", call.rast, channels),
+        ImageOf<T>(d_out_da, kName, "the gradient of out_da", call.rast,
+                   2 * call.diff_attrs.shape(0))};
+    auto d_attr = NewIf<T>(wanted.at(0), attr), d_rast = NewIf<T>(wanted.at(1), call.rast);
+    auto d_rast_db = NewIf<T>(wanted.at(2), call.rast);
+    const nvdiffrast::InterpolateGradients<T> to{NumbersOf(d_attr), NumbersOf(d_rast),
+                                                 NumbersOf(d_rast_db)};
+    const Workers& workers = SharedWorkers(call.threads);
+    Run(kName, [&] { return nvdiffrast::InterpolateBackward<T>(input, cotangents, workers, to); });
+    return py::make_tuple(d_attr, d_rast, d_rast_db);
+  });
 }
 
 struct AntialiasCall {
-  py::array rast, pos, tri;
+  const py::array &rast, &pos, &tri;
   const nvdiffrast::EdgeRings& rings;
-  int threads;
 };
 
 template <class T>
@@ -208,28 +195,32 @@ nvdiffrast::AntialiasInput<T> AntialiasInputOf(const py::array& color, const Ant
           Length(color, 3)};
 }
 
-template <class T>
-py::array Antialias(const py::array& color, const AntialiasCall& call) {
+py::array Antialias(const py::array& color, const py::array& rast, const py::array& pos,
+                    const py::array& tri, const nvdiffrast::EdgeRings& rings, int threads) {
   constexpr char kName[] = "antialias";
-  const auto input = AntialiasInputOf<T>(color, call, kName);
-  auto out = NewArrayLike<T>(color);
-  const auto to = NumbersOf(out);
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return nvdiffrast::Antialias<T>(input, workers, to); });
-  return out;
+  return Dispatch(color, kName, "color", [&]<class T>(T) -> py::array {
+    const auto input = AntialiasInputOf<T>(color, {rast, pos, tri, rings}, kName);
+    auto out = NewArrayLike<T>(color);
+    const auto to = NumbersOf(out);
+    const Workers& workers = SharedWorkers(threads);
+    Run(kName, [&] { return nvdiffrast::Antialias<T>(input, workers, to); });
+    return out;
+  });
 }
 
-template <class T>
-py::tuple AntialiasBackward(const py::array& color, const AntialiasCall& call,
-                            const py::array& gradient, const Wanted& wanted) {
+py::tuple AntialiasBackward(const py::array& color, const py::array& rast, const py::array& pos,
+                            const py::array& tri, const nvdiffrast::EdgeRings& rings,
+                            const py::array& gradient, const Wanted& wanted, int threads) {
   constexpr char kName[] = "antialias's backward pass";
-  const auto input = AntialiasInputOf<T>(color, call, kName);
-  const auto d_out = ImageOf<T>(gradient, kName, "the gradient", color, color.shape(3));
-  auto d_color = NewIf<T>(wanted.at(0), color), d_pos = NewIf<T>(wanted.at(1), call.pos);
-  const nvdiffrast::AntialiasGradients<T> to{NumbersOf(d_color), NumbersOf(d_pos)};
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return nvdiffrast::AntialiasBackward<T>(input, d_out, workers, to); });
-  return py::make_tuple(d_color, d_pos);
+  return Dispatch(color, kName, "color", [&]<class T>(T) {
+    const auto input = AntialiasInputOf<T>(color, {rast, pos, tri, rings}, kName);
+    const auto d_out = ImageOf<T>(gradient, kName, "the gradient", color, color.shape(3));
+    auto d_color = NewIf<T>(wanted.at(0), color), d_pos = NewIf<T>(wanted.at(1), pos);
+    const nvdiffrast::AntialiasGradients<T> to{NumbersOf(d_color), NumbersOf(d_pos)};
+    const Workers& workers = SharedWorkers(threads);
+    Run(kName, [&] { return nvdiffrast::AntialiasBackward<T>(input, d_out, workers, to); });
+    return py::make_tuple(d_color, d_pos);
+  });
 }
 
 void BindNvdiffrastRasterize(py::module_& m) {
@@ -238,32 +229,15 @@ void BindNvdiffrastRasterize(py::module_& m) {
       "Memory that rasterizing reuses. Several threads may share one: whoever finds it at work\n"
       "takes memory of his own.")
       .def(py::init<>())
-      .def(
-          "rasterize",
-          [](NvdiffrastRasterizer& self, const py::array& pos, py::array tri, OptionalArray ranges,
-             int height, int width, OptionalArray peeled, int threads) {
-            const NvdiffrastRasterizer::Call call{std::move(tri), std::move(ranges), height,
-                                                  width,          std::move(peeled), threads};
-            return Dispatch(pos, "rasterize", "pos",
-                            [&](auto t) { return self.Rasterize<decltype(t)>(pos, call); });
-          },
-          py::arg("pos"), py::arg("tri"), py::arg("ranges"), py::arg("height"), py::arg("width"),
-          py::arg("peeled"), py::arg("threads"),
-          "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n"
-          "[N, 2]; tri [F, 3]; peeled [N, height, width] float32: only what lies behind is seen,\n"
-          "and it moves there; infinity at first.");
-  m.def(
-      "nvdiffrast_rasterize_backward",
-      [](const py::array& pos, py::array tri, py::array rast, OptionalArray d_rast,
-         OptionalArray d_rast_db, int threads) {
-        const RasterizeBackwardCall call{std::move(tri), std::move(rast), std::move(d_rast),
-                                         std::move(d_rast_db), threads};
-        return Dispatch(pos, "rasterize's backward pass", "pos",
-                        [&](auto t) { return RasterizeBackward<decltype(t)>(pos, call); });
-      },
-      py::arg("pos"), py::arg("tri"), py::arg("rast"), py::arg("d_rast"), py::arg("d_rast_db"),
-      py::arg("threads"),
-      "The gradient of pos from those of rast and rast_db, either of them None.");
+      .def("rasterize", &NvdiffrastRasterizer::Rasterize, py::arg("pos"), py::arg("tri"),
+           py::arg("ranges"), py::arg("height"), py::arg("width"), py::arg("peeled"),
+           py::arg("threads"),
+           "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n"
+           "[N, 2]; tri [F, 3]; peeled [N, height, width] float32: only what lies behind is seen,\n"
+           "and it moves there; infinity at first.");
+  m.def("nvdiffrast_rasterize_backward", &RasterizeBackward, py::arg("pos"), py::arg("tri"),
+        py::arg("rast"), py::arg("d_rast"), py::arg("d_rast_db"), py::arg("threads"),
+        "The gradient of pos from those of rast and rast_db, either of them None.");
 }
 
 void BindInterpolate(py::module_& m) {
@@ -277,24 +251,11 @@ void BindInterpolate(py::module_& m) {
            }),
            py::kw_only(), py::arg("tri"), py::arg("rast"), py::arg("rast_db"),
            py::arg("diff_attrs"), py::arg("threads"));
-  m.def(
-      "nvdiffrast_interpolate",
-      [](const py::array& attr, const InterpolateCall& call) {
-        return Dispatch(attr, "interpolate", "attr",
-                        [&](auto t) { return Interpolate<decltype(t)>(attr, call); });
-      },
-      py::arg("attr"), py::arg("call"),
-      "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
-  m.def(
-      "nvdiffrast_interpolate_backward",
-      [](const py::array& attr, const InterpolateCall& call, const OptionalArray& d_out,
-         const OptionalArray& d_out_da, const Wanted& wanted) {
-        return Dispatch(attr, "interpolate's backward pass", "attr", [&](auto t) {
-          return InterpolateBackward<decltype(t)>(attr, call, d_out, d_out_da, wanted);
-        });
-      },
-      py::arg("attr"), py::arg("call"), py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"),
-      "The gradients of attr, rast and rast_db, None where not wanted.");
+  m.def("nvdiffrast_interpolate", &Interpolate, py::arg("attr"), py::arg("call"),
+        "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
+  m.def("nvdiffrast_interpolate_backward", &InterpolateBackward, py::arg("attr"), py::arg("call"),
+        py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"),
+        "The gradients of attr, rast and rast_db, None where not wanted.");
 }
 
 void BindAntialias(py::module_& m) {
@@ -305,29 +266,12 @@ void BindAntialias(py::module_& m) {
                  nvdiffrast::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
            }),
            py::arg("tri"));
-  m.def(
-      "nvdiffrast_antialias",
-      [](const py::array& color, py::array rast, py::array pos, py::array tri,
-         const nvdiffrast::EdgeRings& rings, int threads) {
-        const AntialiasCall call{std::move(rast), std::move(pos), std::move(tri), rings, threads};
-        return Dispatch(color, "antialias", "color",
-                        [&](auto t) { return Antialias<decltype(t)>(color, call); });
-      },
-      py::arg("color"), py::arg("rast"), py::arg("pos"), py::arg("tri"), py::arg("rings"),
-      py::arg("threads"), "color [N, H, W, C] with smooth silhouettes.");
-  m.def(
-      "nvdiffrast_antialias_backward",
-      [](const py::array& color, py::array rast, py::array pos, py::array tri,
-         const nvdiffrast::EdgeRings& rings, const py::array& gradient, const Wanted& wanted,
-         int threads) {
-        const AntialiasCall call{std::move(rast), std::move(pos), std::move(tri), rings, threads};
-        return Dispatch(color, "antialias's backward pass", "color", [&](auto t) {
-          return AntialiasBackward<decltype(t)>(color, call, gradient, wanted);
-        });
-      },
-      py::arg("color"), py::arg("rast"), py::arg("pos"), py::arg("tri"), py::arg("rings"),
-      py::arg("gradient"), py::arg("wanted"), py::arg("threads"),
-      "The gradients of color and pos, None where not wanted.");
+  m.def("nvdiffrast_antialias", &Antialias, py::arg("color"), py::arg("rast"), py::arg("pos"),
+        py::arg("tri"), py::arg("rings"), py::arg("threads"),
+        "color [N, H, W, C] with smooth silhouettes.");
+  m.def("nvdiffrast_antialias_backward", &AntialiasBackward, py::arg("color"), py::arg("rast"),
+        py::arg("pos"), py::arg("tri"), py::arg("rings"), py::arg("gradient"), py::arg("wanted"),
+        py::arg("threads"), "The gradients of color and pos, None where not wanted.");
 }
 
 }  // namespace

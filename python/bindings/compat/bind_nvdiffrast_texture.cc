@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "bindings/calls.h"
-#include "bindings/shared_workers.h"
 #include "compat/nvdiffrast/mip.h"
 #include "compat/nvdiffrast/texture.h"
 
@@ -103,92 +102,98 @@ struct TextureArguments {
   }
 };
 
-template <class T>
 py::array Sample(const Levels& levels, const TextureCall& call) {
   constexpr char kName[] = "texture";
-  const TextureArguments<T> arguments(levels, call, kName);
-  auto out =
-      NewArray<T>({call.uv.shape(0), call.uv.shape(1), call.uv.shape(2), ChannelsOf(levels[0])});
-  const auto to = NumbersOf(out);
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] {
-    nvdiffrast::SampleTexture<T>(arguments.input, workers, to);
-    return Status();
+  return Dispatch(call.uv, kName, "uv", [&]<class T>(T) -> py::array {
+    const TextureArguments<T> arguments(levels, call, kName);
+    auto out =
+        NewArray<T>({call.uv.shape(0), call.uv.shape(1), call.uv.shape(2), ChannelsOf(levels[0])});
+    const auto to = NumbersOf(out);
+    const Workers& workers = SharedWorkers(call.threads);
+    Run(kName, [&] {
+      nvdiffrast::SampleTexture<T>(arguments.input, workers, to);
+      return Status();
+    });
+    return out;
   });
-  return out;
 }
 
 // `wanted`: gradients of texels, uv, uv_da, mip_level_bias.
-template <class T>
 py::tuple SampleBackward(const Levels& levels, const TextureCall& call, const py::array& gradient,
                          const std::vector<bool>& wanted) {
   constexpr char kName[] = "texture's backward pass";
-  const TextureArguments<T> arguments(levels, call, kName);
-  const auto d_out =
-      SpanOf<T>(gradient, kName, "the gradient",
-                {call.uv.shape(0), call.uv.shape(1), call.uv.shape(2), ChannelsOf(levels[0])});
-  std::vector<py::array_t<T>> d_levels;
-  std::vector<std::span<T>> spans;
-  for (std::size_t l = 0; l < (wanted.at(0) ? levels.size() : 0); ++l) {
-    d_levels.push_back(NewArrayLike<T>(levels[l]));
-    spans.push_back(NumbersOf(d_levels.back()));
-  }
-  const auto new_if = [](bool want, const OptionalArray& like) {
-    return want && like.has_value() ? std::optional(NewArrayLike<T>(*like)) : std::nullopt;
-  };
-  auto d_uv = new_if(wanted.at(1), call.uv), d_uv_da = new_if(wanted.at(2), call.uv_da);
-  auto d_bias = new_if(wanted.at(3), call.mip_level_bias);
-  const nvdiffrast::TextureGradients<T> to{spans, NumbersOf(d_uv), NumbersOf(d_uv_da),
-                                           NumbersOf(d_bias)};
-  const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] {
-    nvdiffrast::SampleTextureBackward<T>(arguments.input, d_out, workers, to);
-    return Status();
+  return Dispatch(call.uv, kName, "uv", [&]<class T>(T) {
+    const TextureArguments<T> arguments(levels, call, kName);
+    const auto d_out =
+        SpanOf<T>(gradient, kName, "the gradient",
+                  {call.uv.shape(0), call.uv.shape(1), call.uv.shape(2), ChannelsOf(levels[0])});
+    std::vector<py::array_t<T>> d_levels;
+    std::vector<std::span<T>> spans;
+    for (std::size_t l = 0; l < (wanted.at(0) ? levels.size() : 0); ++l) {
+      d_levels.push_back(NewArrayLike<T>(levels[l]));
+      spans.push_back(NumbersOf(d_levels.back()));
+    }
+    const auto new_if = [](bool want, const OptionalArray& like) {
+      return want && like.has_value() ? std::optional(NewArrayLike<T>(*like)) : std::nullopt;
+    };
+    auto d_uv = new_if(wanted.at(1), call.uv), d_uv_da = new_if(wanted.at(2), call.uv_da);
+    auto d_bias = new_if(wanted.at(3), call.mip_level_bias);
+    const nvdiffrast::TextureGradients<T> to{spans, NumbersOf(d_uv), NumbersOf(d_uv_da),
+                                             NumbersOf(d_bias)};
+    const Workers& workers = SharedWorkers(call.threads);
+    Run(kName, [&] {
+      nvdiffrast::SampleTextureBackward<T>(arguments.input, d_out, workers, to);
+      return Status();
+    });
+    return py::make_tuple(d_levels, d_uv, d_uv_da, d_bias);
   });
-  return py::make_tuple(d_levels, d_uv, d_uv_da, d_bias);
 }
 
 // The levels below `tex`.
-template <class T>
 Levels ConstructMip(const py::array& tex, int most, int threads) {
   constexpr char kName[] = "texture_construct_mip";
-  const auto sizes = ValueOrThrow(nvdiffrast::MipSizes(SizeOf(tex), most));
-  const auto channels = static_cast<std::size_t>(ChannelsOf(tex));
-  const Workers& workers = SharedWorkers(threads);
-  Levels out;
-  for (std::size_t l = 1; l < sizes.size(); ++l) {
-    const auto fine = LevelOf<T>(l == 1 ? tex : out.back(), kName);
-    py::array_t<T> coarse = NewArray<T>(LevelShape(tex, sizes[l]));
-    const auto to = NumbersOf(coarse);
-    Run(kName, [&] {
-      nvdiffrast::HalveTexture<T>(fine, channels, workers, to);
-      return Status();
-    });
-    out.push_back(std::move(coarse));
-  }
-  return out;
+  return Dispatch(tex, kName, "tex", [&]<class T>(T) -> Levels {
+    const auto sizes = ValueOrThrow(nvdiffrast::MipSizes(SizeOf(tex), most));
+    const auto channels = static_cast<std::size_t>(ChannelsOf(tex));
+    const Workers& workers = SharedWorkers(threads);
+    Levels out;
+    for (std::size_t l = 1; l < sizes.size(); ++l) {
+      const auto fine = LevelOf<T>(l == 1 ? tex : out.back(), kName);
+      py::array_t<T> coarse = NewArray<T>(LevelShape(tex, sizes[l]));
+      const auto to = NumbersOf(coarse);
+      Run(kName, [&] {
+        nvdiffrast::HalveTexture<T>(fine, channels, workers, to);
+        return Status();
+      });
+      out.push_back(std::move(coarse));
+    }
+    return out;
+  });
 }
 
 // From the gradients of all levels, the texture's first, to that of the texture. Overwrites them.
-template <class T>
-py::array MipBackward(Levels d_levels, int threads) {
+py::array MipBackward(const Levels& d_levels, int threads) {
   constexpr char kName[] = "texture's backward pass";
-  const Workers& workers = SharedWorkers(threads);
-  const auto channels = static_cast<std::size_t>(ChannelsOf(d_levels.at(0)));
-  for (std::size_t l = d_levels.size() - 1; l > 0; --l) {
-    const auto coarse = LevelOf<T>(d_levels[l], kName);
-    py::array_t<T> fine = py::cast<py::array_t<T>>(d_levels[l - 1]);
-    const nvdiffrast::MipSize size = SizeOf(fine);
-    const auto to = NumbersOf(fine);
-    Run(kName, [&] {
-      nvdiffrast::HalveTextureBackward<T>(coarse, size, channels, workers, to);
-      return Status();
-    });
-  }
-  return d_levels[0];
+  return Dispatch(d_levels.at(0), kName, "the gradient", [&]<class T>(T) -> py::array {
+    const Workers& workers = SharedWorkers(threads);
+    const auto channels = static_cast<std::size_t>(ChannelsOf(d_levels.at(0)));
+    for (std::size_t l = d_levels.size() - 1; l > 0; --l) {
+      const auto coarse = LevelOf<T>(d_levels[l], kName);
+      py::array_t<T> fine = py::cast<py::array_t<T>>(d_levels[l - 1]);
+      const nvdiffrast::MipSize size = SizeOf(fine);
+      const auto to = NumbersOf(fine);
+      Run(kName, [&] {
+        nvdiffrast::HalveTextureBackward<T>(coarse, size, channels, workers, to);
+        return Status();
+      });
+    }
+    return d_levels[0];
+  });
 }
 
-void BindCall(py::module_& m) {
+}  // namespace
+
+void BindNvdiffrastTexture(py::module_& m) {
   m.attr("TEXTURE_FILTERS") =
       py::make_tuple("nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear");
   m.attr("TEXTURE_BOUNDARIES") = py::make_tuple("wrap", "clamp", "zero", "cube");
@@ -203,55 +208,15 @@ void BindCall(py::module_& m) {
            }),
            py::kw_only(), py::arg("uv"), py::arg("uv_da"), py::arg("mip_level_bias"),
            py::arg("filter"), py::arg("boundary"), py::arg("threads"));
-}
-
-void BindLookup(py::module_& m) {
-  m.def(
-      "nvdiffrast_texture",
-      [](const Levels& levels, const TextureCall& call) {
-        return Dispatch(call.uv, "texture", "uv",
-                        [&](auto t) { return Sample<decltype(t)>(levels, call); });
-      },
-      py::arg("levels"), py::arg("call"),
-      "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
-  m.def(
-      "nvdiffrast_texture_backward",
-      [](const Levels& levels, const TextureCall& call, const py::array& gradient,
-         const std::vector<bool>& wanted) {
-        return Dispatch(call.uv, "texture's backward pass", "uv", [&](auto t) {
-          return SampleBackward<decltype(t)>(levels, call, gradient, wanted);
-        });
-      },
-      py::arg("levels"), py::arg("call"), py::arg("gradient"), py::arg("wanted"),
-      "The gradients of the levels (a list, empty if not wanted), uv, uv_da and mip_level_bias.");
-}
-
-void BindMip(py::module_& m) {
-  m.def(
-      "nvdiffrast_mip",
-      [](const py::array& tex, int most, int threads) {
-        return Dispatch(tex, "texture_construct_mip", "tex",
-                        [&](auto t) { return ConstructMip<decltype(t)>(tex, most, threads); });
-      },
-      py::arg("tex"), py::arg("most"), py::arg("threads"),
-      "The levels below tex, at most `most` of them, or all if that is negative.");
-  m.def(
-      "nvdiffrast_mip_backward",
-      [](Levels d_levels, int threads) {
-        return Dispatch(d_levels.at(0), "texture's backward pass", "the gradient", [&](auto t) {
-          return MipBackward<decltype(t)>(std::move(d_levels), threads);
-        });
-      },
-      py::arg("d_levels"), py::arg("threads"),
-      "The gradient of a texture from those of all its levels, which are overwritten.");
-}
-
-}  // namespace
-
-void BindNvdiffrastTexture(py::module_& m) {
-  BindCall(m);
-  BindLookup(m);
-  BindMip(m);
+  m.def("nvdiffrast_texture", &Sample, py::arg("levels"), py::arg("call"),
+        "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
+  m.def("nvdiffrast_texture_backward", &SampleBackward, py::arg("levels"), py::arg("call"),
+        py::arg("gradient"), py::arg("wanted"),
+        "The gradients of the levels (a list, empty if not wanted), uv, uv_da and mip_level_bias.");
+  m.def("nvdiffrast_mip", &ConstructMip, py::arg("tex"), py::arg("most"), py::arg("threads"),
+        "The levels below tex, at most `most` of them, or all if that is negative.");
+  m.def("nvdiffrast_mip_backward", &MipBackward, py::arg("d_levels"), py::arg("threads"),
+        "The gradient of a texture from those of all its levels, which are overwritten.");
 }
 
 }  // namespace tilegrad::python
