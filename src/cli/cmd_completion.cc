@@ -8,7 +8,7 @@
 #include <string>
 
 #include "cli/command.h"
-#include "cli/command_tree.h"
+#include "cli/command_line.h"
 #include "cli/console.h"
 
 namespace tilegrad::cli {

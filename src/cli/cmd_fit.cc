@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad fit: images and cameras in, mesh, texture, light or better cameras out.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,19 +14,157 @@
 #include "base/folder_lock.h"
 #include "base/text.h"
 #include "cli/command.h"
+#include "cli/command_line.h"
 #include "cli/console.h"
-#include "cli/fit_outcome.h"
-#include "cli/fit_parameters.h"
-#include "cli/given_options.h"
 #include "cli/live_option.h"
+#include "cli/option_words.h"
 #include "cli/run_folder.h"
+#include "fit/config.h"
 #include "fit/poses/start_cameras.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
+#include "tilegrad/status.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::cli {
 namespace {
+
+// tilegrad fit: what it says at its end.
+
+void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
+  for (const auto& f : findings) {
+    if (f.blocked) {
+      PrintNote("tilegrad: no gradient for {} at the start: {}\n", train::NameOf(f.parameter),
+                f.sentence);
+    } else if (all) {
+      Print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
+    }
+  }
+}
+
+void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) {
+  if (scores.empty()) return;
+  Print("{}: PSNR {:.2f} dB, silhouette IoU {:.1f} %\n", name, train::MeanPsnr(scores),
+        100 * train::MeanIou(scores));
+}
+
+void PrintOutcome(const train::FitOutcome& o, const Path& out, std::int64_t steps) {
+  const bool early = o.last_step < steps;
+  Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
+        FormatDuration(o.seconds), early ? ", for more gained nothing (--stop-gain)" : "");
+  PrintScores("fitted views", o.training);
+  PrintScores("held-out views", o.held_out);
+  if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
+  if (o.camera_error_before && o.camera_error_after) {
+    Print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n", *o.camera_error_before,
+          *o.camera_error_after);
+  }
+  Print("mesh {}\nlook at {}, or at it forming: tilegrad live {}\n", (out / "mesh.glb").string(),
+        (out / "report.html").string(), out.string());
+}
+
+nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {
+  if (scores.empty()) return nullptr;
+  return {{"views", scores.size()},
+          {"psnr", train::MeanPsnr(scores)},
+          {"silhouette_iou", train::MeanIou(scores)}};
+}
+
+void PrintJson(const train::FitOutcome& o, const Path& out) {
+  nlohmann::ordered_json json = {{"folder", out.string()},
+                                 {"steps", o.last_step},
+                                 {"seconds", o.seconds},
+                                 {"training", ScoresJson(o.training)},
+                                 {"held_out", ScoresJson(o.held_out)},
+                                 {"voxel_iou", nullptr},
+                                 {"mesh", (out / "mesh.glb").string()},
+                                 {"report", (out / "report.html").string()}};
+  if (o.voxel_iou) json["voxel_iou"] = *o.voxel_iou;
+  PrintResult(json);
+}
+
+// Of --doctor: what each parameter gets.
+void PrintDiagnosis(const std::vector<train::Finding>& findings) {
+  PrintFindings(findings, true);
+  nlohmann::ordered_json json;
+  for (const auto& f : findings)
+    json.push_back({{"parameter", train::NameOf(f.parameter)},
+                    {"blocked", f.blocked},
+                    {"finding", f.sentence}});
+  PrintResult(json);
+}
+
+// `steps`: the most that it was given.
+void PrintFit(const train::FitOutcome& outcome, const Path& out, std::int64_t steps) {
+  PrintFindings(outcome.findings, false);
+  PrintOutcome(outcome, out, steps);
+  PrintJson(outcome, out);
+}
+
+// The words of tilegrad fit that name what is fitted. Errors say which word, and what there is.
+
+using train::Parameter;
+
+constexpr double kMostRate = 1e6;
+
+Result<Parameter> ParameterNamed(const std::string& name) {
+  std::string known;
+  for (const Parameter p : train::kParameters) {
+    if (name == train::NameOf(p)) return p;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", train::NameOf(p));
+  }
+  return InvalidArgument("cannot fit \"{}\"; choose from {}", name, known);
+}
+
+// Whether a fit of these, which are the mesh and its colours if none is named, may move `p`.
+bool MayMove(const train::ParameterSet& set, Parameter p) {
+  const bool usual =
+      p == Parameter::kPositions || p == Parameter::kColors || p == Parameter::kTexture;
+  return set.empty() ? usual : set[p];
+}
+
+// "positions,texture"
+Status ParseParameters(const std::string& text, train::ParameterSet* out) {
+  for (const std::string& word : PartsBetweenCommas(text)) {
+    TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(word));
+    (*out)[p] = true;
+  }
+  return {};
+}
+
+// "positions=0.01", of a parameter in `fitted`; none there: those that are fitted by default.
+Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
+                 train::LearningRates* rates) {
+  const auto equals = text.find('=');
+  TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(text.substr(0, equals)));
+  const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
+  const auto rate = RealNumber(number);
+  if (!rate || !(*rate >= 0 && *rate < kMostRate)) {
+    return InvalidArgument("--rate {}: expected NAME=NUMBER with a number in [0, {})", text,
+                           kMostRate);
+  }
+  if (!MayMove(fitted, p)) {
+    return InvalidArgument("--rate {}: {} is not fitted; name it in --optimize", text,
+                           train::NameOf(p));
+  }
+  (*rates)[p] = *rate;
+  return {};
+}
+
+// Of --material and --lighting, words that were checked.
+void SetMaterialAndLighting(const std::string& material, const std::string& lighting,
+                            train::FitConfig* config) {
+  static const std::map<std::string, train::MaterialKind> materials = {
+      {"unlit", train::MaterialKind::kUnlit},
+      {"lambert", train::MaterialKind::kLambert},
+      {"phong", train::MaterialKind::kPhong}};
+  static const std::map<std::string, Lighting> lightings = {{"none", Lighting::kNone},
+                                                            {"lambert", Lighting::kLambert},
+                                                            {"phong", Lighting::kPhong},
+                                                            {"sh", Lighting::kSphericalHarmonics}};
+  config->material = materials.at(material);
+  config->lighting = lightings.at(lighting);
+}
 
 struct FitPictures {
   std::string background = "auto";
@@ -66,7 +207,6 @@ void AddPictureOptions(Command* command, FitPictures* o) {
 }
 
 using train::FitConfig;
-using train::Parameter;
 
 struct FitOptions {
   std::string input, dataset_model, out = "fit", start = "auto", truth, optimize;

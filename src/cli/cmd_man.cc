@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "cli/command.h"
-#include "cli/command_tree.h"
+#include "cli/command_line.h"
 #include "cli/console.h"
 #include "tilegrad/version.h"
 

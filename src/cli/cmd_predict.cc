@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and pictures of it all around from each image.
+#include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
 #include <span>
 
 #include "base/error.h"
@@ -11,7 +14,6 @@
 #include "base/progress.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/predict_light.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
 #include "fit/background.h"
@@ -22,15 +24,88 @@
 #include "io/webp_animation.h"
 #include "render/picture/composite.h"
 #include "render/picture/mesh_pictures.h"
+#include "scene/camera_conventions.h"
+#include "scene/light_frame.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/eval/training_pictures.h"
 #include "train/predictor.h"
+#include "train/tasks/textured_image/model.h"
+#include "train/tasks/textured_image/object_pictures.h"
+#include "train/tasks/textured_image/step.h"
 
 namespace tilegrad::cli {
 namespace {
+
+// What predict does with the light that a network of textures and light says.
+
+// `mesh` from where its picture was taken, once around under a light as far from the camera's axis
+// as the predicted one, from where that is: an animated WebP that loops.
+struct Relighting {
+  const train::PredictedObject& object;
+  const train::LightConfig& light;
+  int size;  // pixels a side of the network's pictures
+  const Watch& watch;
+};
+
+constexpr int kLightFrames = 36, kLightFrameMilliseconds = 100, kLightQuality = 85, kLightZoom = 4,
+              kLightSamples = 2;
+constexpr double kLeastTilt = 20 * std::numbers::pi / 180;  // less would not be seen to move
+
+// The light turned about the camera's axis.
+std::array<float, 3> Turned(const std::array<float, 3>& d, double angle) {
+  const double start = std::atan2(d[1], d[0]);
+  const double tilt = std::max(kLeastTilt, std::acos(std::clamp(double{d[2]}, -1.0, 1.0)));
+  return {static_cast<float>(std::sin(tilt) * std::cos(start + angle)),
+          static_cast<float>(std::sin(tilt) * std::sin(start + angle)),
+          static_cast<float>(std::cos(tilt))};
+}
+
+// Whether its network says a light.
+bool PredictsLight(const train::Predictor& predictor) {
+  const auto* const model = predictor.model().textured();
+  return model != nullptr && train::LightingOf(model->config().light) != Lighting::kNone;
+}
+
+// Of one picture, [4][size][size] planar bytes; nothing where the network says no light, or no
+// camera that it is in the axes of.
+Result<std::optional<train::PredictedObject>> PredictLit(const train::Predictor& predictor,
+                                                         std::span<const std::uint8_t> picture) {
+  if (!PredictsLight(predictor)) return std::optional<train::PredictedObject>();
+  TILEGRAD_ASSIGN(auto objects, predictor.model().textured()->PredictObjects(picture));
+  if (!objects[0].camera) return std::optional<train::PredictedObject>();
+  return std::optional(std::move(objects[0]));
+}
+
+// Unit, in the mesh's axes, towards the light.
+glm::dvec3 SunOf(const train::PredictedObject& object, const train::LightConfig& light) {
+  const auto d =
+      DirectionToWorld(train::DirectionOf(object.light, train::LightingOf(light)), *object.camera);
+  return {d[0], d[1], d[2]};
+}
+
+Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& file) {
+  // Harmonics are shown as a direction: turning nine coefficients would turn the sky, too.
+  train::LightConfig light = job.light;
+  if (train::LightingOf(light) == Lighting::kSphericalHarmonics) light.model = "lambert";
+  const int size = kLightZoom * job.size;
+  train::ObjectPictures pictures(light, size, kLightSamples);
+  train::TexturedView view{ScaledCamera(*job.object.camera, kLightZoom), job.object.light};
+  const auto predicted = train::DirectionOf(job.object.light, train::LightingOf(job.light));
+  std::vector<ImageU8> frames;
+  for (int k = 0; k < kLightFrames; ++k) {
+    TILEGRAD_TRY(
+        job.watch.At({"moving the light", static_cast<std::uint64_t>(k), kLightFrames, ""}));
+    view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kLightFrames);
+    TILEGRAD_ASSIGN(const auto rgba, pictures.Draw(mesh, view, train::Appearance::kLit));
+    frames.push_back(train::OnPaper(rgba, size));
+  }
+  return io::SaveWebpAnimation(
+      file, frames,
+      {.frame_ms = kLightFrameMilliseconds, .quality = kLightQuality, .watch = job.watch});
+}
 
 constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableFrames = 36,
               kTurntableSize = 256;

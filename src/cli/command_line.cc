@@ -6,10 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <sstream>
 
 #include "base/did_you_mean.h"
+#include "base/error.h"
+#include "cli/option_words.h"
 #include "tilegrad/version.h"
+#include "train/named_configs.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -144,8 +148,7 @@ std::string Explain(const CLI::App* app, const CLI::Error& error) {
                      name.empty() ? "" : name + " ");
 }
 
-}  // namespace
-
+// Writes to the options' targets when it parses.
 std::unique_ptr<CLI::App> MakeApp(const CommandList& commands) {
   auto app = std::make_unique<CLI::App>(
       "tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
@@ -162,6 +165,8 @@ std::unique_ptr<CLI::App> MakeApp(const CommandList& commands) {
   app->failure_message(Explain);
   return app;
 }
+
+}  // namespace
 
 ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands) {
   const auto app = MakeApp(*commands);
@@ -182,6 +187,153 @@ ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands) {
     option.initial = read->get_default_str();
   }
   return {&*command};
+}
+
+namespace {
+
+// Of "TEXT:{none,lambert}" what stands in the braces.
+std::vector<std::string> ChoicesOf(const std::string& type) {
+  const auto open = type.find('{'), close = type.find('}');
+  if (open == std::string::npos || close == std::string::npos) return {};
+  return PartsBetweenCommas(type.substr(open + 1, close - open - 1));
+}
+
+// What a value is called: option_text "FLOAT x 3", or the type without its range or choices.
+std::string ValueOf(const CLI::Option& option) {
+  if (option.get_type_size_max() == 0 || option.get_expected_max() == 0) return "";
+  const std::string text =
+      option.get_option_text().empty() ? option.get_type_name() : option.get_option_text();
+  return text.substr(0, text.find(':'));
+}
+
+OptionNode NodeOf(const CLI::Option& option) {
+  OptionNode node;
+  node.positional = option.get_positional();
+  if (node.positional) node.names = {option.get_single_name()};
+  for (const auto& name : option.get_snames()) node.names.push_back("-" + name);
+  for (const auto& name : option.get_lnames()) node.names.push_back("--" + name);
+  node.required = option.get_required();
+  node.many = option.get_items_expected_max() > 1000;  // CLI11's "any number"
+  node.value = ValueOf(option);
+  node.choices = ChoicesOf(option.get_type_name());
+  node.path = node.choices.empty() && node.value == "TEXT";
+  if (node.names.back() == "--config") node.choices = ConfigNames();
+  node.initial = option.get_default_str();
+  node.help = option.get_description();
+  return node;
+}
+
+CommandNode NodeOf(const CLI::App& command) {
+  CommandNode node{command.get_name(), command.get_description(), {}};
+  for (const CLI::Option* option : command.get_options()) {
+    if (!option->get_group().empty()) node.options.push_back(NodeOf(*option));  // else: hidden
+  }
+  return node;
+}
+
+}  // namespace
+
+std::vector<std::string> ConfigNames() {
+  std::vector<std::string> names;
+  for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
+  return names;
+}
+
+std::vector<CommandNode> ReadCommandTree(const CommandList& commands) {
+  const auto app = MakeApp(commands);
+  std::vector<CommandNode> tree = {NodeOf(*app)};
+  for (const CLI::App* command :
+       std::as_const(*app).get_subcommands([](const CLI::App*) { return true; }))
+    tree.push_back(NodeOf(*command));
+  return tree;
+}
+
+namespace {
+
+constexpr const char* kGivenHead = "# What the command was given; --resume goes on with it.\n";
+constexpr const char* kGivenIs = " = ";
+
+// A line break and the backslash itself.
+std::string Escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '\n' || c == '\\') out += '\\';
+    out += c == '\n' ? 'n' : c;
+  }
+  return out;
+}
+
+std::string Unescaped(const std::string& text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool escape = text[i] == '\\' && i + 1 < text.size();
+    if (escape) ++i;
+    out += escape && text[i] == 'n' ? '\n' : text[i];
+  }
+  return out;
+}
+
+// Also 1 and 1.0, and two names of a file.
+bool IsSame(const std::string& a, const std::string& b) {
+  const auto x = RealNumber(a), y = RealNumber(b);
+  std::error_code error;
+  return a == b || (x && y && *x == *y) || std::filesystem::equivalent(a, b, error);
+}
+
+Status CheckSame(const Continuation& before, const Option& option, const std::string& now) {
+  const auto then = before.then.find(option.FirstName());
+  const std::string was = then != before.then.end() ? then->second : option.initial;
+  if (before.may_differ.contains(option.FirstName()) || IsSame(was, now)) return {};
+  return InvalidArgument("{}: was {}, is {}; leave it out to resume, or start anew with --force",
+                         option.FirstName(), was.empty() ? "not given" : was, now);
+}
+
+}  // namespace
+
+GivenOptions GivenOf(const Command& command) {
+  GivenOptions out;
+  for (const Option& option : command.options) {
+    if (!option.words.empty())
+      out[option.FirstName()] = fmt::format("{}", fmt::join(option.words, ","));
+  }
+  return out;
+}
+
+Status WriteGiven(const Path& file, const GivenOptions& given) {
+  std::string text = kGivenHead;
+  for (const auto& [name, value] : given) text += name + kGivenIs + Escaped(value) + "\n";
+  return WriteTextAtomic(file, text);
+}
+
+Result<GivenOptions> ReadGiven(const Path& file) {
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  std::istringstream lines(text);
+  GivenOptions out;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.starts_with('#')) continue;
+    const std::size_t is = line.find(kGivenIs);
+    if (is == std::string::npos)
+      return DataLoss("{}: \"{}\" is not of the form option = value", file.string(), line);
+    out[line.substr(0, is)] = Unescaped(line.substr(is + std::string(kGivenIs).size()));
+  }
+  return out;
+}
+
+Status ContinueWith(const Continuation& before, Command* command, CommandList* list) {
+  GivenOptions all = GivenOf(*command);
+  for (const Option& option : command->options) {
+    if (!option.words.empty()) TILEGRAD_TRY(CheckSame(before, option, all.at(option.FirstName())));
+  }
+  const bool instead = std::ranges::any_of(
+      before.instead, [&](const std::string& name) { return all.contains(name); });
+  for (const auto& [name, value] : before.then) {
+    if (!instead || !before.instead.contains(name)) all.emplace(name, value);
+  }
+  std::vector<std::string> words = {command->name};
+  for (const auto& [name, value] : all)
+    words.push_back(name.starts_with('-') ? name + "=" + value : value);
+  const ParsedLine line = ParseLine(std::move(words), list);
+  return line.command != nullptr ? Status() : InvalidArgument("--resume: {}", line.note);
 }
 
 }  // namespace tilegrad::cli

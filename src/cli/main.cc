@@ -60,7 +60,6 @@ Status CheckFirstWord(const CommandList& commands, std::string* word) {
   if (std::find(known.begin(), known.end(), *word) != known.end()) return {};
   const std::vector<std::string> options = {"--help", "--version"};
   if (*word == "-h" || std::find(options.begin(), options.end(), *word) != options.end()) return {};
-  if (*word == "figure2") return InvalidArgument("figure2 is examples/python/figure2.py now");
   const bool option = word->starts_with('-');
   return InvalidArgument("unknown {} \"{}\"{}; see tilegrad --help", option ? "option" : "command",
                          *word, DidYouMean(*word, option ? options : known));
