@@ -6,7 +6,7 @@
 #include <system_error>
 #include <thread>
 
-#include "base/thread_data.h"
+#include "base/parallel.h"
 #include "bindings/to_python.h"
 
 namespace tilegrad::python {

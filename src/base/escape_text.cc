@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "base/escape_html.h"
 #include "base/text.h"
 
 namespace tilegrad {
@@ -19,6 +18,24 @@ bool IsControl(std::uint32_t code) {
                      (code >= 0x2066 && code <= 0x2069);  // of the direction of writing
   const bool breaks = code == 0x2028 || code == 0x2029;   // of lines and paragraphs
   return (code < 0x20 && !layout) || (code >= 0x7f && code < 0xa0) || marks || breaks;
+}
+
+// "&lt;" for '<'; empty for characters that need none.
+std::string_view HtmlEntity(char c) {
+  switch (c) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    case '\'':
+      return "&#39;";
+    default:
+      return "";
+  }
 }
 
 }  // namespace
@@ -59,6 +76,15 @@ std::string EscapeCsv(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + '"';
+}
+
+std::string EscapeHtml(std::string_view text) {
+  std::string out;
+  for (const char c : EscapeControls(text)) {
+    const std::string_view entity = HtmlEntity(c);
+    entity.empty() ? out += c : out += entity;
+  }
+  return out;
 }
 
 }  // namespace tilegrad

@@ -19,4 +19,9 @@ std::string EscapeMarkdown(std::string_view text);
 // A field of a CSV file (RFC 4180): in quotes where it needs them.
 std::string EscapeCsv(std::string_view text);
 
+// Text for HTML or XML, between tags or in a quoted attribute. What EscapeControls
+// makes visible is visible there, too: a mark of writing direction would turn what stands beside
+// it.
+std::string EscapeHtml(std::string_view text);
+
 }  // namespace tilegrad

@@ -3,7 +3,9 @@
 // must not).
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <new>
 #include <type_traits>
 #include <utility>
 
@@ -27,6 +29,64 @@ class FunctionRef<R(A...)> {
  private:
   void* object_;
   R (*call_)(void*, A...);
+};
+
+// A callable that owns what it captures without a heap allocation.
+
+template <class Signature, std::size_t kBytes>
+class InlineFunction;
+
+// Holds any callable of at most kBytes; a larger one does not compile.
+template <class R, class... A, std::size_t kBytes>
+class InlineFunction<R(A...), kBytes> {
+ public:
+  InlineFunction() = default;
+  InlineFunction(std::nullptr_t) {}  // NOLINT: implicit, as std::function's
+  template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, InlineFunction>>>
+  InlineFunction(F&& f) {  // NOLINT: implicit by design
+    using Held = std::decay_t<F>;
+    static_assert(sizeof(Held) <= kBytes && alignof(Held) <= alignof(std::max_align_t));
+    ::new (static_cast<void*>(bytes_)) Held(std::forward<F>(f));
+    call_ = [](std::byte* held, A... a) -> R {
+      return (*Pointer<Held>(held))(std::forward<A>(a)...);
+    };
+    move_ = [](std::byte* held, std::byte* to) {
+      if (to != nullptr) ::new (static_cast<void*>(to)) Held(std::move(*Pointer<Held>(held)));
+      std::destroy_at(Pointer<Held>(held));
+    };
+  }
+  InlineFunction(InlineFunction&& other) noexcept { Take(other); }
+  InlineFunction& operator=(InlineFunction&& other) noexcept {
+    if (this != &other) {
+      Reset();
+      Take(other);
+    }
+    return *this;
+  }
+  ~InlineFunction() { Reset(); }
+
+  explicit operator bool() const { return call_ != nullptr; }
+  R operator()(A... a) { return call_(bytes_, std::forward<A>(a)...); }
+
+ private:
+  template <class Held>
+  static Held* Pointer(std::byte* held) {
+    return std::launder(reinterpret_cast<Held*>(held));
+  }
+  void Reset() {
+    call_ = nullptr;
+    if (auto* move = std::exchange(move_, nullptr); move != nullptr) move(bytes_, nullptr);
+  }
+  void Take(InlineFunction& other) {
+    if (other.move_ == nullptr) return;
+    call_ = std::exchange(other.call_, nullptr);
+    move_ = std::exchange(other.move_, nullptr);
+    move_(other.bytes_, bytes_);
+  }
+
+  alignas(std::max_align_t) std::byte bytes_[kBytes];
+  R (*call_)(std::byte* held, A... a) = nullptr;
+  void (*move_)(std::byte* held, std::byte* to) = nullptr;  // destroys; moves first unless null
 };
 
 }  // namespace tilegrad

@@ -10,10 +10,32 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "base/json_nesting.h"
 #include "base/text.h"
 
 namespace tilegrad {
+
+// Guards against deeply nested JSON: the parser, and any code that copies or writes the values,
+// recurses as deep as they are nested.
+//
+// The position of the first bracket nested within `most` others; npos if there is none. The text
+// need not be valid.
+inline std::size_t FirstNestedDeeper(std::string_view json, int most) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (quoted) {
+      i += c == '\\' ? 1 : 0;
+    } else if (c == '{' || c == '[') {
+      if (++depth > most) return i;
+    } else if (c == '}' || c == ']') {
+      --depth;
+    }
+  }
+  return std::string_view::npos;
+}
 
 // change(text) for every text in `json`, names of members left out.
 template <class Json, class Change>

@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "base/sanitizers.h"
-#include "base/thread_data.h"
 
 namespace tilegrad {
 namespace {
@@ -279,5 +278,26 @@ void Workers::ForRanges(std::size_t n, std::size_t grain,
     task(i * grain, std::min(n, (i + 1) * grain), worker);
   });
 }
+
+static_assert(kMostCores == CPU_SETSIZE);
+
+int MachineCores() { return static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN)); }
+
+void KeepToCores(std::span<const int> cores) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const int core : cores) {
+    if (core >= 0 && core < kMostCores) CPU_SET(core, &set);
+  }
+  if (CPU_COUNT(&set) > 0) sched_setaffinity(0, sizeof(set), &set);
+}
+
+namespace {
+
+thread_local volatile int t_exceptions = 0;  // volatile: a compiler leaves out what nobody reads
+
+}  // namespace
+
+void ReserveThreadData() { t_exceptions = std::uncaught_exceptions(); }
 
 }  // namespace tilegrad

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <span>
 
 #include "base/function_ref.h"
 
@@ -82,5 +83,20 @@ const char* TakeThreadNotice();
 
 // The cores this process may run on (its affinity mask), at least 1.
 int AvailableCores();
+
+inline constexpr int kMostCores = 1024;  // numbers are below
+
+// How many the machine has switched on, whether or not this process may use them.
+int MachineCores();
+
+// Keeps the calling thread, and those it starts, to these cores. Where the system refuses, it stays
+// where it may run: only speed is at stake. Numbers out of range are left out.
+void KeepToCores(std::span<const int> cores);
+
+// For a thread that has just started. Of libraries that are loaded at run time, as Python loads
+// ours, glibc allocates a thread's own variables at their first use, and ends the process where it
+// cannot. Those of C++'s runtime are first used by the thread's first exception: mostly
+// std::bad_alloc.
+void ReserveThreadData();
 
 }  // namespace tilegrad

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-#include "base/inline_function.h"
+#include "base/function_ref.h"
 #include "base/inline_vector.h"
 #include "nn/context.h"
 #include "nn/tensor.h"

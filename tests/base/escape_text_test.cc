@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "base/escape_html.h"
-
 namespace tilegrad::escape_text_test {
 
 TEST(EscapeControls, KeepsTextOfEveryLanguage) {

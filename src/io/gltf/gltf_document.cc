@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "base/json_nesting.h"
+#include "base/json_text.h"
 #include "base/text.h"
 #include "io/gltf/gltf_extensions.h"
 #include "io/mesh_readers.h"

@@ -9,7 +9,6 @@
 #include <cstring>
 #include <initializer_list>
 
-#include "base/cores.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "base/parallel.h"

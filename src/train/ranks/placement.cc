@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "base/cores.h"
+#include "base/parallel.h"
 
 namespace tilegrad::train {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "base/escape_html.h"
+#include "base/escape_text.h"
 #include "scene/image.h"
 #include "tilegrad/status.h"
 

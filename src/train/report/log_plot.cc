@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/escape_html.h"
+#include "base/escape_text.h"
 #include "base/whole_number.h"
 
 namespace tilegrad::train {

@@ -7,7 +7,6 @@
 
 #include <thread>
 
-#include "base/cores.h"
 #include "base/parallel.h"
 #include "support/temp_folder.h"
 

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/json_nesting.h"
+#include "base/json_text.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
 #include "io/picture_names.h"
