@@ -17,7 +17,7 @@
 #include <cstdint>
 #include <span>
 
-#include "raster/scalar.h"
+#include "base/scalar.h"
 
 namespace tilegrad::compat {
 
@@ -43,7 +43,7 @@ std::array<T, 3> CornerAreas(const T* v, const T& px, const T& py) {
 // S + sign(S) eps.
 template <class T>
 T WeightDenominator(const T& area, const T& eps) {
-  return std::signbit(raster::RealPart(area)) ? area - eps : area + eps;
+  return std::signbit(RealPart(area)) ? area - eps : area + eps;
 }
 
 // w_k at p; all 0 where the face has no area.
@@ -51,7 +51,7 @@ template <class T>
 std::array<T, 3> ScreenWeights(const T* corners, const T& px, const T& py, const T& eps) {
   std::array<T, 3> w = CornerAreas(corners, px, py);
   const T area = (w[0] + w[1]) + w[2];
-  if (raster::RealPart(area) == 0) return {T(0), T(0), T(0)};
+  if (RealPart(area) == 0) return {T(0), T(0), T(0)};
   for (T& weight : w) weight /= WeightDenominator(area, eps);
   return w;
 }

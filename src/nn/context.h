@@ -11,7 +11,6 @@
 #include "base/parallel.h"
 #include "nn/kernels/kernel_context.h"
 #include "nn/memory.h"
-#include "nn/step_memory.h"
 #include "nn/tensor.h"
 #include "tilegrad/status.h"
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/layers.h"
 
-#include "nn/init.h"
+#include <algorithm>
+#include <cmath>
+
 #include "nn/named_tensors.h"
 #include "nn/ops/matmul.h"
 #include "nn/ops/pointwise.h"
@@ -158,6 +160,61 @@ void Residual::Visit(const std::string& prefix, ModuleVisitor& visitor) {
 
 void Sequential::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   for (const auto& [name, module] : children_) module->Visit(prefix + name + ".", visitor);
+}
+
+namespace {
+
+template <class Draw>
+void FillBy(Tensor& tensor, const Draw& draw) {
+  WithFloatType(tensor.dtype(), [&]<class T>(T) {
+    std::generate_n(tensor.data<T>(), tensor.elements(), [&] { return static_cast<T>(draw()); });
+  });
+}
+
+}  // namespace
+
+void FillConstant(Tensor& tensor, double value) {
+  FillBy(tensor, [value] { return value; });
+}
+
+void FillNormal(Tensor& tensor, Rng& rng, double deviation) {
+  FillBy(tensor, [&] { return deviation * rng.Normal(); });
+}
+
+void FillUniform(Tensor& tensor, Rng& rng, double low, double high) {
+  FillBy(tensor, [&] { return rng.Uniform(low, high); });
+}
+
+void FillDefault(Tensor& tensor, Rng& rng, std::int64_t fan_in) {
+  const double bound = 1.0 / std::sqrt(static_cast<double>(std::max<std::int64_t>(1, fan_in)));
+  FillUniform(tensor, rng, -bound, bound);
+}
+
+Var LeakyRelu02(const Var& x) { return LeakyRelu(x, 0.2); }
+
+void AddConvBlock(Sequential& net, const std::string& name, Context& context,
+                  const ConvBlock& block, Rng& rng) {
+  ConvShape shape = block.conv;
+  shape.bias = shape.bias && !block.norm;
+  net.Add<Conv2dLayer>(name + ".conv", context, shape, rng);
+  const bool fused = block.norm && block.activation == &Relu;
+  if (block.norm) {
+    net.Add<BatchNorm>(name + ".norm", context, shape.out, BatchNormOptions{.relu = fused});
+  }
+  if (block.activation != nullptr && !fused) net.Add<Activation>(name + ".act", block.activation);
+}
+
+LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
+                       std::int64_t out, Rng& rng) {
+  return net.Add<LinearLayer>(name, context, LinearShape{.in = in, .out = out}, rng);
+}
+
+void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
+                      std::int64_t channels, Rng& rng) {
+  Sequential& body = net.Add<Residual>(name).body;
+  const ConvShape conv{.in = channels, .out = channels, .options = {.padding = 1}};
+  AddConvBlock(body, "1", context, {.conv = conv, .norm = true, .activation = &Relu}, rng);
+  AddConvBlock(body, "2", context, {.conv = conv, .norm = true}, rng);
 }
 
 }  // namespace tilegrad::nn

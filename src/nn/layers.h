@@ -17,6 +17,7 @@
 #include "nn/ops/batch_norm.h"
 #include "nn/ops/conv.h"
 #include "nn/tape.h"
+#include "nn/tensor.h"
 
 namespace tilegrad::nn {
 
@@ -150,5 +151,38 @@ class Residual : public Module {
 
   Sequential body;
 };
+
+// Initial values of parameters. The stream of random numbers is the caller's, so equal seeds
+// give equal networks for any number of workers.
+
+void FillConstant(Tensor& tensor, double value);
+void FillNormal(Tensor& tensor, Rng& rng, double deviation);          // N(0, deviation^2)
+void FillUniform(Tensor& tensor, Rng& rng, double low, double high);  // [low, high)
+
+// What PyTorch gives to linear and convolution weights and to their biases by default: uniform in
+// +-1/sqrt(fan_in) (He et al. 2015 with a = sqrt 5).
+void FillDefault(Tensor& tensor, Rng& rng, std::int64_t fan_in);
+
+// What networks are put together from.
+
+// Adds convolution, batch norm and activation to `net` as "<name>.conv", "<name>.norm",
+// "<name>.act". A convolution that a norm follows has no bias: the norm would take it out again.
+struct ConvBlock {
+  ConvShape conv;
+  bool norm = false;
+  Activation::Function activation = nullptr;
+};
+void AddConvBlock(Sequential& net, const std::string& name, Context& context,
+                  const ConvBlock& block, Rng& rng);
+
+LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
+                       std::int64_t out, Rng& rng);
+
+// "name": x + two 3x3 convolutions of x, of as many channels, the first followed by norm and ReLU,
+// the second by norm.
+void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
+                      std::int64_t channels, Rng& rng);
+
+Var LeakyRelu02(const Var& x);  // LeakyRelu of slope 0.2, as an Activation
 
 }  // namespace tilegrad::nn

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "nn/address_arena.h"
-#include "nn/step_memory.h"
 
 namespace tilegrad::nn {
 

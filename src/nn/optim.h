@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adam, and the norm of a gradient. Learning-rate schedules: schedule.h.
+// Adam, the norm of a gradient, averages of weights, learning rates.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "nn/context.h"
 #include "nn/kernels/adam.h"
 #include "nn/layers.h"
+#include "nn/named_tensors.h"
 #include "nn/tape.h"
 
 namespace tilegrad::nn {
@@ -103,5 +108,53 @@ double GlobalNorm(Context& context, std::span<const Gradient> gradients);  // co
 bool IsFinite(Context& context, std::span<const Gradient> gradients);
 // The factor that brings a norm above `max_norm` down to it: min(1, max_norm / norm).
 double ClipFactor(double norm, double max_norm);
+
+// Exponential moving average of weights, for evaluation: smoother than the weights in
+// training.
+//
+//   MovingAverage average(context, State(net), 0.999);
+//   ... each step:      average.Update();
+//   ... to evaluate:    LoadState(other_net, average.values());
+
+class MovingAverage {
+ public:
+  // Watches `tensors` (of kF32 or kF64), whose storage it shares; starts as a copy of them.
+  MovingAverage(Context& context, std::vector<NamedTensor> tensors, double decay);
+  void Update();  // average = decay average + (1 - decay) tensor
+
+  const std::vector<NamedTensor>& values() const { return averages_; }  // by the tensors' names
+  // "ema.<name>". Loading restores the same bits; errors as CopyByName.
+  std::vector<NamedTensor> State() const;
+  Status LoadState(const std::vector<NamedTensor>& state) { return CopyByName(state, State()); }
+
+ private:
+  Context& context_;
+  double decay_;
+  std::vector<NamedTensor> tensors_, averages_;
+};
+
+// The averages in `state`, which may hold anything else too, under the names of their tensors.
+std::vector<NamedTensor> Averages(const std::vector<NamedTensor>& state);
+
+// Learning rates that follow the step (0, 1, ..): pure functions, so a resumed run needs no state.
+//
+//   adam.options().learning_rate = WarmedUp(CosineRate(1e-3, {.steps = 10000}, step), 100, step);
+
+// From the rate at step 0 along half a cosine to final_factor times the rate at `steps`, and that
+// from there on (Loshchilov, Hutter 2017). steps >= 1.
+struct CosineSchedule {
+  std::int64_t steps = 1;
+  double final_factor = 0;
+};
+inline double CosineRate(double rate, const CosineSchedule& schedule, std::int64_t step) {
+  const double progress = static_cast<double>(step) / static_cast<double>(schedule.steps);
+  const double cosine = 0.5 * (1 + std::cos(std::numbers::pi * std::min(progress, 1.0)));
+  return rate * (schedule.final_factor + (1 - schedule.final_factor) * cosine);
+}
+
+// Rises to `rate` in equal steps: 1/steps of it at step 0, all of it at step steps - 1.
+inline double WarmedUp(double rate, std::int64_t steps, std::int64_t step) {
+  return step < steps ? rate * static_cast<double>(step + 1) / static_cast<double>(steps) : rate;
+}
 
 }  // namespace tilegrad::nn

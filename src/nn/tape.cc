@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/tape.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "nn/ops/matmul.h"
@@ -87,6 +89,104 @@ bool IsPossibleResult(const char* op, const Var& operand, const Shape& result) {
   operand.context().Fail(InvalidArgument("{}: {} would give {}, which no tensor can be", op,
                                          operand.shape().ToString(), result.ToString()));
   return false;
+}
+
+namespace {
+
+// Releases what `node` depends on; prepends nodes without another owner to the list `doomed`.
+void Dismantle(Node& node, std::shared_ptr<Node>& doomed) {
+  node.rule = nullptr;  // its Vars are of the nodes that the edges still hold
+  for (Node::Edge& edge : node.edges) {
+    const std::shared_ptr<Node> below = std::move(edge.node);
+    if (below.use_count() != 1) continue;
+    below->next_doomed = std::move(doomed);
+    doomed = below;
+  }
+}
+
+}  // namespace
+
+// A loop, since recursive destruction of a long chain would overflow the stack after some hundred
+// thousand nodes.
+Node::~Node() {
+  std::shared_ptr<Node> doomed;
+  Dismantle(*this, doomed);
+  while (doomed) {
+    const std::shared_ptr<Node> node = std::move(doomed);
+    doomed = std::move(node->next_doomed);
+    Dismantle(*node, doomed);
+  }
+}
+
+std::shared_ptr<Node> MakeNode(Context& context, const OpInfo& info, std::span<const Var> inputs) {
+  auto node = std::allocate_shared<Node>(context.allocator<Node>());
+  node->info = info;
+  node->order = context.NextOrder();
+  for (const Var& input : inputs) node->edges.push_back({input.node(), input.slot()});
+  return node;
+}
+
+bool WantsNode(const Context& context, std::span<const Var> inputs) {
+  return context.recording() &&
+         std::any_of(inputs.begin(), inputs.end(), [](const Var& v) { return v.requires_grad(); });
+}
+
+// Operations whose value and adjoint are computed outside of the library.
+
+namespace {
+
+// The adjoints of an external operation's inputs. Where a graph of them is wanted they are marked,
+// so that asking for a second derivative is an error rather than a silent zero.
+Vars ExternalBackward(const ExternalOp& op, Context& context, std::span<const Var> d_outputs) {
+  std::vector<Tensor> tensors;
+  for (const Var& d : d_outputs) tensors.push_back(d.value());
+  std::vector<Tensor> d_inputs = op.backward(tensors);
+  if (d_inputs.size() != op.inputs.size()) {
+    context.Fail(InternalError("{}: backward returned {} adjoints for {} inputs", op.name,
+                               d_inputs.size(), op.inputs.size()));
+    return {};
+  }
+  std::vector<Var> parents = op.inputs;
+  for (const Var& d : d_outputs) {
+    if (d.valid()) parents.push_back(d);
+  }
+  const auto refuse = [&context, name = op.name](const Adjoint&) {
+    context.Fail(InvalidArgument("{} has a first derivative only", name));
+    return Vars();
+  };
+  Vars result;
+  for (std::size_t i = 0; i < d_inputs.size(); ++i) {
+    if (!d_inputs[i].empty() && !(d_inputs[i].shape() == op.inputs[i].shape())) {
+      context.Fail(InternalError("{}: adjoint {} has shape {}, its input {}", op.name, i,
+                                 d_inputs[i].shape().ToString(), op.inputs[i].shape().ToString()));
+      return {};
+    }
+    result.push_back(d_inputs[i].empty() ? Var() : Record({op.name}, d_inputs[i], parents, refuse));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<Var> External(Context& context, ExternalOp op) {
+  std::vector<Var> result;
+  for (const Var& input : op.inputs) {
+    if (!input.valid()) return std::vector<Var>(op.outputs.size(), Var(context, Tensor()));
+  }
+  std::shared_ptr<Node> node;
+  if (WantsNode(context, op.inputs)) {
+    node = MakeNode(context, {op.name}, op.inputs);
+    node->slots = static_cast<int>(op.outputs.size());
+  }
+  int slot = 0;
+  for (Tensor& output : op.outputs) result.emplace_back(context, output, node, slot++);
+  op.outputs.clear();  // the graph need not hold them
+  if (node) {
+    node->rule = [&context, op = std::move(op)](const Adjoint& adjoint) {
+      return ExternalBackward(op, context, adjoint.d_outputs());
+    };
+  }
+  return result;
 }
 
 }  // namespace tilegrad::nn

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "base/scalar.h"
 #include "raster/conventions.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

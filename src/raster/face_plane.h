@@ -11,9 +11,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/scalar.h"
 #include "raster/conventions.h"
 #include "raster/coverage.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

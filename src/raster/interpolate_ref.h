@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <span>
 
+#include "base/scalar.h"
 #include "raster/attributes.h"
 #include "raster/face_plane.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

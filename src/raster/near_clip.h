@@ -11,9 +11,9 @@
 #include <span>
 #include <tuple>
 
+#include "base/scalar.h"
 #include "raster/attributes.h"
 #include "raster/coverage.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 #include "scene/camera.h"
 

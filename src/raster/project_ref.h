@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <span>
 
+#include "base/scalar.h"
 #include "raster/near_clip.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 #include "scene/camera.h"
 

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "base/scalar.h"
 #include "raster/coverage.h"
 #include "raster/face_plane.h"
 #include "raster/fragments.h"
-#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

@@ -72,7 +72,7 @@ MUTANTS = [
            "  out.translation[0] = -out.translation[0];\n", "", ["train_run"]),
     Mutant("Adam's first moment is not corrected", "src/nn/optim.cc",
            "options_.learning_rate / (1.0 - std::pow(options_.beta1, t))", "options_.learning_rate", ["nn_optim"]),
-    Mutant("the rate falls along a whole cosine", "src/nn/schedule.h",
+    Mutant("the rate falls along a whole cosine", "src/nn/optim.h",
            "std::numbers::pi * std::min(progress, 1.0)", "2 * std::numbers::pi * std::min(progress, 1.0)", ["nn_optim"]),
 ]
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Colours looked up in the picture: values by hand, complex-step derivatives, extremes, bits.
-#include "nn/ops/sample_colors.h"
-
 #include <gtest/gtest.h>
 
 #include <complex>
@@ -11,6 +9,7 @@
 #include "base/simd_target.h"
 #include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
+#include "nn/ops/sample_pictures.h"
 
 namespace tilegrad::nn::sample_colors_test {
 

@@ -16,8 +16,8 @@
 #include <array>
 #include <cstddef>
 
+#include "base/scalar.h"
 #include "compat/projected_faces.h"
-#include "raster/scalar.h"
 
 namespace tilegrad::compat::pytorch3d {
 
@@ -45,7 +45,7 @@ struct FragmentWeights {
 
 template <class T>
 T AtLeast(const T& value, double least) {
-  return raster::RealPart(value) < raster::RealPart(T(least)) ? T(least) : value;
+  return RealPart(value) < RealPart(T(least)) ? T(least) : value;
 }
 
 // Corners [3,3]: x, y, z.
@@ -90,9 +90,9 @@ BoundaryPoint<T> NearestOnEdge(const T* v, std::size_t k, const T& px, const T& 
   const T ex = b[0] - a[0], ey = b[1] - a[1];
   const T length = ex * ex + ey * ey;
   T t = T(1);
-  if (raster::RealPart(length) > kFragmentEps) t = ((px - a[0]) * ex + (py - a[1]) * ey) / length;
-  if (raster::RealPart(t) < 0) t = T(0);
-  if (raster::RealPart(t) > 1) t = T(1);
+  if (RealPart(length) > kFragmentEps) t = ((px - a[0]) * ex + (py - a[1]) * ey) / length;
+  if (RealPart(t) < 0) t = T(0);
+  if (RealPart(t) > 1) t = T(1);
   const T rx = px - a[0] - t * ex, ry = py - a[1] - t * ey;
   return {k, t, rx, ry, rx * rx + ry * ry};
 }
@@ -102,15 +102,14 @@ BoundaryPoint<T> NearestOnBoundary(const T* v, const T& px, const T& py) {
   BoundaryPoint<T> best = NearestOnEdge(v, 0, px, py);
   for (std::size_t k = 1; k < 3; ++k) {
     const BoundaryPoint<T> other = NearestOnEdge(v, k, px, py);
-    if (raster::RealPart(other.squared) < raster::RealPart(best.squared)) best = other;
+    if (RealPart(other.squared) < RealPart(best.squared)) best = other;
   }
   return best;
 }
 
 template <class T>
 bool IsInside(const FragmentWeights<T>& at) {
-  return raster::RealPart(at.w[0]) > 0 && raster::RealPart(at.w[1]) > 0 &&
-         raster::RealPart(at.w[2]) > 0;
+  return RealPart(at.w[0]) > 0 && RealPart(at.w[1]) > 0 && RealPart(at.w[2]) > 0;
 }
 
 template <class T>
@@ -127,7 +126,7 @@ template <class T>
 std::array<T, 3> NormalizeBackward(const std::array<T, 3>& y, const T& sum, double least,
                                    const std::array<T, 3>& d_y) {
   const T along = d_y[0] * y[0] + d_y[1] * y[1] + d_y[2] * y[2];
-  const bool kept_up = raster::RealPart(sum) < raster::RealPart(T(least));
+  const bool kept_up = RealPart(sum) < RealPart(T(least));
   const T denominator = AtLeast(sum, least);
   std::array<T, 3> d_x;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -164,7 +163,7 @@ void FragmentBackward(const T* v, const T& px, const T& py, const FragmentRule& 
   if (rule.clip_barycentrics) {
     d = NormalizeBackward(at.c, at.clipped_sum, kLeastClippedSum, d);
     for (std::size_t k = 0; k < 3; ++k) {
-      if (!(raster::RealPart(at.w[k]) > 0)) d[k] = T(0);
+      if (!(RealPart(at.w[k]) > 0)) d[k] = T(0);
     }
   }
   if (rule.perspective_correct) {

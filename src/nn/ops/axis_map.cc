@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/axis_map.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
 #include "nn/kernels/axis_map.h"
+#include "nn/ops/shape.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -81,6 +84,82 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
   return Record({"map axis"}, std::move(y), {x}, [axis, map](const Adjoint& adj) {
     return Vars{MapAxis(adj.dy(), axis, Transposed(adj.dy().context(), map))};
   });
+}
+
+namespace {
+
+// The element of [0, extent) that stands at position i, which may lie outside.
+std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
+  if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
+  return std::clamp<std::int64_t>(i, 0, extent - 1);
+}
+
+}  // namespace
+
+Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode mode) {
+  if (!Usable("pad", {&x})) return Invalid({&x});
+  if (mode == PadMode::kZero) return Pad(x, axis, before, after);
+  const std::int64_t extent = axis >= 0 && axis < x.shape().rank() ? x.shape()[axis] : 0;
+  const std::int64_t most = std::max(before, after);
+  if (extent <= 0 || before < 0 || after < 0 || most > AxisMap::kMostExtent ||
+      before + extent + after > AxisMap::kMostExtent) {
+    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", before, after,
+                                   axis, x.shape().ToString()));
+  }
+  if (most == 0) return x;
+  Shape padded = x.shape();
+  padded[axis] += before + after;
+  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
+  const AxisMap map = MakeAxisMap(x, {extent, padded[axis]}, [&](std::int64_t i, AxisTerms& terms) {
+    terms.push_back({SourceOf(i - before, extent, mode), 1.0});
+  });
+  return MapAxis(x, axis, map);
+}
+
+Var PadImage(const Var& x, const Padding& padding, PadMode mode) {
+  if (!Usable("pad image", {&x})) return Invalid({&x});
+  if (x.shape().rank() != 4) {
+    return Fail(x, InvalidArgument("pad image: {} is not [n, c, h, w]", x.shape().ToString()));
+  }
+  return Pad(Pad(x, 2, padding.top, padding.bottom, mode), 3, padding.left, padding.right, mode);
+}
+
+namespace {
+
+void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
+  const double scale = static_cast<double>(e.in) / static_cast<double>(e.out);
+  const double at = std::max(0.0, (static_cast<double>(i) + 0.5) * scale - 0.5);
+  const auto below = std::min(e.in - 1, static_cast<std::int64_t>(at));
+  const double share = below == e.in - 1 ? 0.0 : at - static_cast<double>(below);
+  terms.push_back({below, 1.0 - share});
+  if (share > 0) terms.push_back({below + 1, share});
+}
+
+Var ResizeAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
+  const AxisExtents extents{x.shape()[axis], extent};
+  if (extents.in == extent) return x;
+  const auto row = [&](std::int64_t i, AxisTerms& terms) {
+    if (mode == ResizeMode::kBilinear) return AppendBilinear(extents, i, terms);
+    terms.push_back({i * extents.in / extents.out, 1.0});
+  };
+  return MapAxis(x, axis, MakeAxisMap(x, extents, row));
+}
+
+}  // namespace
+
+Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
+  if (!Usable("resize", {&x})) return Invalid({&x});
+  const bool image = x.shape().rank() == 4 && x.shape()[2] > 0 && x.shape()[3] > 0;
+  const bool fits = size.height >= 1 && size.height <= AxisMap::kMostExtent && size.width >= 1 &&
+                    size.width <= AxisMap::kMostExtent;
+  if (!image || !fits) {
+    return Fail(
+        x, InvalidArgument("resize: {} to {} x {}", x.shape().ToString(), size.height, size.width));
+  }
+  if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
+    return Invalid({&x});
+  }
+  return ResizeAxis(ResizeAxis(x, 2, size.height, mode), 3, size.width, mode);
 }
 
 }  // namespace tilegrad::nn

@@ -3,7 +3,7 @@
 // its derivatives. Each of the three is the derivative of the others, so together they are closed.
 #pragma once
 
-#include "nn/ops/pad.h"
+#include "nn/ops/axis_map.h"
 #include "nn/ops/shape.h"
 #include "nn/tape.h"
 

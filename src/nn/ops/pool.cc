@@ -2,16 +2,62 @@
 #include "nn/ops/pool.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 
 #include "base/error.h"
-#include "nn/kernels/max_pool.h"
+#include "base/parallel.h"
 #include "nn/ops/axis_map.h"
 #include "nn/ops/index.h"
 #include "nn/ops/shape.h"
 
 namespace tilegrad::nn {
 namespace {
+
+// Where the largest element of each window of an image lies. Nothing is computed, and a window's
+// few elements lie in few cache lines, so there is no vector body.
+
+struct PoolShape {
+  std::size_t planes = 1, height = 1, width = 1;  // x: [planes, height, width]
+  std::size_t out_height = 1, out_width = 1;      // first: [planes, out_height, out_width]
+  std::size_t kernel = 1, stride = 1, padding = 0;
+};
+
+struct Range {
+  std::size_t begin, end;
+};
+
+// The part of an axis of `extent` elements that window i covers.
+Range Window(const PoolShape& s, std::size_t i, std::size_t extent) {
+  const std::size_t from = i * s.stride;  // in the padded axis
+  return {from > s.padding ? from - s.padding : 0, std::min(extent, from + s.kernel - s.padding)};
+}
+
+template <class T>
+std::int32_t Largest(const PoolShape& s, const T* x, const Range& rows, const Range& columns) {
+  std::size_t best = rows.begin * s.width + columns.begin;
+  for (std::size_t r = rows.begin; r < rows.end; ++r) {
+    for (std::size_t k = r * s.width + columns.begin; k < r * s.width + columns.end; ++k) {
+      if (x[k] > x[best] || (x[k] != x[k] && x[best] == x[best])) best = k;
+    }
+  }
+  return static_cast<std::int32_t>(best);
+}
+
+// first[p, i, j] = the index in plane p of the first element that attains the maximum over rows
+// i stride - padding + [0, kernel) and columns alike, as far as they are in the image; some are,
+// for every window. NaN counts as larger than everything.
+template <class T>
+void MaxPoolIndices(const PoolShape& s, const T* x, std::int32_t* first, const Workers& workers) {
+  workers.For(s.planes * s.out_height, [&](std::size_t row, std::size_t) {
+    const T* plane = x + row / s.out_height * s.height * s.width;
+    const Range rows = Window(s, row % s.out_height, s.height);
+    for (std::size_t j = 0; j < s.out_width; ++j) {
+      first[row * s.out_width + j] = Largest(s, plane, rows, Window(s, j, s.width));
+    }
+  });
+}
 
 std::int64_t Windows(std::int64_t extent, const PoolOptions& o) {
   return (extent + 2 * static_cast<std::int64_t>(o.padding) - o.kernel) / o.stride + 1;

@@ -23,4 +23,14 @@ Var ReduceMin(const Var& x, std::initializer_list<int> axes, Keep keep = Keep::k
 // Sums what broadcasting to x's shape had repeated. Adjoint of BroadcastTo.
 Var SumTo(const Var& x, const Shape& shape);
 
+// Softmax over one axis and the losses of classification. The largest element is subtracted before
+// exponentiation, so that no finite input overflows.
+
+// Of -infinity alone, or with infinity in it, both are NaN: there is no such distribution.
+Var Softmax(const Var& x, int axis);
+Var LogSoftmax(const Var& x, int axis);
+
+// logits [n, classes] -> mean over n of -log softmax[i, labels[i]]; labels: [n] of kI32.
+Var CrossEntropy(const Var& logits, const Tensor& labels);
+
 }  // namespace tilegrad::nn

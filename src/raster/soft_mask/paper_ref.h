@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "raster/scalar.h"
+#include "base/scalar.h"
 
 namespace tilegrad::raster {
 

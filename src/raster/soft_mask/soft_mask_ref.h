@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "raster/scalar.h"
+#include "base/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

@@ -44,7 +44,7 @@ UvPlanes UvPlanesOf(const raster::ScreenMeshT<T>& mesh,
   for (int k = 0; k < 3; ++k) {
     m[k] = perspective ? corners.z[k] : 1.0;
     const T* const uv = attributes.corner(mesh, face, k) + first;
-    for (int i = 0; i < 2; ++i) n[i][k] = m[k] * raster::RealPart(uv[i]);
+    for (int i = 0; i < 2; ++i) n[i][k] = m[k] * RealPart(uv[i]);
   }
   UvPlanes out;
   for (int i = 0; i < 2; ++i) {

@@ -2,7 +2,7 @@
 #include "train/losses/feature_l1.h"
 
 #include "base/error.h"
-#include "nn/networks/features.h"
+#include "nn/features.h"
 
 namespace tilegrad::train {
 namespace {

@@ -11,7 +11,7 @@
 #include <functional>
 #include <vector>
 
-#include "nn/networks/gan.h"
+#include "nn/gan.h"
 #include "nn/tape.h"
 
 namespace tilegrad::train {

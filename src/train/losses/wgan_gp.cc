@@ -2,7 +2,7 @@
 #include "train/losses/wgan_gp.h"
 
 #include "base/error.h"
-#include "nn/networks/gan.h"
+#include "nn/gan.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
 

@@ -2,9 +2,9 @@
 #include "train/models/mesh_network.h"
 
 #include "base/error.h"
-#include "nn/networks/blocks.h"
+#include "nn/layers.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_colors.h"
+#include "nn/ops/sample_pictures.h"
 
 namespace tilegrad::train {
 namespace {

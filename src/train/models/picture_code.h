@@ -3,7 +3,7 @@
 // sphere, whose bottom goes through one code that other heads start from, too.
 #pragma once
 
-#include "nn/networks/unet.h"
+#include "nn/unet.h"
 
 namespace tilegrad::train {
 

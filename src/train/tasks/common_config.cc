@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/schedule.h"
+#include "nn/optim.h"
 
 namespace tilegrad::train {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/networks/gan.h"
+#include "nn/gan.h"
 #include "train/losses/loss_sum.h"
 #include "train/losses/wgan_gp.h"
 #include "train/tasks/learned_weights.h"

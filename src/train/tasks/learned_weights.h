@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "nn/moving_average.h"
 #include "nn/optim.h"
 #include "train/run/step_values.h"
 #include "train/tasks/common_config.h"

@@ -7,7 +7,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "nn/optim.h"
-#include "nn/schedule.h"
 #include "train/tasks/single_image/image_losses.h"
 
 namespace tilegrad::train {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/networks/features.h"
+#include "nn/features.h"
 
 #include <array>
 

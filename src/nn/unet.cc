@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/networks/unet.h"
+#include "nn/unet.h"
 
 #include <algorithm>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/networks/gan.h"
+#include "nn/gan.h"
 
 #include <string>
 #include <utility>

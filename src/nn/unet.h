@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "nn/networks/blocks.h"
+#include "nn/layers.h"
 
 namespace tilegrad::nn {
 
