@@ -12,7 +12,7 @@
 #include "cli/console.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "tilegrad/version.h"
 #include "train/run/machine.h"
 

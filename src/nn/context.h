@@ -44,7 +44,7 @@ class Context {
   Tensor Copy(const Tensor& tensor) const;                     // storage of its own
 
   MemoryPool& memory() const { return *pool_; }
-  // For the small objects of a step (step_memory.h).
+  // For the small objects of a step (memory.h).
   template <class T>
   StepAllocator<T> allocator() const {
     return StepAllocator<T>(step_memory_);

@@ -10,7 +10,7 @@
 #include <regex>
 
 #include "base/simd_target.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 

@@ -2,17 +2,83 @@
 #include "compat/nvdiffrast/antialias.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include "base/error.h"
+#include "base/scalar.h"
 #include "compat/nvdiffrast/band_sums.h"
-#include "compat/nvdiffrast/edge_crossing.h"
+#include "compat/nvdiffrast/pixel_grid.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
+
+// Where an edge crosses the way from one pixel's centre to the next one's, and the adjoint.
+// S: double, std::complex<double>.
+//
+// In homogeneous pixel coordinates relative to the first centre, with q along the way, r across it:
+// the edge from i to j meets r = 0 at
+//
+//     t = q / w = (q_i r_j - q_j r_i) / (w_i r_j - w_j r_i)
+
+// The way: from the centre of a pixel, one pixel along axis 0 (x) or 1 (y), forwards or back.
+struct PixelStep {
+  PixelCentre from;
+  int axis;
+  int direction;    // 1 or -1
+  double scale[2];  // pixels per unit of normalised device coordinates, along x and y
+};
+
+// A vertex seen from the way.
+template <class S>
+struct WayPoint {
+  S q, r, w;
+};
+
+template <class S>
+WayPoint<S> PointOnWay(const PixelStep& step, const S* p) {
+  const S from_centre[2] = {(p[0] - step.from.x * p[3]) * step.scale[0],
+                            (p[1] - step.from.y * p[3]) * step.scale[1]};
+  return {from_centre[step.axis] * static_cast<double>(step.direction), from_centre[1 - step.axis],
+          p[3]};
+}
+
+// Whether the edge crosses the way before its end, in front of the eye, at an angle that makes it
+// this axis's affair (exactly 45 degrees belong to x).
+template <class S>
+bool CrossesWay(const PixelStep& step, const WayPoint<S>& i, const WayPoint<S>& j, S* t) {
+  if ((RealPart(i.r) < 0) == (RealPart(j.r) < 0)) return false;
+  const S m = i.w * j.r - j.w * i.r, n = i.q * j.r - j.q * i.r;
+  if (!(RealPart(m) * (RealPart(j.r) - RealPart(i.r)) > 0)) return false;
+  const double along = std::abs(RealPart(m));  // the edge's normal, scaled
+  const double across = std::abs(RealPart(i.w) * RealPart(j.q) - RealPart(i.q) * RealPart(j.w));
+  if (step.axis == 0 ? along < across : along <= across) return false;
+  *t = n / m;
+  return RealPart(*t) >= 0 && RealPart(*t) <= 1;
+}
+
+// d_p[4] += what d_way pulls.
+template <class S>
+void PointOnWayAdjoint(const PixelStep& step, const WayPoint<S>& d_way, S* d_p) {
+  S d_from[2];
+  d_from[step.axis] = d_way.q * static_cast<double>(step.direction) * step.scale[step.axis];
+  d_from[1 - step.axis] = d_way.r * step.scale[1 - step.axis];
+  d_p[0] += d_from[0];
+  d_p[1] += d_from[1];
+  d_p[3] += d_way.w - step.from.x * d_from[0] - step.from.y * d_from[1];
+}
+
+// d_i[4], d_j[4] += what d_t pulls on the ends of an edge that crosses at t.
+template <class S>
+void CrossingAdjoint(const PixelStep& step, const WayPoint<S>& i, const WayPoint<S>& j, S t, S d_t,
+                     S* d_i, S* d_j) {
+  const S d_n = d_t / (i.w * j.r - j.w * i.r), d_m = -t * d_n;
+  PointOnWayAdjoint(step, {d_n * j.r, -(d_n * j.q + d_m * j.w), d_m * j.r}, d_i);
+  PointOnWayAdjoint(step, {-(d_n * i.r), d_n * i.q + d_m * i.w, -(d_m * i.r)}, d_j);
+}
 
 // Pixel `to` takes `weight` of what `from` shows beyond itself. The pixels are those of the batch.
 struct Blend {
@@ -280,5 +346,45 @@ Status AntialiasBackward(const AntialiasInput<T>& input, std::span<const T> d_ou
 TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
+
+namespace {
+
+// Vertices of an edge, the lower one first, and one of its sides. Sorting brings those of one edge
+// together.
+struct Side {
+  std::uint64_t edge;
+  std::int32_t side;
+  bool operator<(const Side& other) const {
+    return edge != other.edge ? edge < other.edge : side < other.side;
+  }
+};
+
+std::vector<Side> SortedSides(FaceList faces) {
+  std::vector<Side> sides(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    const auto [a, b] = std::minmax(faces[i], faces[next]);
+    sides[i] = {static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint64_t>(b),
+                static_cast<std::int32_t>(i)};
+  }
+  std::sort(sides.begin(), sides.end());
+  return sides;
+}
+
+}  // namespace
+
+EdgeRings BuildEdgeRings(FaceList faces) {
+  const std::vector<Side> sides = SortedSides(faces);
+  EdgeRings out;
+  out.next.resize(sides.size());
+  for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
+    for (end = begin + 1; end < sides.size() && sides[end].edge == sides[begin].edge;) ++end;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Side& next = sides[i + 1 < end ? i + 1 : begin];
+      out.next[static_cast<std::size_t>(sides[i].side)] = next.side;
+    }
+  }
+  return out;
+}
 
 }  // namespace tilegrad::compat::nvdiffrast

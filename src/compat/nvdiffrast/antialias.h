@@ -16,15 +16,27 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/parallel.h"
 #include "compat/nvdiffrast/clip_mesh.h"
-#include "compat/nvdiffrast/edge_rings.h"
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::compat::nvdiffrast {
+
+// Which faces share an edge, by the indices of its two vertices.
+
+// Side 3 f + k of face f goes from its corner k to the next one, and is opposite to the third. The
+// sides of one edge form a ring: next[side] is another side of the same edge, or the side itself at
+// a boundary. However many faces share the edge, all of them are in its ring.
+struct EdgeRings {
+  std::vector<std::int32_t> next;  // [3 F]
+};
+
+EdgeRings BuildEdgeRings(FaceList faces);
 
 template <class T>
 struct AntialiasInput {

@@ -2,18 +2,259 @@
 #include "compat/nvdiffrast/rasterize.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <tuple>
 #include <vector>
 
+#include "base/aligned.h"
+#include "base/inline_vector.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
-#include "compat/nvdiffrast/clip_screen.h"
+#include "compat/nvdiffrast/clip_mesh.h"
+#include "compat/nvdiffrast/pixel_grid.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 #include "raster/bin.h"
+#include "raster/conventions.h"
 #include "raster/drawn_faces.h"
 #include "raster/fragments.h"
+#include "raster/screen_mesh.h"
 #include "raster/visibility.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
+
+// Faces in clip space to the screen of the engine's rasterizer (raster/screen_mesh.h), which finds
+// what is seen.
+//
+// Faces are cut by the planes -w <= z <= w, and at a guard far outside of the image on each side,
+// so that what remains has w > 0 and coordinates of at most raster::kGuardBand. Where an edge is
+// cut depends on its two ends only: faces that share it stay together. Row 0 of the screen is row 0
+// of the image, the bottom. In the place of 1/depth stands 1 - z/w: linear on the screen too, and
+// larger where it is nearer.
+
+// Faces [first, first + count).
+struct FaceRange {
+  std::size_t first, count;
+};
+
+// Reused from frame to frame.
+struct ClipScreen {
+  raster::ScreenMeshBuffers mesh;
+  AlignedVector<std::uint8_t> outside;  // of each vertex: planes that it lies beyond
+};
+
+constexpr int kPlanes = 6;  // near, far, left, right, below, above
+constexpr std::size_t kMostCorners = 3 + kPlanes;
+// 1 - z/w of what lies on the far plane: seen, but behind everything else.
+constexpr double kFarthest = 1e-30;
+
+struct ClipPoint {
+  double x, y, z, w;
+};
+
+// Signed distances to the planes, negative outside.
+struct Frustum {
+  double guard_x, guard_y;  // |x| <= guard_x * w
+
+  Frustum(int width, int height)
+      : guard_x(2.0 * raster::kGuardBand / width - 1.0),
+        guard_y(2.0 * raster::kGuardBand / height - 1.0) {}
+
+  double Distance(const ClipPoint& p, int plane) const {
+    switch (plane) {
+      case 0:
+        return p.w + p.z;
+      case 1:
+        return p.w - p.z;
+      case 2:
+        return guard_x * p.w + p.x;
+      case 3:
+        return guard_x * p.w - p.x;
+      case 4:
+        return guard_y * p.w + p.y;
+      default:
+        return guard_y * p.w - p.y;
+    }
+  }
+  std::uint8_t Outside(const ClipPoint& p) const {
+    std::uint8_t bits = 0;
+    for (int plane = 0; plane < kPlanes; ++plane) {
+      bits = static_cast<std::uint8_t>(bits | (Distance(p, plane) < 0) << plane);
+    }
+    return bits;
+  }
+};
+
+using Polygon = InlineVector<ClipPoint, kMostCorners>;
+
+// Where the edge from `a`, inside, to `b`, outside, meets a plane: in this order whatever way the
+// face goes, so that both faces of an edge get the same point.
+ClipPoint Cut(const ClipPoint& a, const ClipPoint& b, double da, double db) {
+  const double t = da / (da - db);
+  return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z),
+          a.w + t * (b.w - a.w)};
+}
+
+void CutPolygon(const Frustum& frustum, int plane, Polygon* polygon) {
+  const Polygon from = *polygon;
+  polygon->clear();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const ClipPoint& a = from[i];
+    const ClipPoint& b = from[i + 1 < from.size() ? i + 1 : 0];
+    const double da = frustum.Distance(a, plane), db = frustum.Distance(b, plane);
+    if (da >= 0) polygon->push_back(a);
+    if (da >= 0 && db < 0) polygon->push_back(Cut(a, b, da, db));
+    if (da < 0 && db >= 0) polygon->push_back(Cut(b, a, db, da));
+  }
+}
+
+// By x, then y, z and w.
+std::size_t LeastCorner(const Polygon& polygon) {
+  const auto key = [](const ClipPoint& p) { return std::tie(p.x, p.y, p.z, p.w); };
+  std::size_t least = 0;
+  for (std::size_t i = 1; i < polygon.size(); ++i) {
+    if (key(polygon[i]) < key(polygon[least])) least = i;
+  }
+  return least;
+}
+
+// Fills the arrays of a screen mesh.
+class ScreenWriter {
+ public:
+  ScreenWriter(const PixelGrid& grid, raster::ScreenMeshBuffers* out)
+      : half_width_(0.5 * grid.width), half_height_(0.5 * grid.height), out_(*out) {}
+
+  raster::PackedVertexT<float> Project(const ClipPoint& p) const {
+    if (!(p.w > 0)) return {0, 0, 0, 0};
+    const double near = std::max((p.w - p.z) / p.w, kFarthest);
+    return {static_cast<float>((p.x / p.w + 1) * half_width_),
+            static_cast<float>((p.y / p.w + 1) * half_height_), static_cast<float>(near), 0};
+  }
+  std::int32_t Append(const ClipPoint& p) {
+    out_.packed.push_back(Project(p));
+    return static_cast<std::int32_t>(out_.packed.size() - 1);
+  }
+  void AppendFace(std::int32_t a, std::int32_t b, std::int32_t c, std::size_t source) {
+    out_.v0.push_back(a);
+    out_.v1.push_back(b);
+    out_.v2.push_back(c);
+    out_.source_face.push_back(static_cast<std::int32_t>(source));
+    out_.reject.push_back(raster::kFaceDrawn);
+  }
+  // A cut face, as a fan from its least corner: of coinciding faces, whatever corner they start
+  // with and however they are wound, the same pieces. Nothing where it has no area in front of the
+  // eye.
+  void AppendPolygon(const Polygon& polygon, std::size_t source) {
+    for (const ClipPoint& p : polygon) {
+      if (!(p.w > 0)) return;
+    }
+    std::array<std::int32_t, kMostCorners> v;
+    const std::size_t count = polygon.size(), first = LeastCorner(polygon);
+    for (std::size_t i = 0; i < count; ++i) v[i] = Append(polygon[(first + i) % count]);
+    for (std::size_t i = 2; i < count; ++i) AppendFace(v[0], v[i - 1], v[i], source);
+  }
+  // The other arrays, from `packed`.
+  void Unpack() {
+    const std::size_t n = out_.packed.size();
+    for (auto* array : {&out_.x, &out_.y, &out_.depth, &out_.inverse_depth}) array->resize(n);
+    for (std::size_t v = 0; v < n; ++v) {
+      const auto& p = out_.packed[v];
+      out_.x[v] = p.x;
+      out_.y[v] = p.y;
+      out_.inverse_depth[v] = p.inverse_depth;
+      out_.depth[v] = 0;
+    }
+  }
+
+ private:
+  double half_width_, half_height_;
+  raster::ScreenMeshBuffers& out_;
+};
+
+template <class T>
+ClipPoint PointAt(const VertexRows<T>& positions, std::size_t image, std::int32_t vertex) {
+  const T* p = positions.at(image, vertex);
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]),
+          static_cast<double>(p[3])};
+}
+
+void Clear(const PixelGrid& grid, ClipScreen* out) {
+  raster::ScreenMeshBuffers& mesh = out->mesh;
+  mesh.packed.clear();
+  out->outside.clear();
+  mesh.v0.clear();
+  mesh.v1.clear();
+  mesh.v2.clear();
+  mesh.source_face.clear();
+  mesh.reject.clear();
+  mesh.clipped.clear();
+  mesh.width = grid.width;
+  mesh.height = grid.height;
+}
+
+// The planes that all corners, or any, lie beyond.
+struct Beyond {
+  std::uint8_t all = 0xff, any = 0;
+};
+Beyond BeyondOf(const AlignedVector<std::uint8_t>& outside, const std::int32_t (&v)[3]) {
+  Beyond out;
+  for (const std::int32_t vertex : v) {
+    const std::uint8_t code = outside[static_cast<std::size_t>(vertex)];
+    out.all &= code;
+    out.any |= code;
+  }
+  return out;
+}
+
+Polygon CutFace(const Frustum& frustum, const ClipPoint (&corners)[3], std::uint8_t planes) {
+  Polygon polygon = {corners[0], corners[1], corners[2]};
+  for (int plane = 0; plane < kPlanes; ++plane) {
+    if ((planes >> plane & 1) != 0) CutPolygon(frustum, plane, &polygon);
+  }
+  return polygon;
+}
+
+// `source_face` of the mesh counts all of `faces`. Positions are finite and `faces` have been
+// checked. Allocates only to grow `out`.
+template <class T>
+void MakeClipScreen(const VertexRows<T>& positions, FaceList faces, const FaceRange& range,
+                    std::size_t image, const PixelGrid& grid, ClipScreen* out) {
+  Clear(grid, out);
+  const FaceList drawn = faces.subspan(3 * range.first, 3 * range.count);
+  ScreenWriter writer(grid, &out->mesh);
+  const Frustum frustum(grid.width, grid.height);
+  // Of a batch that shares its vertices, an image has only some of them.
+  const auto [low, high] = std::minmax_element(drawn.begin(), drawn.end());
+  const std::int32_t first = drawn.empty() ? 0 : *low, end = drawn.empty() ? 0 : *high + 1;
+  for (std::int32_t v = first; v < end; ++v) {
+    const ClipPoint p = PointAt(positions, image, v);
+    out->outside.push_back(frustum.Outside(p));
+    writer.Append(p);
+  }
+  out->mesh.source_vertices = end - first;
+  out->mesh.source_faces = static_cast<std::int32_t>(range.count);
+  for (std::size_t f = 0; f < range.count; ++f) {
+    const std::int32_t* ids = &drawn[3 * f];
+    const std::int32_t v[3] = {ids[0] - first, ids[1] - first, ids[2] - first};
+    const Beyond beyond = BeyondOf(out->outside, v);
+    if (beyond.all != 0) continue;
+    if (beyond.any == 0) {
+      writer.AppendFace(v[0], v[1], v[2], range.first + f);
+      continue;
+    }
+    const ClipPoint corners[3] = {PointAt(positions, image, ids[0]),
+                                  PointAt(positions, image, ids[1]),
+                                  PointAt(positions, image, ids[2])};
+    writer.AppendPolygon(CutFace(frustum, corners, beyond.any), range.first + f);
+  }
+  writer.Unpack();
+}
+
+template void MakeClipScreen(const VertexRows<float>&, FaceList, const FaceRange&, std::size_t,
+                             const PixelGrid&, ClipScreen*);
+template void MakeClipScreen(const VertexRows<double>&, FaceList, const FaceRange&, std::size_t,
+                             const PixelGrid&, ClipScreen*);
 
 template <class T>
 void WritePixel(const Barycentrics<double>& b, std::int32_t face, T* rast, T* rast_db) {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"

@@ -64,4 +64,14 @@ Status ExpectSameBits(std::string_view what, std::span<const float> got,
   return {};
 }
 
+std::vector<Check> AllChecks() {
+  std::vector<Check> all;
+  for (const auto& group :
+       {TriangleChecks, SphereChecks, AlphaBoundChecks, SameBitsChecks, ExtremeChecks, KernelChecks,
+        TrainingChecks, FileChecks, MetricChecks}) {
+    for (Check& check : group()) all.push_back(std::move(check));
+  }
+  return all;
+}
+
 }  // namespace tilegrad::selftest

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "proof/owned_rendering.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
 #include "render/renderer.h"
 

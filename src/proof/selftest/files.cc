@@ -8,7 +8,7 @@
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "nn/nn.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::selftest {

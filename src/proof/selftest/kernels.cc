@@ -4,7 +4,7 @@
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -2,7 +2,7 @@
 // Scores of meshes whose scores are known.
 #include "train/metrics/metrics.h"
 
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::selftest {

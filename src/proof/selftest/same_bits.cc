@@ -3,7 +3,7 @@
 #include <iterator>
 
 #include "base/hash.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
 #include "render/renderer.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "proof/complex_step.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
 #include "render/scene_fields.h"
 

@@ -4,7 +4,7 @@
 
 #include "base/hash.h"
 #include "nn/nn.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 
 namespace tilegrad::selftest {
 namespace {

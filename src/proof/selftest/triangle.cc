@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "proof/owned_rendering.h"
-#include "proof/selftest/checks.h"
+#include "proof/selftest/check.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -2,10 +2,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/escape_text.h"
+#include "io/mesh_file.h"
 #include "proof/tradeoff_study.h"
+#include "scene/camera.h"
+#include "scene/shapes.h"
+#include "train/named_configs.h"
+#include "train/predictor.h"
 #include "train/report/log_plot.h"
+#include "train/trainer.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -98,6 +105,81 @@ std::string StudyPicture(const std::vector<StudyResult>& results) {
     plot.series.push_back(std::move(series));
   }
   return train::LogPlotSvg(plot);
+}
+
+namespace {
+
+StudyScene SceneOf(std::string name, const Mesh& mesh, int size) {
+  StudyScene out;
+  out.name = std::move(name);
+  out.size = size;
+  for (const glm::vec3& p : mesh.positions) {
+    for (int i = 0; i < 3; ++i) out.positions.push_back(p[i]);
+  }
+  for (const Face& face : mesh.faces) out.faces.insert(out.faces.end(), face.begin(), face.end());
+  out.camera = OrbitCamera({30.0, size, size}, 40, 25, 2.732);
+  return out;
+}
+
+void AddBumps(Mesh* mesh) {
+  for (glm::vec3& p : mesh->positions) {
+    p *= 1 + 0.15f * std::sin(22 * p.x) * std::sin(18 * p.y + 1) * std::sin(20 * p.z + 2);
+  }
+}
+
+}  // namespace
+
+std::vector<StudyScene> BuiltInScenes() {
+  Mesh bumpy = Icosphere(5, 0.5f);
+  AddBumps(&bumpy);
+  return {SceneOf("sphere", Icosphere(3, 0.5f), 64), SceneOf("bumpy", bumpy, 256)};
+}
+
+Result<StudyScene> SceneFromFile(const Path& file, int size) {
+  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
+  TILEGRAD_TRY(NormalizeToBox(loaded.mesh, 0.45f).Within(file.string()));
+  return SceneOf(file.stem().string(), loaded.mesh, size);
+}
+
+namespace {
+
+Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, const Workers& workers,
+                                const ProgressSink& progress, const StopFlag& stop) {
+  train::TrainJob job;
+  TILEGRAD_ASSIGN(job.config, train::FindConfig(study.config));
+  TILEGRAD_TRY(
+      train::ApplyOverrides({fmt::format("render.max_alpha_error={}", error)}, &job.config));
+  job.config.schedule.steps = study.steps;
+  job.data = study.data;
+  job.run = study.out / fmt::format("training_{:g}", error);
+  job.existing = train::ExistingRun::kContinue;
+  job.warn = study.warn;
+  TILEGRAD_ASSIGN(const train::RunOutcome outcome, train::Train(job, workers, progress, stop));
+  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(job.run, workers));
+  TILEGRAD_ASSIGN(
+      const train::Evaluation evaluation,
+      predictor.task().Evaluate({job.run, study.data, predictor}, workers, progress, stop));
+  const train::Score& mean = evaluation.rows.back().mean;
+  return StudyTraining{error, outcome.seconds, outcome.last_step, mean.iou,
+                       mean.f_score.value_or(0)};
+}
+
+}  // namespace
+
+Status CheckTrainingStudy(const TrainingStudyJob& job) {
+  if (auto dataset = train::Dataset::Open(job.data); !dataset.ok()) return dataset.status();
+  return train::FindConfig(job.config).status();
+}
+
+Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
+                                                    const Workers& workers,
+                                                    const ProgressSink& progress,
+                                                    const StopFlag& stop) {
+  std::vector<StudyTraining> out;
+  for (const double error : job.errors) {
+    TILEGRAD_ASSIGN(out.emplace_back(), TrainWith(job, error, workers, progress, stop));
+  }
+  return out;
 }
 
 }  // namespace tilegrad::cli
