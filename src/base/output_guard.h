@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "base/file.h"
-#include "base/temporary_file.h"
 
 namespace tilegrad {
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace tilegrad {
 
@@ -44,5 +45,14 @@ bool IsUtf8(std::string_view text);
 // byte by byte. NameFromJson(JsonName(x)) is x, whatever x is.
 std::string JsonName(std::string_view name);
 std::string NameFromJson(std::string_view text);
+
+// What a person may have meant who has mistyped a name.
+
+// Whether `word` is likely to mean `name`: a letter or two are otherwise, or one begins the other.
+bool IsNear(std::string_view word, std::string_view name);
+
+// " (did you mean --out?)" with the names, the nearest first, that `word` is likely to mean; empty
+// if there is none.
+std::string DidYouMean(std::string_view word, const std::vector<std::string>& known);
 
 }  // namespace tilegrad

@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include "base/did_you_mean.h"
 #include "base/error.h"
 #include "base/file.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"

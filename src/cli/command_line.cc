@@ -9,8 +9,8 @@
 #include <memory>
 #include <sstream>
 
-#include "base/did_you_mean.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "cli/option_words.h"
 #include "tilegrad/version.h"
 #include "train/named_configs.h"

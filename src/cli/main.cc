@@ -13,10 +13,10 @@
 #include <new>
 #include <system_error>
 
-#include "base/did_you_mean.h"
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "base/simd_target.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"

@@ -1,19 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch of images whose faces come already projected (compat/projected_faces.h), and
-// what their checks have in common. For callers who project for themselves, as DIB-R's other
-// implementations have it; whoever has vertices and cameras uses Renderer, which clips, covers
-// exactly and interpolates with perspective.
+// A batch of images whose faces come already projected, and what their checks have in common. For
+// callers who project for themselves, as DIB-R's other implementations have it; whoever has
+// vertices and cameras uses Renderer, which clips, covers exactly and interpolates with
+// perspective.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
-#include "compat/projected_faces.h"
+#include "base/scalar.h"
 #include "scene/camera.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::compat {
+
+// Faces that come already projected, and the weights that interpolate over them: the rule of
+// DIB-R's implementations, which differs from conventions.h. Coordinates are NDC, x
+// right, y up; nothing is snapped, a pixel centre on an edge is inside, depth and features are
+// linear on the screen, and weights have a small eps in their denominator:
+//
+//     W_0 = (b - p) x (c - p),  W_1 = (c - p) x (a - p),  W_2 = (a - p) x (b - p),  S = sum W_k,
+//     w_k = W_k / (S + sign(S) eps)
+//
+// W_k of an edge changes its sign exactly when the edge is turned around, so faces that share an
+// edge leave no crack between them.
+
+template <class T>
+struct ProjectedFacesT {
+  std::span<const T> xy;                // [F,3,2] NDC
+  std::span<const T> z;                 // [F,3] camera z: the larger is nearer
+  std::span<const std::uint8_t> valid;  // [F] 0 covers nothing; empty: all are valid
+
+  std::size_t count() const { return xy.size() / 6; }
+  bool is_valid(std::size_t face) const { return valid.empty() || valid[face] != 0; }
+  const T* corners(std::size_t face) const { return xy.data() + 6 * face; }
+};
+
+// Twice the signed areas that p makes with the edges opposite to corners 0, 1, 2 of [3,2] corners.
+template <class T>
+std::array<T, 3> CornerAreas(const T* v, const T& px, const T& py) {
+  const T ax = v[0] - px, ay = v[1] - py, bx = v[2] - px, by = v[3] - py;
+  const T cx = v[4] - px, cy = v[5] - py;
+  return {bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx};
+}
+
+// S + sign(S) eps.
+template <class T>
+T WeightDenominator(const T& area, const T& eps) {
+  return std::signbit(RealPart(area)) ? area - eps : area + eps;
+}
+
+// w_k at p; all 0 where the face has no area.
+template <class T>
+std::array<T, 3> ScreenWeights(const T* corners, const T& px, const T& py, const T& eps) {
+  std::array<T, 3> w = CornerAreas(corners, px, py);
+  const T area = (w[0] + w[1]) + w[2];
+  if (RealPart(area) == 0) return {T(0), T(0), T(0)};
+  for (T& weight : w) weight /= WeightDenominator(area, eps);
+  return w;
+}
 
 // N images of F faces each, views over the caller's arrays.
 template <class T>

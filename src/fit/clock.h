@@ -8,7 +8,7 @@
 
 #include "fit/config.h"
 #include "nn/context.h"
-#include "nn/named_tensors.h"
+#include "nn/tensor.h"
 
 namespace tilegrad::train {
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "nn/named_tensors.h"
 #include "nn/tape.h"
+#include "nn/tensor.h"
 
 namespace tilegrad::nn {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/named_tensors.h"
 #include "nn/ops/matmul.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/shape.h"
+#include "nn/tensor.h"
 
 namespace tilegrad::nn {
 namespace {

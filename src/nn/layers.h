@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "nn/named_tensors.h"
 #include "nn/ops/batch_norm.h"
 #include "nn/ops/conv.h"
 #include "nn/tape.h"

@@ -14,8 +14,8 @@
 #include "nn/context.h"
 #include "nn/kernels/adam.h"
 #include "nn/layers.h"
-#include "nn/named_tensors.h"
 #include "nn/tape.h"
+#include "nn/tensor.h"
 
 namespace tilegrad::nn {
 

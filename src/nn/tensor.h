@@ -9,8 +9,10 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "nn/memory.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad::nn {
 
@@ -123,5 +125,20 @@ decltype(auto) WithFloatType(DType dtype, F&& f) {
   assert(dtype == DType::kF32 || dtype == DType::kF64);
   return dtype == DType::kF64 ? f(double{}) : f(float{});
 }
+
+// Tensors with names, as checkpoints hold them.
+
+struct NamedTensor {
+  std::string name;  // "encoder.conv1.weight"
+  Tensor value;      // shares the storage of the parameter or buffer
+};
+
+// The tensor of that name, or null.
+const Tensor* Find(const std::vector<NamedTensor>& tensors, const std::string& name);
+
+// Copies the tensors of `from` into those of `to` by name, converting between F32 and F64 (other
+// dtypes must be equal). Every name of `to` must be there with its shape; else nothing is changed
+// and the error names the first that is not. Further names in `from` are ignored.
+Status CopyByName(const std::vector<NamedTensor>& from, std::vector<NamedTensor> to);
 
 }  // namespace tilegrad::nn

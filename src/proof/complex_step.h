@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 
 namespace tilegrad {
 

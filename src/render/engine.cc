@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/validate.h"
 #include "render/shading/gradients.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rivals/n3mr_box.h"
 #include "rivals/n3mr_reduce.h"
 #include "rivals/n3mr_sweep.h"
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "rivals/n3mr_box.h"
+#include "rivals/n3mr.h"
 #include "rivals/n3mr_reduce.h"
 #include "rivals/n3mr_sweep.h"
 

@@ -9,7 +9,6 @@
 #include "base/aligned.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "rivals/batch.h"
 #include "rivals/n3mr_color.h"
 #include "rivals/projection.h"
 #include "rivals/softras_color.h"

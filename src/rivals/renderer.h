@@ -3,15 +3,94 @@
 // alpha and colours out, and their gradients back.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "base/parallel.h"
-#include "rivals/batch.h"
+#include "rivals/n3mr_color.h"
+#include "rivals/softras_color.h"
+#include "tilegrad/camera.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::rivals {
+
+enum class Rule { kSoftRas, kN3mr };
+
+struct Options {
+  Rule rule = Rule::kSoftRas;
+  SoftRasOptions softras = {};
+  SoftRasColors softras_colors = {};
+  N3mrOptions n3mr = {};
+  N3mrColors n3mr_colors = {};
+
+  // Texels of a face, and whether they are the colours of its corners; else all have the face's
+  // colour, the mean of its corners'.
+  std::size_t texels() const {
+    return rule == Rule::kSoftRas ? softras_colors.texels() : n3mr_colors.texels();
+  }
+  bool corner_colors() const {
+    return rule == Rule::kSoftRas && softras_colors.texture == SoftTexture::kVertex;
+  }
+};
+
+// InvalidArgument names the first number out of its range.
+Status Validate(const Options& options);
+
+// Images of meshes that have the same faces; mesh b is seen by cameras [b * views, (b + 1) *
+// views).
+template <class T>
+struct BatchT {
+  std::span<const T> positions;         // [B,V,3] world
+  std::span<const T> colors;            // [B,V,3], of vertices; without textures, too: alpha alone
+  std::span<const std::int32_t> faces;  // [F,3] indices in [0, V)
+  std::span<const CameraT<T>> cameras;  // [N], N = B * views
+  std::size_t meshes = 0;               // B
+  int size = 0;                         // pixels a side of the images, which are square
+  std::span<const T> textures{};        // [B,F,texels,3] instead of colors; N3MR
+
+  bool colored() const { return !colors.empty() || !textures.empty(); }
+  // The texels of image n's mesh, of numbers like textures.
+  template <class U>
+  std::span<U> TexturesOf(std::span<U> numbers, std::size_t n) const {
+    const std::size_t count = numbers.size() / meshes;
+    return numbers.subspan(n / views() * count, count);
+  }
+
+  std::size_t vertices() const { return meshes == 0 ? 0 : positions.size() / (3 * meshes); }
+  std::size_t views() const { return meshes == 0 ? 0 : cameras.size() / meshes; }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  }
+  // The numbers [V,3] of image n's mesh.
+  template <class U>
+  std::span<U> MeshOf(std::span<U> numbers, std::size_t n) const {
+    // Image n is there, so there are views.
+    return numbers.subspan(n / views() * 3 * vertices(),  // NOLINT(clang-analyzer-core.DivideZero)
+                           3 * vertices());
+  }
+};
+
+// Of a batch or of one of its images; as an adjoint, what is empty does not push.
+template <class T>
+struct ImagesT {
+  std::span<T> alpha;  // [N,size,size]
+  std::span<T> color;  // [N,3,size,size]; empty where the batch has no colours
+
+  ImagesT Image(std::size_t n, std::size_t pixels) const {
+    return {alpha.empty() ? alpha : alpha.subspan(n * pixels, pixels),
+            color.empty() ? color : color.subspan(3 * n * pixels, 3 * pixels)};
+  }
+};
+
+// Of a batch: [B,V,3] each.
+template <class T>
+struct GradientsT {
+  std::span<T> positions;
+  std::span<T> colors;      // empty: not wanted
+  std::span<T> textures{};  // as BatchT::textures; empty: not wanted
+};
 
 template <class T>
 class ImageStateT;

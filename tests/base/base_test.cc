@@ -21,7 +21,6 @@
 #include "base/rng.h"
 #include "base/sanitizers.h"
 #include "base/simd_target.h"
-#include "base/temporary_file.h"
 #include "support/forked.h"
 
 namespace tilegrad::base_test {

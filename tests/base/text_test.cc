@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/did_you_mean.h"
 #include "base/json_text.h"
 #include "base/rng.h"
 #include "base/whole_number.h"

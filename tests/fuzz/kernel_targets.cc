@@ -8,7 +8,7 @@
 #include "base/simd_target.h"
 #include "fuzz/numbers.h"
 #include "fuzz/target.h"
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 #include "raster/extremes/truth.h"
 #include "render/trial.h"
 

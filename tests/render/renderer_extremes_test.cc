@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "base/simd_target.h"
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 #include "render/trial.h"
 
 namespace tilegrad::renderer_extremes_test {

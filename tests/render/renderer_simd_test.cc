@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/simd_target.h"
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 #include "render/trial.h"
 
 namespace tilegrad::renderer_simd_test {

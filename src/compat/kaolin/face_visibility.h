@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which of an image's projected faces is seen in each pixel (projected_faces.h has the rule).
+// Which of an image's projected faces is seen in each pixel (projected_batch.h has the rule).
 // Discrete: no gradient.
 //
 // A face covers the pixel centres p with low <= p < high along both axes of its box where no W_k
@@ -22,7 +22,7 @@
 #include <type_traits>
 
 #include "base/aligned.h"
-#include "compat/projected_faces.h"
+#include "compat/projected_batch.h"
 
 namespace tilegrad::compat::kaolin {
 

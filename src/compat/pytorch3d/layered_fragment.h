@@ -3,7 +3,7 @@
 // and the signed squared distance to the face's boundary, as PyTorch3D's rasterizer has them.
 // Coordinates are its NDC, x to the left, y up, with z the depth in the camera, > 0 in front.
 //
-//     A_k = -W_k (projected_faces.h), A = sum A_k     positive where the face's front is seen
+//     A_k = -W_k (projected_batch.h), A = sum A_k     positive where the face's front is seen
 //     b_k = A_k / (A + eps)                           linear on the screen
 //     w_k = b_k z_l z_m / max(sum_j ..., eps)         if perspective_correct
 //     c_k = max(w_k, 0) / max(sum_j max(w_j, 0), 1e-5)         if clip_barycentrics
@@ -17,7 +17,7 @@
 #include <cstddef>
 
 #include "base/scalar.h"
-#include "compat/projected_faces.h"
+#include "compat/projected_batch.h"
 
 namespace tilegrad::compat::pytorch3d {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 #include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
 #include "render/renderer.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "proof/owned_rendering.h"
+#include "proof/owned_scene.h"
 #include "proof/selftest/check.h"
 
 namespace tilegrad::selftest {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/clocks.h"
 #include "base/prefetch.h"
-#include "base/stage_clock.h"
 #include "raster/fragments.h"
 #include "render/pipeline/frame_layout.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "raster/fragments.h"
 #include "raster/visibility_ref.h"
 #include "render/pipeline/frame_layout.h"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "render/alpha/rules.h"
 #include "render/pipeline/bin_forward.h"
 #include "render/pipeline/frame_layout.h"

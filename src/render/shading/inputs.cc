@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "shade/normalize_ref.h"
 #include "shade/spherical_harmonics_ref.h"
 

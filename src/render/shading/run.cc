@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "shade/normalize.h"
 #include "shade/phong.h"
 

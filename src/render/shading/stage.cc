@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "base/stage_clock.h"
+#include "base/clocks.h"
 #include "raster/conventions.h"
 #include "raster/fragments.h"
 #include "render/pipeline/part_backward.h"

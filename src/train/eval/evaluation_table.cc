@@ -3,8 +3,8 @@
 
 #include "base/error.h"
 #include "base/escape_text.h"
+#include "base/file.h"
 #include "base/json_text.h"
-#include "base/temporary_file.h"
 #include "base/text.h"
 #include "train/eval/evaluation.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "nn/named_tensors.h"
+#include "nn/tensor.h"
 #include "tilegrad/status.h"
 #include "train/ranks/transport.h"
 

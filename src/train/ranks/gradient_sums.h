@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/aligned.h"
-#include "nn/named_tensors.h"
 #include "nn/tape.h"
+#include "nn/tensor.h"
 #include "train/ranks/bucket_layout.h"
 #include "train/ranks/exchange.h"
 #include "train/ranks/portion_tree.h"

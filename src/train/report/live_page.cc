@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/folder_lock.h"
-#include "base/temporary_file.h"
 #include "io/mesh_file.h"
 #include "train/config.h"
 #include "train/predictor.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "base/temporary_file.h"
+#include "base/file.h"
 #include "io/image_file.h"
 #include "train/predictor.h"
 #include "train/report/assets.h"

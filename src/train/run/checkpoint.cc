@@ -7,7 +7,6 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
-#include "base/temporary_file.h"
 
 namespace tilegrad::train {
 namespace {

@@ -8,8 +8,8 @@
 #include <sstream>
 #include <type_traits>
 
-#include "base/did_you_mean.h"
 #include "base/error.h"
+#include "base/text.h"
 
 namespace tilegrad::train {
 namespace {

@@ -4,10 +4,10 @@
 #include <chrono>
 #include <sstream>
 
+#include "base/clocks.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "base/folder_lock.h"
-#include "base/processor_time.h"
 #include "base/text.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"

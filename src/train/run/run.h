@@ -16,7 +16,7 @@
 #include "base/file.h"
 #include "base/progress.h"
 #include "nn/context.h"
-#include "nn/named_tensors.h"
+#include "nn/tensor.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
 #include "train/run/schedule.h"

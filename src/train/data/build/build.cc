@@ -9,9 +9,9 @@
 #include <span>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/folder_lock.h"
 #include "base/hash.h"
-#include "base/temporary_file.h"
 #include "base/text.h"
 #include "io/image_file.h"
 #include "render/picture/composite.h"

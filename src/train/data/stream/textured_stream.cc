@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/clocks.h"
 #include "base/error.h"
-#include "base/processor_time.h"
 #include "render/picture/composite.h"
 #include "render/picture/dataset_light.h"
 #include "render/renderer.h"

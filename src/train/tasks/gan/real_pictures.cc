@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/clocks.h"
 #include "base/error.h"
-#include "base/processor_time.h"
 
 namespace tilegrad::train {
 namespace {

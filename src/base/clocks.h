@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clocks for what is measured while it is done.
+#pragma once
+
+#include <chrono>
+#include <ctime>
+
+namespace tilegrad {
+
+// Times the successive stages of a task.
+class StageClock {
+ public:
+  // Adds the milliseconds since the last call, or since construction, to *stage.
+  void Lap(double* stage) {
+    const auto now = std::chrono::steady_clock::now();
+    *stage += std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// Seconds that processors have worked, as the system counts them.
+namespace internal {
+inline double SecondsOf(clockid_t clock) {
+  timespec t{};
+  ::clock_gettime(clock, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+}  // namespace internal
+
+inline double ThreadSeconds() { return internal::SecondsOf(CLOCK_THREAD_CPUTIME_ID); }
+inline double ProcessSeconds() { return internal::SecondsOf(CLOCK_PROCESS_CPUTIME_ID); }
+
+}  // namespace tilegrad
