@@ -3,18 +3,55 @@
 
 from __future__ import annotations
 
-from typing import Any, Iterator, Optional, Sequence, Union
+from typing import Any, Callable, Iterator, Optional, Sequence, Union
 
 import numpy as np
 
 from tilegrad import _arrays, _core
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size, common_size, filled_size
-from tilegrad._options import DEFAULTS as _D, options_of
 from tilegrad._packed import Packed
 from tilegrad._picture import Pictured
 from tilegrad._scene import Light, Scene, Surface
 from tilegrad._threads import thread_count
+
+_Reader = Callable[[str, str, Any], Any]
+
+
+def _number(kind: type) -> _Reader:
+    return lambda function, name, value: _arrays.as_number(function, name, value, kind)
+
+
+def _choice(choices: Sequence[str]) -> _Reader:
+    return lambda function, name, value: _arrays.check_choice(function, name, value, choices)
+
+
+def _option(name: str, choices: Optional[Sequence[str]] = None) -> tuple[Any, _Reader]:
+    """C++'s default of an option, and what checks another value."""
+    value = getattr(_core.RenderOptions(), name)
+    return (choices[value], _choice(choices)) if choices else (value, _number(type(value)))
+
+
+# In the order in which Renderer.render has them.
+_OPTIONS = {"width": _option("width"), "height": _option("height"), "delta": _option("delta"),
+            "max_alpha_error": _option("max_alpha_error"),
+            "interpolation": _option("interpolation", _core.INTERPOLATIONS),
+            "culling": _option("culling", _core.CULLINGS),
+            "alpha_rule": _option("alpha_rule", _core.ALPHA_RULES),
+            "paper_box": _option("paper_box"), "paper_faces": _option("paper_faces")}
+_D = {name: default for name, (default, _) in _OPTIONS.items()}
+# Those that functions hand on, beside the size of the image.
+PASSED_ON = frozenset(_OPTIONS) - {"width", "height"}
+
+
+def options_of(*values: Any) -> _core.RenderOptions:
+    """Of a value for each option, which is checked if it is not the default itself."""
+    options = _core.RenderOptions()
+    for (name, (default, read)), value in zip(_OPTIONS.items(), values):
+        if value is not default:
+            setattr(options, name, read("render", name, value))
+    return options
+
 
 _OUTPUTS = ("color", "alpha")
 # Names whose values are not plain arrays.

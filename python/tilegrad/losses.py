@@ -135,8 +135,7 @@ def _like(tensor: Any, value: Any) -> Any:
 
 def _on_tape(compute: Callable[..., tuple], *inputs: Any) -> Any:
     """The value as a scalar tensor whose backward gives the gradients. First derivatives only."""
-    from tilegrad._autograd import first_derivative_only
-    from tilegrad._dense import widened
+    from tilegrad._dense import first_derivative_only, widened
     torch = _torch_of(*inputs)
     tensors = [widened(torch.as_tensor(value)) for value in inputs]
 

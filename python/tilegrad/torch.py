@@ -18,11 +18,10 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import torch
 
-from tilegrad import _arrays, _core, _rotation
-from tilegrad._autograd import first_derivative_only
+from tilegrad import _arrays, _core
+from tilegrad._dense import check_dense, first_derivative_only, full_precision
 from tilegrad._camera import Camera
-from tilegrad._dense import check_dense, full_precision
-from tilegrad._options import PASSED_ON
+from tilegrad._renderer import PASSED_ON
 from tilegrad._torch_call import Call, scenes_of
 
 Array = Any  # whatever tilegrad takes as an array
@@ -135,7 +134,6 @@ def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.
     return numbers if numbers.ndim == 2 else numbers[None]
 
 
-rotation_6d = _rotation.rotation_6d
 
 class _Render(torch.autograd.Function):
     """Each call has its own frame, so that renders may follow each other before backward."""
@@ -197,3 +195,32 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
                              f"leading axes that broadcast with that") from None
         flat.append(tensor.reshape(*tensor.shape[:split], math.prod(shape)))
     return torch.cat([tensor.expand(*lead, -1) for tensor in flat], dim=-1)
+
+
+@full_precision
+def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
+    """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
+    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).
+
+    TypeError if they are not real numbers, ValueError if they are not six, or where the first three
+    are 0 or the last three parallel to them.
+    """
+    if not isinstance(numbers, torch.Tensor) or numbers.dtype not in (torch.float32, torch.float64):
+        kind = getattr(numbers, "dtype", type(numbers).__name__)
+        raise TypeError(f"rotation_6d: numbers have dtype {kind}, expected torch.float32 or "
+                        f"torch.float64")
+    check_dense("rotation_6d", "numbers", numbers)
+    if numbers.ndim < 1 or numbers.shape[-1] != 6:
+        raise ValueError(f"rotation_6d: numbers have shape {tuple(numbers.shape)}, expected "
+                         f"(..., 6)")
+    first, second = numbers[..., :3], numbers[..., 3:]
+    x = torch.nn.functional.normalize(first, dim=-1)
+    across = second - (x * second).sum(-1, keepdim=True) * x
+    y = torch.nn.functional.normalize(across, dim=-1)
+    z = torch.cross(x, y, dim=-1)
+    with torch.no_grad():
+        rounding = 8 * torch.finfo(numbers.dtype).eps * second.norm(dim=-1)
+        if not ((z.norm(dim=-1) > 0.5) & (across.norm(dim=-1) > rounding)).all():
+            raise ValueError("rotation_6d: of six numbers the first three are 0, or the last "
+                             "three parallel to them")
+    return torch.stack([x, y, z], dim=-2)

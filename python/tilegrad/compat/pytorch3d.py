@@ -21,8 +21,7 @@ import torch
 
 from tilegrad import _core, fragments
 from tilegrad._arrays import check_indices
-from tilegrad._autograd import first_derivative_only
-from tilegrad._dense import widened
+from tilegrad._dense import first_derivative_only, widened
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Fragments = fragments.Fragments

@@ -9,8 +9,7 @@ import torch
 
 from tilegrad import _core
 from tilegrad._arrays import Sizes, check_choice
-from tilegrad._autograd import first_derivative_only
-from tilegrad._dense import full_precision
+from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 

@@ -7,10 +7,10 @@ dtype. Gradients are the same bits for any number of threads.
 """
 
 from tilegrad.compat.nvdiffrast._antialias import antialias, antialias_construct_topology_hash
-from tilegrad.compat.nvdiffrast._context import (RasterizeCpuContext, RasterizeCudaContext,
-                                                 RasterizeGLContext, get_log_level, set_log_level)
 from tilegrad.compat.nvdiffrast._interpolate import interpolate
-from tilegrad.compat.nvdiffrast._rasterize import DepthPeeler, rasterize
+from tilegrad.compat.nvdiffrast._rasterize import (
+    DepthPeeler, RasterizeCpuContext, RasterizeCudaContext, RasterizeGLContext, get_log_level,
+    rasterize, set_log_level)
 from tilegrad.compat.nvdiffrast._texture import texture, texture_construct_mip
 
 __all__ = ["DepthPeeler", "RasterizeCpuContext", "RasterizeCudaContext", "RasterizeGLContext",

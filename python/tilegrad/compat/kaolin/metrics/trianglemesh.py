@@ -7,8 +7,7 @@ from typing import Any, Optional
 
 import torch
 
-from tilegrad._autograd import first_derivative_only
-from tilegrad._dense import full_precision
+from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat._tensors import (check_floats, check_not_empty, check_tensor, surface_tools,
                                       threads, to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from

@@ -15,8 +15,7 @@ from typing import Any, Optional, Union
 import torch
 
 from tilegrad import _core
-from tilegrad._autograd import first_derivative_only
-from tilegrad._dense import full_precision
+from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 from tilegrad.compat.kaolin.render.mesh.rasterization import (
     DEFAULT_MULTIPLIER, Features, check_multiplier, rasterize)

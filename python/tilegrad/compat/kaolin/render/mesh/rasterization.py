@@ -9,8 +9,7 @@ import torch
 
 from tilegrad import _core
 from tilegrad._arrays import as_pixels, check_choice
-from tilegrad._autograd import first_derivative_only
-from tilegrad._dense import full_precision
+from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Features = Union[torch.Tensor, Sequence[torch.Tensor]]
