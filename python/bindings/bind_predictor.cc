@@ -20,21 +20,12 @@ void BindPredictor(py::module_& m);
 
 namespace {
 
-ImageU8 ImageFromPython(const char* argument, const py::object& pixels) {
-  const auto values = SpanOf<std::uint8_t>(pixels, "prepare", argument, {kAny, kAny, kAny});
-  const auto array = py::reinterpret_borrow<py::array>(pixels);
-  ImageU8 image(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
-                static_cast<int>(array.shape(2)));
-  std::copy(values.begin(), values.end(), image.pixels.begin());
-  return image;
-}
-
 // image: [height,width,4], or any number of channels with a mask [height,width,channels].
 py::array PrepareCutout(const py::object& image, const py::object& mask, int size,
                         bool keep_framing) {
-  ImageU8 cutout = ImageFromPython("image", image);
+  ImageU8 cutout = ImageFromPython("prepare", "image", image);
   if (!mask.is_none())
-    cutout = ValueOrThrow(train::WithMask(cutout, ImageFromPython("mask", mask)));
+    cutout = ValueOrThrow(train::WithMask(cutout, ImageFromPython("prepare", "mask", mask)));
   const auto framing = keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   auto planar =
       ValueOrThrow(WithoutGil([&] { return train::PrepareCutout(cutout, size, framing); }));

@@ -85,19 +85,11 @@ py::dict TextureToDict(MeshTexture texture) {
 }
 
 MeshTexture TextureFromDict(const char* function, const py::dict& dict) {
-  const py::object image = dict["image"];
-  const auto texels = SpanOf<std::uint8_t>(image, function, "image", {kAny, kAny, kAny});
-  const auto array = py::reinterpret_borrow<py::array>(image);
-  const auto side = [&](int axis) { return static_cast<int>(array.shape(axis)); };
-  if (side(2) != 3 && side(2) != 4) {
-    throw py::value_error(
-        fmt::format("{}: a texture has 3 or 4 channels, got {}", function, side(2)));
-  }
-  MeshTexture out;
-  out.name = py::cast<std::string>(dict["name"]);
-  out.image = ImageU8(side(1), side(0), side(2));
-  std::copy(texels.begin(), texels.end(), out.image.pixels.begin());
-  return out;
+  MeshTexture out{py::cast<std::string>(dict["name"]),
+                  ImageFromPython(function, "image", dict["image"])};
+  if (out.image.channels == 3 || out.image.channels == 4) return out;
+  throw py::value_error(
+      fmt::format("{}: a texture has 3 or 4 channels, got {}", function, out.image.channels));
 }
 
 // Copies dict[name], if it is there, into a vector of records of T.
@@ -112,6 +104,15 @@ void Read(const char* function, const py::dict& dict, const char* name,
 }
 
 }  // namespace
+
+ImageU8 ImageFromPython(const char* function, const char* argument, const py::object& pixels) {
+  const auto values = SpanOf<std::uint8_t>(pixels, function, argument, {kAny, kAny, kAny});
+  const auto array = py::reinterpret_borrow<py::array>(pixels);
+  ImageU8 image(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
+                static_cast<int>(array.shape(2)));
+  std::copy(values.begin(), values.end(), image.pixels.begin());
+  return image;
+}
 
 py::dict MeshToDict(Mesh mesh) {
   const auto vertices = static_cast<py::ssize_t>(mesh.positions.size()),

@@ -13,6 +13,9 @@
 
 namespace tilegrad::python {
 
+// Of [height,width,channels] uint8. Errors as of SpanOf.
+ImageU8 ImageFromPython(const char* function, const char* argument, const py::object& pixels);
+
 py::dict MeshToDict(Mesh mesh);
 
 // ValueError or TypeError, in the name of `function`, where an array has another shape or dtype or

@@ -9,9 +9,8 @@
 namespace tilegrad::python {
 
 void BindMeshes(py::module_& m);
-void BindImages(py::module_& m);
+void BindArrayFiles(py::module_& m);
 void BindCameraFiles(py::module_& m);
-void BindWeights(py::module_& m);
 void BindPredictor(py::module_& m);
 void BindDataset(py::module_& m);
 void BindSurfaces(py::module_& m);
@@ -28,9 +27,8 @@ PYBIND11_MODULE(_tools, m) {
   m.attr("__version__") = TILEGRAD_VERSION;
   ThrowIfError(ForceTargetFromEnvironment());
   BindMeshes(m);
-  BindImages(m);
+  BindArrayFiles(m);
   BindCameraFiles(m);
-  BindWeights(m);
   BindPredictor(m);
   BindDataset(m);
   BindSurfaces(m);

@@ -38,9 +38,10 @@ def stub_names(path):
     names, members = set(), {}
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.ClassDef):
-            members[node.name] = set(defined(node.body))
+            members[node.name] = set(defined(node.body)).union(*(members[base.id] for base in node.bases))
     names = set(defined(ast.parse(path.read_text()).body))
-    return names, members
+    own = {name for name in names if name == "__version__" or not name.startswith("_")}
+    return own, {name: members[name] for name in members if name in own}
 
 
 def defined(body):

@@ -1,20 +1,100 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weights of networks (safetensors, npz) and checkpoints of training runs.
+// Arrays from files and to files: images (PNG, JPEG and others as uint8, EXR as float32, NPY as it
+// is), weights of networks (safetensors, npz), checkpoints of training runs.
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include <map>
 
-#include "bindings/npy_arrays.h"
+#include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
+#include "io/exr_file.h"
+#include "io/image_file.h"
+#include "io/npz.h"
 #include "nn/serialize.h"
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::python {
 
-void BindWeights(py::module_& m);
+void BindArrayFiles(py::module_& m);
 
 namespace {
+
+constexpr io::NpyType kTypes[] = {io::NpyType::kBool, io::NpyType::kU8,  io::NpyType::kI8,
+                                  io::NpyType::kU16,  io::NpyType::kI16, io::NpyType::kU32,
+                                  io::NpyType::kI32,  io::NpyType::kU64, io::NpyType::kI64,
+                                  io::NpyType::kF32,  io::NpyType::kF64};
+
+py::dtype DTypeOf(io::NpyType type) { return py::dtype(std::string(io::NpyTypeName(type))); }
+
+py::array NpyToPython(io::NpyArray array) {
+  const std::vector<py::ssize_t> shape(array.shape.begin(), array.shape.end());
+  const auto bytes = static_cast<py::ssize_t>(array.data.size());
+  py::array flat = OwnedArray<std::uint8_t>(std::move(array.data), {bytes});
+  return flat.attr("view")(DTypeOf(array.type)).attr("reshape")(shape);
+}
+
+// A copy of a C-contiguous array. TypeError for a dtype that .npy files of ours do not hold, which
+// names `function` and `argument`.
+io::NpyArray NpyFromPython(const char* function, const std::string& argument,
+                           const py::object& object) {
+  const auto array = py::cast<py::array>(object);
+  for (const io::NpyType type : kTypes) {
+    if (!array.dtype().equal(DTypeOf(type)) || !(array.flags() & py::array::c_style)) continue;
+    io::NpyArray out{type, {}, {}};
+    out.shape.assign(array.shape(), array.shape() + array.ndim());
+    const auto* data = static_cast<const std::uint8_t*>(array.data());
+    out.data.assign(data, data + array.nbytes());
+    return out;
+  }
+  throw py::type_error(fmt::format(
+      "{}: {} has dtype {}, expected a C-contiguous array of bool, integers, float32 or float64",
+      function, argument, py::cast<std::string>(py::str(array.dtype()))));
+}
+
+py::array LoadImage(const Path& path, std::size_t max_bytes) {
+  ImageU8 image = LoadWithin(max_bytes, [&] { return io::LoadImage(path); });
+  return OwnedArray<std::uint8_t>(std::move(image.pixels),
+                                  {image.height, image.width, image.channels});
+}
+
+// pixels: [height,width,channels] uint8.
+void SavePng(const Path& path, const py::object& pixels) {
+  const ImageU8 image = ImageFromPython("save_image", "image", pixels);
+  ThrowIfError(WithoutGil([&] { return io::SavePng(path, image).Within(path.string()); }));
+}
+
+// Names of channels, [channels,height,width] float32, and warnings.
+py::tuple LoadExr(const Path& path, std::size_t max_bytes) {
+  io::LoadedExr image = LoadWithin(max_bytes, [&] { return io::LoadExr(path); });
+  const auto channels = static_cast<py::ssize_t>(image.names.size());
+  py::list names, warnings;
+  for (const std::string& name : image.names) names.append(Text(name));
+  for (const std::string& warning : image.warnings) warnings.append(Text(warning));
+  return py::make_tuple(
+      names, OwnedArray<float>(std::move(image.values), {channels, image.height, image.width}),
+      warnings);
+}
+
+void SaveExr(const Path& path, const std::vector<std::string>& names, const py::object& planes) {
+  const auto values = SpanOf<float>(planes, "save_image", "image",
+                                    {static_cast<py::ssize_t>(names.size()), kAny, kAny});
+  const auto array = py::reinterpret_borrow<py::array>(planes);
+  io::ExrImage image{static_cast<int>(array.shape(2)), static_cast<int>(array.shape(1)), {}};
+  const std::size_t size = names.empty() ? 0 : values.size() / names.size();
+  for (std::size_t c = 0; c < names.size(); ++c)
+    image.channels.push_back({names[c], values.subspan(c * size, size)});
+  ThrowIfError(WithoutGil([&] { return io::SaveExr(path, image).Within(path.string()); }));
+}
+
+py::array LoadNpy(const Path& path, std::size_t max_bytes) {
+  return NpyToPython(LoadWithin(max_bytes, [&] { return io::LoadNpy(path); }));
+}
+
+void SaveNpy(const Path& path, const py::object& array) {
+  const Bytes bytes = io::EncodeNpy(NpyFromPython("save_image", "image", array));
+  ThrowIfError(WithoutGil([&] { return WriteFileAtomic(path, bytes); }));
+}
 
 using Metadata = std::map<std::string, std::string>;
 
@@ -117,7 +197,16 @@ py::dict LoadCheckpoint(const Path& path) {
 
 }  // namespace
 
-void BindWeights(py::module_& m) {
+void BindArrayFiles(py::module_& m) {
+  m.def("load_image", &LoadImage, py::arg("path"), py::arg("max_bytes") = 0, "(H, W, C) uint8.");
+  m.def("save_png", &SavePng, py::arg("path"), py::arg("pixels"), "Writes (H, W, C) uint8.");
+  m.def("load_exr", &LoadExr, py::arg("path"), py::arg("max_bytes") = 0,
+        "Names of channels, (C, H, W) float32, and what of the file is left out.");
+  m.def("save_exr", &SaveExr, py::arg("path"), py::arg("names"), py::arg("planes"),
+        "Writes (C, H, W) float32 with names of channels.");
+  m.def("load_npy", &LoadNpy, py::arg("path"), py::arg("max_bytes") = 0,
+        "The array of an .npy file.");
+  m.def("save_npy", &SaveNpy, py::arg("path"), py::arg("array"), "Writes an .npy file.");
   m.def("load_safetensors", &LoadSafetensors, py::arg("path"), py::arg("max_bytes") = 0,
         "Arrays and metadata by name.");
   m.def("save_safetensors", &SaveSafetensors, py::arg("path"), py::arg("arrays"),
