@@ -3,6 +3,7 @@
 // oneTBB.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <memory>
@@ -98,5 +99,19 @@ void KeepToCores(std::span<const int> cores);
 // cannot. Those of C++'s runtime are first used by the thread's first exception: mostly
 // std::bad_alloc.
 void ReserveThreadData();
+
+// Calls task(begin, end) for ranges of at most `size` indices that make up [0, n); on the calling
+// thread, in order, where `workers` is null or there is one range only.
+// Calls task(begin, end) for ranges of at most `size` indices of [0, n), which several workers may
+// share; null: on the caller.
+template <class Task>
+void ForChunks(const Workers* workers, std::size_t n, std::size_t size, const Task& task) {
+  if (workers == nullptr || n <= size) {
+    for (std::size_t i = 0; i < n; i += size) task(i, std::min(n, i + size));
+    return;
+  }
+  workers->ForRanges(n, size,
+                     [&](std::size_t begin, std::size_t end, std::size_t) { task(begin, end); });
+}
 
 }  // namespace tilegrad

@@ -11,7 +11,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "proof/tradeoff_study.h"
+#include "proof/tradeoff.h"
 
 namespace tilegrad::cli {
 namespace {

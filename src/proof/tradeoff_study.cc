@@ -6,7 +6,7 @@
 
 #include "base/escape_text.h"
 #include "io/mesh_file.h"
-#include "proof/tradeoff_study.h"
+#include "proof/tradeoff.h"
 #include "scene/camera.h"
 #include "scene/shapes.h"
 #include "train/named_configs.h"
@@ -14,7 +14,7 @@
 #include "train/report/log_plot.h"
 #include "train/trainer.h"
 
-namespace tilegrad::cli {
+namespace tilegrad {
 namespace {
 
 double Cost(const TradeoffRow& row) { return row.forward_ms + row.backward_ms; }
@@ -182,4 +182,4 @@ Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
   return out;
 }
 
-}  // namespace tilegrad::cli
+}  // namespace tilegrad

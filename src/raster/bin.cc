@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "raster/chunks.h"
+#include "base/parallel.h"
 
 namespace tilegrad::raster {
 namespace {

@@ -101,4 +101,6 @@ inline constexpr float kGuardBand = 16384.0f;  // pixels
 inline constexpr double kMaxSnap = 0x1p40;       // pixels
 inline constexpr double kFlatHeight = 1.0 / 64;  // pixels, rule 8
 
+inline constexpr std::int32_t kNoFace = -1;  // a background pixel
+
 }  // namespace tilegrad::raster

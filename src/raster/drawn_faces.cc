@@ -11,7 +11,7 @@
 #if HWY_ONCE
 #include <algorithm>
 
-#include "raster/chunks.h"
+#include "base/parallel.h"
 
 namespace tilegrad::raster {
 namespace {

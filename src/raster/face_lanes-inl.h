@@ -15,7 +15,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "raster/screen_mesh.h"
 
 HWY_BEFORE_NAMESPACE();

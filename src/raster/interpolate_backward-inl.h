@@ -13,8 +13,8 @@
 #include <cstddef>
 #include <cstring>
 
+#include "raster/conventions.h"
 #include "raster/corner_planes-inl.h"
-#include "raster/fragments.h"
 #include "raster/interpolate_backward.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "raster/chunks.h"
+#include "base/parallel.h"
 #include "raster/project_ref.h"
 
 namespace tilegrad::raster {

@@ -13,7 +13,6 @@
 #include <cstddef>
 
 #include "base/prefetch.h"
-#include "raster/tile_face_setup.h"
 #include "raster/visibility.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -11,7 +11,7 @@
 #if HWY_ONCE
 #include <algorithm>
 
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 
 namespace tilegrad::raster {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/scalar.h"
+#include "raster/conventions.h"
 #include "raster/coverage.h"
 #include "raster/face_plane.h"
-#include "raster/fragments.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {

@@ -8,7 +8,7 @@
 #include "base/simd_target.h"
 #include "fuzz/numbers.h"
 #include "fuzz/target.h"
-#include "nn/kernels/conv2d/trial.h"
+#include "nn/kernels/kernel_trial.h"
 #include "shade/texture.h"
 #include "shade/texture_levels.h"
 #include "shade/texture_levels_ref.h"

@@ -13,7 +13,7 @@
 
 #include "base/rng.h"
 #include "base/simd_target.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "raster/interpolate_ref.h"
 #include "raster/visibility_ref.h"
 

@@ -15,8 +15,8 @@
 #include "base/rng.h"
 #include "base/simd_target.h"
 #include "raster/bin.h"
+#include "raster/conventions.h"
 #include "raster/coverage.h"
-#include "raster/fragments.h"
 #include "raster/visibility_ref.h"
 
 namespace tilegrad::raster::visibility_test {

@@ -172,8 +172,7 @@ TEST(Structure, FoldersOfCompatAreNamespaces) {
 }
 
 TEST(Structure, ShadeSeesOnlyTheRecordsOfRaster) {
-  const std::set<std::string> records = {"raster/fragments.h", "raster/screen_mesh.h",
-                                         "raster/conventions.h"};
+  const std::set<std::string> records = {"raster/screen_mesh.h", "raster/conventions.h"};
   for (const auto& [file, target] : IncludesUnder("src/shade")) {
     if (FirstPart(target) != "raster") continue;
     EXPECT_TRUE(records.count(target)) << file << " includes " << target;

@@ -16,7 +16,7 @@
 #include <limits>
 
 #include "compat/kaolin/face_visibility.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::compat::kaolin {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "compat/kaolin/face_visibility.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 
 namespace tilegrad::compat::kaolin {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "compat/kaolin/face_visibility.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "render/pipeline/validate.h"
 
 namespace tilegrad::compat::kaolin {

@@ -17,7 +17,6 @@
 #include "raster/bin.h"
 #include "raster/conventions.h"
 #include "raster/drawn_faces.h"
-#include "raster/fragments.h"
 #include "raster/screen_mesh.h"
 #include "raster/visibility.h"
 

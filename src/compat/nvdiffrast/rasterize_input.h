@@ -7,7 +7,7 @@
 
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/rasterize.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 
 namespace tilegrad::compat::nvdiffrast {
 

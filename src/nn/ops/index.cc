@@ -1,13 +1,91 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/index.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/copy.h"
+#include "base/parallel.h"
 
 namespace tilegrad::nn {
 namespace {
+
+// Rows picked along the middle axis of [outer, extent, inner].
+struct IndexedRows {
+  std::size_t outer = 1, extent = 1, inner = 1;
+  const std::int32_t* indices = nullptr;  // [count], each in [0, extent)
+  std::size_t count = 0;
+};
+
+// Elements picked along the last axis of [outer, extent], other ones for each row.
+struct PickedElements {
+  std::size_t outer = 1, extent = 1;
+  const std::int32_t* indices = nullptr;  // [outer, count], each in [0, extent)
+  std::size_t count = 0;
+};
+
+constexpr std::size_t kCopyGrain = 16384;  // elements to a task
+
+std::size_t RowsPerTask(std::size_t length) {
+  return std::max<std::size_t>(1, kCopyGrain / std::max<std::size_t>(1, length));
+}
+
+// y[o, i, :] = x[o, indices[i], :]; y is [outer, count, inner].
+template <class T>
+void GatherRows(const IndexedRows& rows, const T* x, T* y, const Workers& workers) {
+  workers.ForRanges(rows.outer * rows.count, RowsPerTask(rows.inner),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t row = begin; row < end; ++row) {
+                        const std::size_t o = row / rows.count;
+                        const auto index = static_cast<std::size_t>(rows.indices[row % rows.count]);
+                        std::copy_n(x + (o * rows.extent + index) * rows.inner, rows.inner,
+                                    y + row * rows.inner);
+                      }
+                    });
+}
+
+// y = 0, then y[o, indices[i], :] += x[o, i, :] in the order of i; y is [outer, extent, inner].
+template <class T>
+void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& workers) {
+  workers.For(rows.outer, [&](std::size_t o, std::size_t) {
+    T* to = y + o * rows.extent * rows.inner;
+    std::fill_n(to, rows.extent * rows.inner, T(0));
+    for (std::size_t i = 0; i < rows.count; ++i) {
+      const T* from = x + (o * rows.count + i) * rows.inner;
+      T* sum = to + static_cast<std::size_t>(rows.indices[i]) * rows.inner;
+      for (std::size_t k = 0; k < rows.inner; ++k) sum[k] += from[k];
+    }
+  });
+}
+
+// y[o, i] = x[o, indices[o, i]]; y is [outer, count].
+template <class T>
+void TakeElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
+  workers.ForRanges(picked.outer, RowsPerTask(picked.count),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t o = begin; o < end; ++o) {
+                        const T* row = x + o * picked.extent;
+                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i) {
+                          y[i] = row[picked.indices[i]];
+                        }
+                      }
+                    });
+}
+
+// y = 0, then y[o, indices[o, i]] += x[o, i] in the order of i; y is [outer, extent].
+template <class T>
+void PlaceElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
+  workers.ForRanges(picked.outer, RowsPerTask(picked.extent),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t o = begin; o < end; ++o) {
+                        T* row = y + o * picked.extent;
+                        std::fill_n(row, picked.extent, T(0));
+                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i) {
+                          row[picked.indices[i]] += x[i];
+                        }
+                      }
+                    });
+}
 
 // Why elements below `extent` cannot be addressed by `indices`, or OK.
 Status CheckIndices(const char* op, const Tensor& indices, std::int64_t extent) {

@@ -6,12 +6,53 @@
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/copy.h"
+#include "base/parallel.h"
 #include "nn/ops/broadcast.h"
 #include "nn/ops/reduce.h"
 
 namespace tilegrad::nn {
 namespace {
+
+// to[sum i strides_to] = from[sum i strides_from] for every index of a box. Axes that are not used
+// have extent 1.
+struct StridedBox {
+  static constexpr int kRank = 5;
+  using Axes = std::array<std::size_t, kRank>;
+  Axes extents = {1, 1, 1, 1, 1};
+  Axes strides_from{}, strides_to{};
+};
+
+template <class T>
+void CopyRow(const StridedBox& box, const T* from, T* to) {
+  const std::size_t n = box.extents.back();
+  const std::size_t step_from = box.strides_from.back(), step_to = box.strides_to.back();
+  if (step_from == 1 && step_to == 1) {
+    std::copy_n(from, n, to);
+    return;
+  }
+  for (std::size_t i = 0; i < n; ++i) to[i * step_to] = from[i * step_from];
+}
+
+template <class T>
+void CopyStrided(const StridedBox& box, const T* from, T* to, const Workers& workers) {
+  std::size_t rows = 1;
+  for (std::size_t i = 0; i + 1 < box.extents.size(); ++i) rows *= box.extents[i];
+  constexpr std::size_t kGrain = 16384;  // elements to a task
+  const std::size_t length = std::max<std::size_t>(1, box.extents.back());
+  workers.ForRanges(rows, std::max<std::size_t>(1, kGrain / length),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t row = begin; row < end; ++row) {
+                        std::size_t rest = row, offset_from = 0, offset_to = 0;
+                        for (std::size_t i = box.extents.size() - 1; i-- > 0;) {
+                          const std::size_t index = rest % box.extents[i];
+                          rest /= box.extents[i];
+                          offset_from += index * box.strides_from[i];
+                          offset_to += index * box.strides_to[i];
+                        }
+                        CopyRow(box, from + offset_from, to + offset_to);
+                      }
+                    });
+}
 
 // Row-major strides, right-aligned into a box of five axes.
 StridedBox::Axes StridesOf(const Shape& shape) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Products of matrices and convolutions against scalar loops in double.
-#include "nn/kernels/conv2d/trial.h"
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"
+#include "nn/kernels/kernel_trial.h"
 #include "proof/selftest/check.h"
 
 namespace tilegrad::selftest {

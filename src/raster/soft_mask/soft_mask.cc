@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raster/soft_mask/soft_mask.h"
 
-#include "raster/chunks.h"
+#include "base/parallel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "raster/soft_mask/soft_mask.cc"

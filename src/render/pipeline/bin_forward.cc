@@ -7,7 +7,7 @@
 
 #include "base/clocks.h"
 #include "base/prefetch.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "render/pipeline/frame_layout.h"
 
 namespace tilegrad {

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "base/clocks.h"
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "raster/visibility_ref.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/quick_checks.h"

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "raster/fragments.h"
+#include "raster/conventions.h"
 #include "raster/interpolate_ref.h"
 #include "raster/near_clip.h"
 #include "raster/project_ref.h"

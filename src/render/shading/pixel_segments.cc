@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "raster/conventions.h"
-#include "raster/fragments.h"
 
 namespace tilegrad {
 namespace {

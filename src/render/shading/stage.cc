@@ -5,7 +5,6 @@
 
 #include "base/clocks.h"
 #include "raster/conventions.h"
-#include "raster/fragments.h"
 #include "render/pipeline/part_backward.h"
 #include "render/pipeline/quick_checks.h"
 #include "render/shading/uv_level.h"

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "nn/kernels/conv2d/trial.h"
 #include "nn/kernels/kernel_test_util.h"
+#include "nn/kernels/kernel_trial.h"
 
 namespace tilegrad::nn {
 
