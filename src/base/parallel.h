@@ -102,8 +102,6 @@ void ReserveThreadData();
 
 // Calls task(begin, end) for ranges of at most `size` indices that make up [0, n); on the calling
 // thread, in order, where `workers` is null or there is one range only.
-// Calls task(begin, end) for ranges of at most `size` indices of [0, n), which several workers may
-// share; null: on the caller.
 template <class Task>
 void ForChunks(const Workers* workers, std::size_t n, std::size_t size, const Task& task) {
   if (workers == nullptr || n <= size) {
