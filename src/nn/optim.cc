@@ -47,11 +47,11 @@ Adam::Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions
   }
 }
 
-Status Adam::Step(std::span<const Var> gradients, double gradient_scale) {
+Status Adam::Step(std::span<const Var> gradients) {
   StepVector<Gradient> as_they_are(context_.allocator<Gradient>());
   as_they_are.reserve(gradients.size());
   for (const Var& g : gradients) as_they_are.emplace_back(g);
-  return Step(as_they_are, gradient_scale);
+  return Step(as_they_are);
 }
 
 Status Adam::Check(std::span<const Gradient> gradients) const {
@@ -69,7 +69,7 @@ Status Adam::Step(std::span<const Gradient> gradients, UpdateShare* share) {
   if (share == nullptr) return Step(gradients);
   TILEGRAD_TRY(Check(gradients));
   ++steps_;
-  BeginStep(/*gradient_scale=*/1);
+  BeginStep();
   share->Begin(*this);
   context_.workers().For(share->pieces(), [&](std::size_t k, std::size_t) {
     const UpdateShare::Piece piece = share->piece(k);
@@ -80,10 +80,10 @@ Status Adam::Step(std::span<const Gradient> gradients, UpdateShare* share) {
   return share->Finish();
 }
 
-Status Adam::Step(std::span<const Gradient> gradients, double gradient_scale) {
+Status Adam::Step(std::span<const Gradient> gradients) {
   TILEGRAD_TRY(Check(gradients));
   ++steps_;
-  BeginStep(gradient_scale);
+  BeginStep();
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     if (gradients[i].is_product()) {
       UpdateByProduct(slots_[i], gradients[i]);
@@ -117,9 +117,9 @@ Status Adam::LoadState(const std::vector<NamedTensor>& state) {
   return {};
 }
 
-void Adam::BeginStep(double gradient_scale) {
+void Adam::BeginStep() {
   const auto t = static_cast<double>(steps());
-  coefficients_ = {gradient_scale, options_.beta1, options_.beta2, options_.epsilon};
+  coefficients_ = {options_.beta1, options_.beta2, options_.epsilon};
   coefficients_.step = options_.learning_rate / (1.0 - std::pow(options_.beta1, t));
   coefficients_.inverse_root = 1.0 / std::sqrt(1.0 - std::pow(options_.beta2, t));
 }
@@ -201,8 +201,6 @@ bool IsFinite(Context& context, std::span<const Gradient> gradients) {
            std::isfinite(SquaresOf(context, g.Value()));
   });
 }
-
-double ClipFactor(double norm, double max_norm) { return norm > max_norm ? max_norm / norm : 1.0; }
 
 namespace {
 

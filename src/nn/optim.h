@@ -54,11 +54,10 @@ class Adam {
   Adam(const Adam&) = delete;
   Adam& operator=(const Adam&) = delete;
 
-  // One step along `gradients` (as Gradients or Grad return them for parameters(): same bits), each
-  // multiplied by `gradient_scale` on the way (see ClipFactor). A gradient that is not valid or
-  // does not fit is refused before anything is changed.
-  Status Step(std::span<const Gradient> gradients, double gradient_scale = 1.0);
-  Status Step(std::span<const Var> gradients, double gradient_scale = 1.0);
+  // One step along `gradients`, as Gradients or Grad return them for parameters(): same bits. A
+  // gradient that is not valid or does not fit is refused before anything is changed.
+  Status Step(std::span<const Gradient> gradients);
+  Status Step(std::span<const Var> gradients);
 
   // The same where `share` is not null, of whose pieces alone gradients are read: values, no
   // products. Moments of other numbers stay behind.
@@ -84,7 +83,7 @@ class Adam {
   };
   Status Check(std::span<const Gradient> gradients) const;
   // What all parameters of step steps() (1, 2, ..) share, then each of them.
-  void BeginStep(double gradient_scale);
+  void BeginStep();
   // Numbers [begin, end); called by several threads, each with other numbers.
   void Update(Slot& slot, const Tensor& gradient, Numbers numbers);
   void UpdateByProduct(Slot& slot, const Gradient& product);
@@ -106,8 +105,6 @@ double GlobalNorm(Context& context, std::span<const Gradient> gradients);  // co
 // Whether GlobalNorm is finite. Computes a product only if its factors are too large for the
 // Cauchy-Schwarz inequality to decide.
 bool IsFinite(Context& context, std::span<const Gradient> gradients);
-// The factor that brings a norm above `max_norm` down to it: min(1, max_norm / norm).
-double ClipFactor(double norm, double max_norm);
 
 // Exponential moving average of weights, for evaluation: smoother than the weights in
 // training.

@@ -41,8 +41,8 @@ MUTANTS = [
            "hn::IfThenElseZero(hn::Ge(cosine, hn::Zero(d)), LoadRun(d_light, i))", "LoadRun(d_light, i)", ["renderer_simd"]),
     Mutant("batch norm divides by the variance alone", "src/nn/kernels/batch_norm-inl.h",
            "hn::Add(variance, hn::Set(d, static_cast<float>(p.epsilon)))", "variance", ["nn_ops", "nn_reduce", "nn_derivatives"]),
-    Mutant("Adam forgets the gradient's scale in the second moment", "src/nn/kernels/adam-inl.h",
-           "hn::Mul(rest2, hn::Mul(g, g))", "hn::Mul(rest2, hn::Mul(g, gradient))", ["nn_adam"]),
+    Mutant("Adam's second moment is of the gradient, not of its square", "src/nn/kernels/adam-inl.h",
+           "hn::Mul(rest2, hn::Mul(g, g))", "hn::Mul(rest2, g)", ["nn_adam"]),
     # Readers.
     Mutant("a PNG's checksums are not looked at", "src/io/image_check.cc",
            "if (crc != BigEndian32(", "if (false && crc != BigEndian32(", ["io_formats"]),

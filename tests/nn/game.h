@@ -37,8 +37,7 @@ class Game {
                      Mean(Abs(painted - real)) + GradientPenalty(wide_critic_, one) +
                      Mean(Abs(wide_net_.Forward(one, Mode::kTrain) - one));
     const auto gradients = Grad(loss, adam_.parameters());
-    const double scale = ClipFactor(GlobalNorm(context_, gradients), 1.0);
-    const Status status = adam_.Step(gradients, scale);
+    const Status status = adam_.Step(gradients);
     EXPECT_TRUE(status.ok()) << status.message();
     return loss.item();
   }

@@ -20,8 +20,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 struct AdamRule {
   // Written out: a default member initialiser would not be compiled for the target.
   HWY_INLINE explicit AdamRule(const AdamCoefficients& c)
-      : scale(Set(c.gradient_scale)),
-        beta1(Set(c.beta1)),
+      : beta1(Set(c.beta1)),
         rest1(Set(1 - c.beta1)),
         beta2(Set(c.beta2)),
         rest2(Set(1 - c.beta2)),
@@ -31,10 +30,9 @@ struct AdamRule {
         keep(Set(c.keep)) {}
 
   // `count` numbers: a whole vector or a tail.
-  HWY_INLINE void Update(VF gradient, float* parameter, float* m_at, float* v_at,
+  HWY_INLINE void Update(VF g, float* parameter, float* m_at, float* v_at,
                          std::size_t count) const {
     const DF d;
-    const VF g = hn::Mul(scale, gradient);
     const VF m = hn::MulAdd(beta1, LoadSome(d, m_at, count), hn::Mul(rest1, g));
     const VF v = hn::MulAdd(beta2, LoadSome(d, v_at, count), hn::Mul(rest2, hn::Mul(g, g)));
     const VF denominator = hn::MulAdd(hn::Sqrt(v), root, epsilon);
@@ -44,7 +42,7 @@ struct AdamRule {
     StoreSome(hn::Sub(p, hn::Div(hn::Mul(step, m), denominator)), d, parameter, count);
   }
 
-  VF scale, beta1, rest1, beta2, rest2, root, epsilon, step, keep;
+  VF beta1, rest1, beta2, rest2, root, epsilon, step, keep;
 
  private:
   static HWY_INLINE VF Set(double x) { return hn::Set(DF(), static_cast<float>(x)); }

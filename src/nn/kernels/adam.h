@@ -9,12 +9,10 @@
 
 namespace tilegrad::nn {
 
-//   g = gradient_scale g
 //   m = beta1 m + (1 - beta1) g
 //   v = beta2 v + (1 - beta2) g^2
 //   p = keep p - step m / (sqrt(v) inverse_root + epsilon)
 struct AdamCoefficients {
-  double gradient_scale = 1;
   double beta1 = 0.9, beta2 = 0.999;
   double epsilon = 1e-8;
   double step = 0;          // learning rate / (1 - beta1^t)

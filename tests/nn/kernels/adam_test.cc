@@ -11,7 +11,7 @@ TEST(Adam, EqualsReference) {
   const Workers workers(2);
   Rng rng(8);
   const AdamCoefficients coefficients{
-      .gradient_scale = 0.7, .epsilon = 1e-3, .step = 0.05, .inverse_root = 1.5, .keep = 0.99};
+      .epsilon = 1e-3, .step = 0.05, .inverse_root = 1.5, .keep = 0.99};
   for (const std::size_t n : {1, 3, 8, 29, 70001}) {
     const auto p0 = RandomFloats(rng, n), g = RandomFloats(rng, n), m0 = RandomFloats(rng, n);
     std::vector<float> v0 = RandomFloats(rng, n);

@@ -70,11 +70,7 @@ class Step {
             .parameter = state.p.data(),
             .m = state.m.data(),
             .v = state.v.data(),
-            .coefficients = {.gradient_scale = 0.7,
-                             .epsilon = 1e-3,
-                             .step = 0.05,
-                             .inverse_root = 1.5,
-                             .keep = 0.99}};
+            .coefficients = {.epsilon = 1e-3, .step = 0.05, .inverse_root = 1.5, .keep = 0.99}};
   }
 
   Case case_;
