@@ -25,24 +25,22 @@
 namespace tilegrad::cli {
 namespace {
 
-struct DatasetSourceRequest {
-  std::vector<std::string> sources;  // names of DatasetSourceNames
-  std::string input, split_list;     // empty: not given
-  int procedural_per_class = 0;      // 0: the default
-  std::uint64_t seed = 0;            // of procedural shapes
+struct DatasetOptions {
+  std::vector<std::string> sources = {"sweethome3d"};
+  std::string input, out, split_list;
+  int workers = 0;
+  bool fixed_size = false;  // --size or --views was given
+  bool shares = false;      // of the split were given
+  bool liveries = false;    // --liveries was given
+  bool force = false;
+  train::BuildOptions build;
+
+  std::string Name() const { return fmt::format("{}", fmt::join(sources, "+")); }
 };
 
-using train::ModelSource;
-using Opened = Result<std::unique_ptr<ModelSource>>;
+using Opened = Result<std::unique_ptr<train::ModelSource>>;
 
 constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
-
-Opened OpenSeveral(const DatasetSourceRequest& request) {
-  const std::string name = fmt::format("{}", fmt::join(request.sources, "+"));
-  if (!request.input.empty())
-    return InvalidArgument("--input: --source {} reads several folders; leave it out", name);
-  return train::OpenInstalledSources(name);
-}
 
 std::vector<std::string> DatasetSourceNames() {
   std::vector<std::string> names = {"shapenet", "folder", "procedural", "nmr", train::kThirteen};
@@ -63,40 +61,24 @@ std::string DatasetSourceHelp() {
 // One source, or several of installed packages as one. Errors: --input is missing, or given where
 // there is no one folder to read; a name twice; several of which one is no package; and those of
 // opening them.
-Opened OpenDatasetSource(const DatasetSourceRequest& request) {
-  const std::string& name = request.sources.front();
-  if (request.sources.size() > 1 || name == train::kThirteen) return OpenSeveral(request);
+Opened OpenDatasetSource(const DatasetOptions& options) {
+  const std::string& name = options.sources.front();
+  if (options.sources.size() > 1 || name == train::kThirteen) {
+    if (options.input.empty()) return train::OpenInstalledSources(options.Name());
+    return InvalidArgument("--input: --source {} reads several folders; leave it out",
+                           options.Name());
+  }
   if (name == "procedural") {
-    const int models = request.procedural_per_class;
-    return train::ProceduralSource(models > 0 ? models : kProceduralModels, request.seed);
+    const int models = options.build.per_class;
+    return train::ProceduralSource(models > 0 ? models : kProceduralModels,
+                                   options.build.split.seed);
   }
   if (const auto* installed = train::FindInstalledSource(name))
-    return installed->open(request.input.empty() ? installed->folder : request.input);
-  if (request.input.empty()) return InvalidArgument("--source {} needs --input FOLDER", name);
-  if (name == "folder") return train::FolderSource(request.input);
-  if (name == "shapenet") return train::ShapeNetSource(request.input, request.split_list);
-  return train::NmrSource(request.input);
-}
-
-struct DatasetOptions {
-  std::vector<std::string> sources = {"sweethome3d"};
-  std::string input, out, split_list;
-  int workers = 0;
-  bool fixed_size = false;  // --size or --views was given
-  bool shares = false;      // of the split were given
-  bool liveries = false;    // --liveries was given
-  bool force = false;
-  train::BuildOptions build;
-
-  std::string Name() const { return fmt::format("{}", fmt::join(sources, "+")); }
-};
-
-DatasetSourceRequest RequestOf(const DatasetOptions& options) {
-  return {.sources = options.sources,
-          .input = options.input,
-          .split_list = options.split_list,
-          .procedural_per_class = options.build.per_class,
-          .seed = options.build.split.seed};
+    return installed->open(options.input.empty() ? installed->folder : options.input);
+  if (options.input.empty()) return InvalidArgument("--source {} needs --input FOLDER", name);
+  if (name == "folder") return train::FolderSource(options.input);
+  if (name == "shapenet") return train::ShapeNetSource(options.input, options.split_list);
+  return train::NmrSource(options.input);
 }
 
 bool Has(const DatasetOptions& options, std::string_view source) {
@@ -163,24 +145,16 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
   for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
 }
 
-void PrintModelWarnings(const train::BuildSummary& summary) {
+// A few of what `items` say of files, below a heading.
+template <class Item>
+void PrintSome(const std::vector<Item>& items, const std::string& heading,
+               std::string Item::*what) {
   constexpr std::size_t kShown = 10;
-  if (summary.warnings.empty()) return;
-  Print("{} while reading models:\n", Count(summary.warnings.size(), "warning"));
-  for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
-    Print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
-  if (summary.warnings.size() > kShown) Print("  ...\n");
-}
-
-void PrintIgnored(const train::BuildSummary& summary) {
-  constexpr std::size_t kShown = 10;
-  if (summary.ignored.empty()) return;
-  const std::size_t count = summary.ignored.size();
-  Print("{} ignored:\n",
-        count == 1 ? "1 file or folder" : fmt::format("{} files or folders", count));
-  for (std::size_t i = 0; i < std::min(kShown, count); ++i)
-    Print("  {}: {}\n", summary.ignored[i].file, summary.ignored[i].reason);
-  if (count > kShown) Print("  ...\n");
+  if (items.empty()) return;
+  Print("{}:\n", heading);
+  for (std::size_t i = 0; i < std::min(kShown, items.size()); ++i)
+    Print("  {}: {}\n", items[i].file, items[i].*what);
+  if (items.size() > kShown) Print("  ...\n");
 }
 
 void PrintJson(const train::BuildSummary& summary, const Path& folder) {
@@ -198,13 +172,12 @@ void PrintJson(const train::BuildSummary& summary, const Path& folder) {
                {"bytes", summary.bytes}});
 }
 
-Result<std::unique_ptr<train::ModelSource>> Open(const DatasetOptions& options, const Path& folder,
-                                                 const Ranks& ranks) {
+Opened Open(const DatasetOptions& options, const Path& folder, const Ranks& ranks) {
   // It goes on with a dataset that is there, unless it is to be made anew.
   if (!ranks.follows() && !PathExists(train::DatasetInfoPath(folder)))
     TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
   TILEGRAD_TRY(CheckEffects(options));
-  return OpenDatasetSource(RequestOf(options));
+  return OpenDatasetSource(options);
 }
 
 Status Make(const DatasetOptions& options) {
@@ -228,8 +201,13 @@ Status Make(const DatasetOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   PrintTable(summary);
   PrintRejected(summary, folder);
-  PrintModelWarnings(summary);
-  PrintIgnored(summary);
+  PrintSome(summary.warnings, Count(summary.warnings.size(), "warning") + " while reading models",
+            &train::ModelWarning::text);
+  const std::size_t ignored = summary.ignored.size();
+  PrintSome(summary.ignored,
+            ignored == 1 ? "1 file or folder ignored"
+                         : fmt::format("{} files or folders ignored", ignored),
+            &train::IgnoredFile::reason);
   Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
         Count(summary.models.size(), "model"),
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,

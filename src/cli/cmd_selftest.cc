@@ -46,15 +46,11 @@ Result<std::vector<Check>> ChooseChecks(const std::string& only) {
   return InvalidArgument("--only {}: no check has that in its title; there are:\n{}", only, titles);
 }
 
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
+using Clock = std::chrono::steady_clock;
 
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& context) {
   try {
@@ -66,14 +62,14 @@ Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& con
 
 // Whether it holds. What it found is appended to `json`.
 bool RunCheck(const Check& check, const CheckContext& context, nlohmann::ordered_json* json) {
-  const Stopwatch watch;
+  const auto start = Clock::now();
   const auto finding = RunGuarded(check, context);
   Print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
-        finding.ok() ? finding->text : finding.status().message(), watch.seconds());
+        finding.ok() ? finding->text : finding.status().message(), SecondsSince(start));
   json->push_back({{"check", check.title},
                    {"holds", finding.ok()},
                    {"found", finding.ok() ? finding->text : finding.status().message()},
-                   {"seconds", watch.seconds()}});
+                   {"seconds", SecondsSince(start)}});
   std::fflush(stdout);  // a check that crashes is the one after the last line
   return finding.ok();
 }
@@ -102,17 +98,17 @@ Status RunSelftest(const SelftestOptions& options) {
   const std::string forced = ForcedTarget();
   const CheckContext context{workers, forced.empty() ? RunnableTargets() : std::vector{forced}};
   PrintHeader(context);
-  const Stopwatch watch;
+  const auto start = Clock::now();
   nlohmann::ordered_json json;
   const auto failed = std::count_if(checks.begin(), checks.end(), [&](const Check& check) {
     return !RunCheck(check, context, &json);
   });
   PrintResult(json);
   if (failed == 0) {
-    Print("all {} checks hold ({:.1f} s)\n", checks.size(), watch.seconds());
+    Print("all {} checks hold ({:.1f} s)\n", checks.size(), SecondsSince(start));
     return {};
   }
-  Print("{} of {} checks FAILED ({:.1f} s)\n", failed, checks.size(), watch.seconds());
+  Print("{} of {} checks FAILED ({:.1f} s)\n", failed, checks.size(), SecondsSince(start));
   return InternalError(
       "do not trust results of this program on this machine; please report the lines above");
 }
