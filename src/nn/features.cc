@@ -4,10 +4,7 @@
 #include <array>
 
 #include "base/error.h"
-#include "nn/ops/conv.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/pool.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

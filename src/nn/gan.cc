@@ -4,8 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "nn/ops/pointwise.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 Critic::Critic(Context& context, const CriticShape& shape, Rng& rng) {

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/ops/matmul.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/shape.h"
+#include "nn/ops.h"
 #include "nn/tensor.h"
 
 namespace tilegrad::nn {

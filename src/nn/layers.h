@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "nn/ops/batch_norm.h"
-#include "nn/ops/conv.h"
+#include "nn/ops.h"
 #include "nn/tape.h"
 #include "nn/tensor.h"
 

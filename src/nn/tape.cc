@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "nn/ops/matmul.h"
+#include "nn/ops.h"
 #include "nn/tape_node.h"
 
 namespace tilegrad::nn {

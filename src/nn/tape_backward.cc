@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "nn/ops/pointwise.h"
+#include "nn/ops.h"
 #include "nn/tape.h"
 #include "nn/tape_node.h"
 

@@ -6,9 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "nn/ops/axis_map.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/shape.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

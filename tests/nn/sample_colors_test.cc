@@ -9,7 +9,6 @@
 #include "base/simd_target.h"
 #include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 
 namespace tilegrad::nn::sample_colors_test {
 

@@ -7,7 +7,6 @@
 
 #include "gradient_check.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 #include "scene/shapes.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/distance_barrier.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Colours that vertices look up in a picture, of one picture at a time: nn/ops/sample_pictures.h has
+// Colours that vertices look up in a picture, of one picture at a time: nn/ops.h has
 // the formula.
 #pragma once
 

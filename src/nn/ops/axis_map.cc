@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/axis_map.h"
+
+#include "nn/kernels/axis_map.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/axis_map.h"
-#include "nn/ops/shape.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/batch_norm.h"
+
+#include "nn/kernels/batch_norm.h"
 
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/batch_norm.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/reduce.h"
-#include "nn/ops/shape.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

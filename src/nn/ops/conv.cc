@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/conv.h"
 
 #include <algorithm>
 #include <utility>
@@ -7,8 +6,7 @@
 #include "base/error.h"
 #include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/conv2d/conv2d_ref.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

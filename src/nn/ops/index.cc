@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/index.h"
-
 #include <algorithm>
 #include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

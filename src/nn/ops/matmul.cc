@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/matmul.h"
 
 #include <utility>
 
 #include "base/error.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/pointwise.h"
+#include "nn/kernels/pointwise.h"
 
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/pointwise.h"
+#include "nn/ops.h"
 #include "nn/ops/broadcast.h"
-#include "nn/ops/reduce.h"
 
 namespace tilegrad::nn {
 namespace {

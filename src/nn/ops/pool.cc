@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/pool.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -8,9 +7,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "nn/ops/axis_map.h"
-#include "nn/ops/index.h"
-#include "nn/ops/shape.h"
+#include "nn/ops.h"
 
 namespace tilegrad::nn {
 namespace {

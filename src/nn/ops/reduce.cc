@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/reduce.h"
+
+#include "nn/kernels/reduce.h"
 
 #include <array>
 #include <limits>
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/reduce.h"
+#include "nn/ops.h"
 #include "nn/ops/broadcast.h"
-#include "nn/ops/index.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/shape.h"
 
 namespace tilegrad::nn {
 namespace {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/sample_pictures.h"
 
 #include <algorithm>
 #include <cmath>

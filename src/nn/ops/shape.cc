@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/ops/shape.h"
-
 #include <algorithm>
 #include <array>
 #include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "nn/ops.h"
 #include "nn/ops/broadcast.h"
-#include "nn/ops/reduce.h"
 
 namespace tilegrad::nn {
 namespace {

@@ -3,8 +3,7 @@
 
 #include "base/error.h"
 #include "nn/gan.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::train {
 namespace {

@@ -5,9 +5,7 @@
 #include <string>
 
 #include "base/rng.h"
-#include "nn/ops/pointwise.h"
-#include "nn/ops/pool.h"
-#include "nn/ops/reduce.h"
+#include "nn/ops.h"
 
 namespace tilegrad::train {
 namespace {

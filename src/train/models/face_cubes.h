@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "nn/ops/axis_map.h"
+#include "nn/ops.h"
 #include "scene/mesh.h"
 
 namespace tilegrad::train {

@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "nn/layers.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 
 namespace tilegrad::train {
 namespace {

@@ -24,7 +24,7 @@ struct NetworkConfig {
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
                                     // fan-in, as convolutions
   double color_bias = 0.0;          // what vertex colours start at
-  bool picture_colors = false;      // colours are read from the picture (nn/ops/sample_pictures.h)
+  bool picture_colors = false;      // colours are read from the picture (nn/ops.h)
 };
 
 // At 64 x 64 with NetworkConfig's defaults.

@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 
 namespace tilegrad::train {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/ops/axis_map.h"
+#include "nn/ops.h"
 #include "scene/mesh.h"
 #include "train/models/picture_code.h"
 #include "train/models/prediction.h"

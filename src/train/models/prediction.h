@@ -16,7 +16,7 @@ struct Prediction {
   nn::Var positions{};   // [B, V, 3]
   nn::Var colors{};      // [B, V, 3] linear, not clamped
   nn::Var textures{};    // [B, h, h, 3] in [0, 1], by the sphere's longitude and latitude
-  nn::Var flow{};        // [B, 2, h, w] in [-1, 1] (nn/ops/sample_pictures.h)
+  nn::Var flow{};        // [B, 2, h, w] in [-1, 1] (nn/ops.h)
   nn::Var directions{};  // [B, 3] unit, to the light; Lambert and Phong
   nn::Var shininess{};   // [B]; Phong
   nn::Var sh{};          // [B, 9]; harmonics

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "nn/ops/axis_map.h"
+#include "nn/ops.h"
 #include "scene/mesh.h"
 #include "scene/topology.h"
 #include "train/ops/render_op.h"

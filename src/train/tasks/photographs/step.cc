@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 #include "train/losses/color_l1.h"
 #include "train/ops/weak_cameras.h"
 #include "train/tasks/equation14.h"
