@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "api/c_records.h"
-#include "base/guarded.h"
+#include "base/error.h"
 
 using tilegrad::InvalidArgument;
 using tilegrad::Status;

@@ -2,6 +2,7 @@
 #include "base/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -266,6 +267,39 @@ void RemoveTemporaries(const Path& folder) { LeftTemporaries(folder).RemoveAll()
 void RemoveTemporariesOf(const Path& file) {
   const Path folder = file.parent_path();
   LeftTemporaries(folder.empty() ? Path(".") : folder).RemoveOf(file.filename().string());
+}
+
+namespace {
+
+constexpr int kAttempts = 2;
+constexpr unsigned kPauseMicroseconds = 10'000;
+
+}  // namespace
+
+FolderLock::FolderLock(const Path& folder)
+    : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {}
+
+FolderLock::~FolderLock() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Result<FolderLock> FolderLock::Take(const Path& folder) {
+  TILEGRAD_TRY(MakeFolder(folder));
+  FolderLock lock(folder);
+  if (lock.fd_ < 0) return IoError("{}: cannot open: {}", folder.string(), std::strerror(errno));
+  // IsHeld takes it for a moment: once more, then.
+  for (int attempt = 0; ::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+       ++attempt) {
+    if (attempt == kAttempts)
+      return InvalidArgument("{}: in use by another process", folder.string());
+    ::usleep(kPauseMicroseconds);
+  }
+  return lock;
+}
+
+bool FolderLock::IsHeld(const Path& folder) {
+  const FolderLock probe(folder);
+  return probe.fd_ >= 0 && ::flock(probe.fd_, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
 }  // namespace tilegrad

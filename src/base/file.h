@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tilegrad/status.h"
@@ -67,5 +68,31 @@ class LeftTemporaries {
 void RemoveTemporaries(const Path& folder);
 // Only those of one file: for folders that also hold other programs' files.
 void RemoveTemporariesOf(const Path& file);
+
+// One process at a time in a folder.
+
+// Held during its lifetime and released by the system if the process is killed.
+class FolderLock {
+ public:
+  FolderLock() = default;  // of nothing
+  ~FolderLock();
+  FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  FolderLock& operator=(FolderLock&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+
+  // Makes the folder, and locks it itself: no file of ours is left in it. kInvalidArgument if
+  // another process holds it. On a file system without locks of folders (NFS) the result locks
+  // nothing.
+  static Result<FolderLock> Take(const Path& folder);
+  // Whether somebody holds it, this process included.
+  static bool IsHeld(const Path& folder);
+
+ private:
+  explicit FolderLock(const Path& folder);  // opened, not locked
+
+  int fd_ = -1;
+};
 
 }  // namespace tilegrad

@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "tilegrad/status.h"
+#include "base/error.h"
 
 namespace tilegrad {
 
@@ -37,7 +37,11 @@ struct Watch {
 
   bool stopped() const { return stop != nullptr && *stop; }
   // Tells; kCancelled, naming the stage, once the work is to end.
-  Status At(const Progress& now) const;
+  Status At(const Progress& now) const {
+    if (stopped()) return Cancelled("stopped while {}", now.stage);
+    if (progress) progress(now);
+    return {};
+  }
 };
 
 }  // namespace tilegrad

@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,20 @@ template <std::integral Number>
 std::string Count(Number number, std::string_view thing) {
   return std::to_string(number) + " " + Plural(thing, number == 1);
 }
+
+// Names for files, each once: the second "chair" is "chair_2".
+class UniqueNames {
+ public:
+  // `name`, or if it is taken the first of name_2, name_3, ... that is not; taken from now on.
+  std::string Take(const std::string& name) {
+    std::string unique = name;
+    for (int i = 2; !taken_.insert(unique).second; ++i) unique = name + "_" + std::to_string(i);
+    return unique;
+  }
+
+ private:
+  std::set<std::string> taken_;
+};
 
 // "my%20wood.png" -> "my wood.png" (RFC 3986). A "+" is no space; a "%" that two hexadecimal digits
 // do not follow stands for itself.

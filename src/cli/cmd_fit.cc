@@ -11,13 +11,12 @@
 #include <string>
 
 #include "base/error.h"
-#include "base/folder_lock.h"
+#include "base/file.h"
 #include "base/text.h"
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"
 #include "cli/live_option.h"
-#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "fit/config.h"
 #include "fit/poses/start_cameras.h"

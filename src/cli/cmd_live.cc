@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/folder_lock.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/live_option.h"

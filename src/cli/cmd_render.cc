@@ -11,12 +11,12 @@
 
 #include "base/error.h"
 #include "base/output_guard.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/mesh_options.h"
 #include "cli/render_job.h"
 #include "cli/run_folder.h"
-#include "cli/unique_names.h"
 #include "render/picture/mesh_scene.h"
 #include "render/scene_fields.h"
 #include "tilegrad/status.h"

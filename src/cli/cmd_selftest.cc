@@ -10,7 +10,6 @@
 #include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "proof/selftest/check.h"
 #include "tilegrad/version.h"

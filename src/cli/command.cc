@@ -2,9 +2,26 @@
 #include "cli/command.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 namespace tilegrad::cli {
+
+// std::from_chars would refuse a plus sign, "0x" and white space before the number.
+std::optional<double> RealNumber(const std::string& word) {
+  char* end = nullptr;
+  const double number = std::strtod(word.c_str(), &end);
+  if (word.empty() || end != word.c_str() + word.size()) return std::nullopt;
+  return number;
+}
+
+std::vector<std::string> PartsBetweenCommas(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream rest(text);
+  for (std::string part; std::getline(rest, part, ',');) parts.push_back(part);
+  return parts;
+}
 
 // CLI11's own say "not in range 0 to 1797..." with 308 digits.
 WordCheck AboveZero() {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -16,10 +17,15 @@
 #include <vector>
 
 #include "base/text.h"
-#include "cli/option_words.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::cli {
+
+// The number that all of the word is, as CLI11 reads options: also "+.5", "0x10", "inf" and "nan".
+std::optional<double> RealNumber(const std::string& word);
+
+// "a,b" is a and b.
+std::vector<std::string> PartsBetweenCommas(const std::string& text);
 
 // Looks at a word of an option. Says what is wrong with it, or nothing.
 struct WordCheck {

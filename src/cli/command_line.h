@@ -12,6 +12,11 @@
 
 namespace tilegrad::cli {
 
+// Lists whose words stand apart, in the words of a command line, joined by commas: those that are
+// of the list's kind. "--errors 0 1e-3 mesh.obj" becomes "--errors 0,1e-3 mesh.obj"; the same for
+// --up of three numbers, which may also be a word.
+std::vector<std::string> JoinLists(std::vector<std::string> words);
+
 struct ParsedLine {
   const Command* command = nullptr;  // null: print the texts, and end with the code
   int exit_code = 0;

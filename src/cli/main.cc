@@ -20,7 +20,6 @@
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"
-#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "tilegrad/version.h"
 #include "train/ranks/launch.h"

@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "base/rng.h"
 #include "base/text.h"
-#include "cli/option_words.h"
 #include "cli/render_job.h"
 #include "io/exr_file.h"
 #include "io/image_file.h"

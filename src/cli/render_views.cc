@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/text.h"
+#include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_words.h"
 #include "cli/render_job.h"
-#include "cli/unique_names.h"
 #include "scene/framing.h"
 
 namespace tilegrad::cli {

@@ -13,7 +13,6 @@
 
 #include "base/aligned.h"
 #include "base/error.h"
-#include "base/guarded.h"
 #include "render/engine.h"
 #include "render/gradient_arrays.h"
 #include "render/gradient_records.h"

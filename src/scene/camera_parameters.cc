@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "base/error.h"
-#include "base/guarded.h"
 #include "scene/camera_conventions.h"
 #include "scene/camera_ref.h"
 #include "tilegrad/camera.h"

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "base/folder_lock.h"
+#include "base/file.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <limits>
 
-#include "base/folder_lock.h"
+#include "base/file.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"

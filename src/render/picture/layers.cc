@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/guarded.h"
+#include "base/error.h"
 
 namespace tilegrad {
 

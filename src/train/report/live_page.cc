@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/folder_lock.h"
 #include "io/mesh_file.h"
 #include "train/config.h"
 #include "train/predictor.h"

@@ -7,7 +7,6 @@
 #include "base/clocks.h"
 #include "base/error.h"
 #include "base/file.h"
-#include "base/folder_lock.h"
 #include "base/text.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"

@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/folder_lock.h"
 #include "base/hash.h"
 #include "base/text.h"
 #include "io/image_file.h"

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "base/folder_lock.h"
+#include "base/file.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
