@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "base/scalar.h"
 #include "compat/nvdiffrast/band_sums.h"
-#include "compat/nvdiffrast/pixel_grid.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {

@@ -22,7 +22,6 @@
 
 #include "base/parallel.h"
 #include "compat/nvdiffrast/clip_mesh.h"
-#include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::compat::nvdiffrast {

@@ -15,7 +15,7 @@
 #include <cmath>
 
 #include "base/scalar.h"
-#include "compat/nvdiffrast/pixel_grid.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 
 namespace tilegrad::compat::nvdiffrast {
 

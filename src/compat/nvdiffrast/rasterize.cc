@@ -12,7 +12,6 @@
 #include "base/inline_vector.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/clip_mesh.h"
-#include "compat/nvdiffrast/pixel_grid.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 #include "raster/bin.h"
 #include "raster/conventions.h"

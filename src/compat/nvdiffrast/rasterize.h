@@ -4,7 +4,7 @@
 // The operations (rasterize, interpolate, texture, antialias) are those of Laine et al., Modular
 // Primitives for High-Performance Differentiable Rendering, 2020: each reads and writes whole
 // images, so that callers compose and differentiate them as they like. Vertices are in the clip
-// space of OpenGL; images have their bottom row first (pixel_grid.h). T is float or double;
+// space of OpenGL; images have their bottom row first (clip_mesh.h). T is float or double;
 // arithmetic is done in double.
 //
 //     rast     (u, v, z/w, face + 1)   u, v: perspective-correct weights of corners 0 and 1, kept
@@ -22,7 +22,6 @@
 
 #include "base/parallel.h"
 #include "compat/nvdiffrast/clip_mesh.h"
-#include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::compat::nvdiffrast {

@@ -22,8 +22,8 @@
 #include <span>
 
 #include "base/parallel.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/mip.h"
-#include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::compat::nvdiffrast {

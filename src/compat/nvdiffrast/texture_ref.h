@@ -10,7 +10,6 @@
 
 #include "compat/nvdiffrast/band_sums.h"
 #include "compat/nvdiffrast/texture.h"
-#include "compat/nvdiffrast/texture_point.h"
 #include "compat/nvdiffrast/texture_taps.h"
 
 namespace tilegrad::compat::nvdiffrast {

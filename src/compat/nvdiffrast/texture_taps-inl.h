@@ -26,7 +26,7 @@ namespace tilegrad::compat::nvdiffrast {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Vector body of texture_point.h: the points on a texture that pixels look up, their footprints and
+// Vector body of texture_taps.h: the points on a texture that pixels look up, their footprints and
 // levels, and the adjoints. Lanes are pixels of a run; float.
 
 using RunTag = HWY_CAPPED(float, 16);
@@ -61,7 +61,7 @@ struct RunCoordinates {
   }
 };
 
-// TexturePoint of texture_point.h. Of cube maps also the direction along the axes of its face: p
+// TexturePoint of texture_taps.h. Of cube maps also the direction along the axes of its face: p
 // and q are s and t in [-1, 1].
 struct PointLanes {
   RunVec st[2], slopes[4];
@@ -176,7 +176,7 @@ HWY_INLINE RunVec PowerOfTwo(RunInt e) {
   return hn::BitCast(RunTag(), hn::ShiftLeft<23>(hn::Add(e, hn::Set(RunIntTag(), 127))));
 }
 
-// Footprint of texture_point.cc: J times 2^-exponent, so that no square overflows. Powers of two
+// Footprint of texture_taps.cc: J times 2^-exponent, so that no square overflows. Powers of two
 // keep their digits.
 struct FootprintLanes {
   RunInt exponent;
@@ -219,7 +219,7 @@ HWY_INLINE RunVec Log2Lanes(RunVec x) {
   return hn::MulAdd(hn::Log(d, m), hn::Set(d, std::numbers::log2e_v<float>), hn::ConvertTo(d, e));
 }
 
-// LevelOf of texture_point.h.
+// LevelOf of texture_taps.h.
 HWY_INLINE RunVec LevelLanes(const FootprintLanes& f) {
   const RunTag d;
   const RunVec level =
@@ -228,7 +228,7 @@ HWY_INLINE RunVec LevelLanes(const FootprintLanes& f) {
                         hn::Set(d, -std::numeric_limits<float>::infinity()));
 }
 
-// LevelAdjoint of texture_point.h.
+// LevelAdjoint of texture_taps.h.
 HWY_INLINE void LevelAdjointLanes(const FootprintLanes& f, RunVec d_level, RunVec (&d_slopes)[4]) {
   const RunTag d;
   const RunVec zero = hn::Zero(d), half = hn::Set(d, 0.5f), two = hn::Set(d, 2.0f);
@@ -249,7 +249,7 @@ HWY_INLINE void LevelAdjointLanes(const FootprintLanes& f, RunVec d_level, RunVe
   }
 }
 
-// PointAdjoint of texture_point.h for a cube map: d_uv [3], d_uv_da [6].
+// PointAdjoint of texture_taps.h for a cube map: d_uv [3], d_uv_da [6].
 HWY_INLINE void CubeAdjointLanes(const PointLanes& p, const RunVec (&d_st)[2],
                                  const RunVec (&d_slopes)[4], RunVec (&d_uv)[3],
                                  RunVec (&d_uv_da)[6]) {

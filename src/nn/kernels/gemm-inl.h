@@ -18,7 +18,6 @@
 
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/micro_kernel-inl.h"
-#include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {

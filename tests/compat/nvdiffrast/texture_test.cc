@@ -6,7 +6,7 @@
 #include "compat/nvdiffrast/test_util.h"
 #include "compat/nvdiffrast/texture_cube.h"
 #include "compat/nvdiffrast/texture_lookups.h"
-#include "compat/nvdiffrast/texture_point.h"
+#include "compat/nvdiffrast/texture_taps.h"
 
 namespace tilegrad::compat::nvdiffrast::texture_test {
 

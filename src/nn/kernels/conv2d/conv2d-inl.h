@@ -15,7 +15,7 @@
 
 #include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/conv2d/product-inl.h"
-#include "nn/kernels/pack-inl.h"
+#include "nn/kernels/micro_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {

@@ -18,7 +18,7 @@
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/conv2d/winograd_tiles-inl.h"
 #include "nn/kernels/conv2d/winograd_transform-inl.h"
-#include "nn/kernels/pack-inl.h"
+#include "nn/kernels/micro_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
