@@ -11,6 +11,7 @@
 #include "cli/console.h"
 #include "cli/run_folder.h"
 #include "io/image_file.h"
+#include "render/picture/composite.h"
 #include "train/data/dataset.h"
 
 namespace tilegrad::cli {
@@ -63,21 +64,6 @@ Result<int> ChooseModel(const train::Dataset& dataset, const ViewOptions& option
                   options.data, options.model);
 }
 
-// Planar RGB over black to interleaved RGBA with straight alpha.
-ImageU8 Straighten(std::span<const std::uint8_t> planar, int size) {
-  ImageU8 out(size, size, 4);
-  const std::size_t plane = planar.size() / 4;
-  for (std::size_t p = 0; p < plane; ++p) {
-    const int alpha = planar[3 * plane + p];
-    for (std::size_t c = 0; c < 3; ++c) {
-      out.pixels[4 * p + c] = static_cast<std::uint8_t>(
-          alpha == 0 ? 0 : std::min(255, (planar[c * plane + p] * 255 + alpha / 2) / alpha));
-    }
-    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
-  }
-  return out;
-}
-
 Status WriteView(const ViewOptions& options) {
   TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(options.data));
   if (options.view >= dataset.info().views)
@@ -90,7 +76,7 @@ Status WriteView(const ViewOptions& options) {
   const auto image =
       std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
   TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
-                            [&] { return io::SavePng(options.out, Straighten(image, size)); }));
+                            [&] { return io::SavePng(options.out, StraightRgba(image, size)); }));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
   const std::string& of_class = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
   Print("{}: {} ({}), view {}\n", options.out, info.name, of_class, options.view);

@@ -25,7 +25,6 @@ struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
   std::string split = "test";
-  bool force = false;
   int refine = 0, oracle = 0;
 };
 
@@ -135,8 +134,6 @@ void AddEval(CommandList* list) {
                "steps of fitting the template to all views of each model, for a row that says how "
                "good predictions can be at best; 300 take a second a model or two",
                {Range{0, 100000}});
-  command->Add("--force", &options->force, "of earlier versions: the files are the run's own",
-               {Hidden{}});
 }
 
 }  // namespace tilegrad::cli

@@ -79,6 +79,20 @@ ImageU8 StraightRgba(const Picture& picture) {
   return out;
 }
 
+ImageU8 StraightRgba(std::span<const std::uint8_t> planes, int size) {
+  ImageU8 out(size, size, 4);
+  const std::size_t plane = planes.size() / 4;
+  for (std::size_t p = 0; p < plane; ++p) {
+    const int alpha = planes[3 * plane + p];
+    for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
+      const int value = (255 * planes[c * plane + p] + alpha / 2) / alpha;
+      out.pixels[4 * p + c] = static_cast<std::uint8_t>(std::min(value, 255));
+    }
+    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
+  }
+  return out;
+}
+
 ImageU8 Enlarged(const ImageU8& image, int factor) {
   ImageU8 out(image.width * factor, image.height * factor, image.channels);
   for (int y = 0; y < out.height; ++y) {

@@ -35,6 +35,7 @@ ImageU8 OverGrey(const Images& images, std::size_t n, float grey);
 
 std::vector<std::uint8_t> PremultipliedPlanes(const Picture& picture);  // [4,H,W], RGB over black
 ImageU8 StraightRgba(const Picture& picture);  // 4 channels; RGB is 0 where alpha is
+ImageU8 StraightRgba(std::span<const std::uint8_t> planes, int size);  // of [4,size,size], as above
 
 // Each pixel as a square of factor x factor.
 ImageU8 Enlarged(const ImageU8& image, int factor);

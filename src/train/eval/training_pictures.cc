@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "io/npz.h"
+#include "render/picture/composite.h"
 #include "train/data/cutout.h"
 
 namespace tilegrad::train {
@@ -27,21 +28,6 @@ std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
   const std::size_t taken = std::min(count, most);
   std::vector<std::size_t> out;
   for (std::size_t i = 0; i < taken; ++i) out.push_back(i * count / taken);
-  return out;
-}
-
-// Planar RGBA, RGB over black, as an image with straight alpha.
-ImageU8 Straight(std::span<const std::uint8_t> planar, int size) {
-  ImageU8 out(size, size, 4);
-  const std::size_t plane = planar.size() / 4;
-  for (std::size_t p = 0; p < plane; ++p) {
-    const int alpha = planar[3 * plane + p];
-    for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
-      const int value = (255 * planar[c * plane + p] + alpha / 2) / alpha;
-      out.pixels[4 * p + c] = static_cast<std::uint8_t>(std::min(value, 255));
-    }
-    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
-  }
   return out;
 }
 
@@ -97,7 +83,7 @@ void TrainingPictures::Keep(const ImageStore& store, const Workers& workers) {
   const auto model_of = [&](std::size_t i) { return static_cast<int>(chosen[i]) / store.views; };
   workers.For(chosen.size(), [&](std::size_t i, std::size_t) {
     const auto image = store.Image(model_of(i), static_cast<int>(chosen[i]) % store.views);
-    auto made = PrepareCutout(Straight(image, store.size), kThumbnailSize, Framing::kFit);
+    auto made = PrepareCutout(StraightRgba(image, store.size), kThumbnailSize, Framing::kFit);
     if (made.ok()) small[i] = std::move(*made);
   });
   for (std::size_t i = 0; i < chosen.size(); ++i) {
