@@ -7,6 +7,10 @@
 
 namespace tilegrad {
 
+inline double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 // Times the successive stages of a task.
 class StageClock {
  public:

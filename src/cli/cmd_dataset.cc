@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/clocks.h"
 #include "base/error.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
@@ -198,7 +199,7 @@ Status Make(const DatasetOptions& options) {
   line.Finish();
   if (!made.ok() || ranks.follows()) return ranks.Told(made.status());
   const train::BuildSummary summary = std::move(*made);
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  const double seconds = SecondsSince(start);
   PrintTable(summary);
   PrintRejected(summary, folder);
   PrintSome(summary.warnings, Count(summary.warnings.size(), "warning") + " while reading models",
@@ -212,7 +213,7 @@ Status Make(const DatasetOptions& options) {
         Count(summary.models.size(), "model"),
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
         summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
-        Count(static_cast<std::size_t>(summary.reused), "model file"), seconds.count());
+        Count(static_cast<std::size_t>(summary.reused), "model file"), seconds);
   if (const auto advice = train::AdviceOnFewModels(summary.models, /*streamed=*/false))
     PrintNote("tilegrad: warning: {}\n", *advice);
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);

@@ -5,6 +5,7 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "base/clocks.h"
 #include "base/error.h"
 #include "base/simd_target.h"
 #include "base/text.h"
@@ -45,12 +46,6 @@ Result<std::vector<Check>> ChooseChecks(const std::string& only) {
   return InvalidArgument("--only {}: no check has that in its title; there are:\n{}", only, titles);
 }
 
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& context) {
   try {
     return check.run(context);
@@ -61,7 +56,7 @@ Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& con
 
 // Whether it holds. What it found is appended to `json`.
 bool RunCheck(const Check& check, const CheckContext& context, nlohmann::ordered_json* json) {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const auto finding = RunGuarded(check, context);
   Print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
         finding.ok() ? finding->text : finding.status().message(), SecondsSince(start));
@@ -97,7 +92,7 @@ Status RunSelftest(const SelftestOptions& options) {
   const std::string forced = ForcedTarget();
   const CheckContext context{workers, forced.empty() ? RunnableTargets() : std::vector{forced}};
   PrintHeader(context);
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   nlohmann::ordered_json json;
   const auto failed = std::count_if(checks.begin(), checks.end(), [&](const Check& check) {
     return !RunCheck(check, context, &json);

@@ -5,12 +5,12 @@
 #include <chrono>
 #include <cstring>
 
+#include "base/clocks.h"
+
 namespace tilegrad::train {
 namespace {
 
 constexpr std::size_t kGrain = 32768;  // numbers to a task
-
-using Clock = std::chrono::steady_clock;
 
 void Resize(std::vector<AlignedVector<float>>* all, std::size_t numbers) {
   for (auto& one : *all) one.resize(std::max(one.size(), numbers));
@@ -141,9 +141,9 @@ void GradientSums::EndPortion(std::span<const nn::Gradient> gradients) {
 }
 
 bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   if (exchange_ && !exchange_->Wait(meanwhile)) return false;
-  seconds_waited_ = std::chrono::duration<double>(Clock::now() - start).count();
+  seconds_waited_ = SecondsSince(start);
   if (share_) {
     TakeOwn(meanwhile);
   } else {

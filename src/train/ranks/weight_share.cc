@@ -4,16 +4,11 @@
 #include <algorithm>
 #include <chrono>
 
+#include "base/clocks.h"
 #include "base/error.h"
 #include "train/ranks/messages.h"
 
 namespace tilegrad::train {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-}  // namespace
-
 void WeightShare::PlacesOf(const BucketLayout& layout, int rank, int ranks,
                            std::vector<Place>* out) {
   for (std::size_t b = 0; b < layout.buckets(); ++b) {
@@ -61,9 +56,9 @@ void WeightShare::Updated(std::size_t k) {
 }
 
 Status WeightShare::Finish() {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   if (!exchange_.WaitForSpread(job_.meanwhile)) return Cancelled("another rank ended");
-  seconds_waited_ = std::chrono::duration<double>(Clock::now() - start).count();
+  seconds_waited_ = SecondsSince(start);
   workers_.For(foreign_.size(), [&](std::size_t k, std::size_t) {
     const Place& place = foreign_[k];
     const Piece& piece = place.piece;

@@ -22,10 +22,6 @@ constexpr const char* kStepsKey = "schedule.steps";
 
 using Clock = std::chrono::steady_clock;
 
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 // Without the line "KEY = ...".
 std::string WithoutKey(const std::string& settings, const std::string& key) {
   std::istringstream lines(settings);
