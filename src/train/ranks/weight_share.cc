@@ -9,6 +9,7 @@
 #include "train/ranks/messages.h"
 
 namespace tilegrad::train {
+
 void WeightShare::PlacesOf(const BucketLayout& layout, int rank, int ranks,
                            std::vector<Place>* out) {
   for (std::size_t b = 0; b < layout.buckets(); ++b) {
