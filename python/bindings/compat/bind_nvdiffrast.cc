@@ -25,7 +25,7 @@ using nvdiffrast::PixelGrid;
 using nvdiffrast::VertexRows;
 using OptionalArray = std::optional<py::array>;
 
-std::size_t Length(const py::array& array, int axis) {
+std::size_t Extent(const py::array& array, int axis) {
   return axis < array.ndim() ? static_cast<std::size_t>(array.shape(axis)) : 0;
 }
 
@@ -36,11 +36,11 @@ VertexRows<T> RowsOf(const py::array& array, const char* function, const char* a
   const bool shared = array.ndim() == 2;
   const auto values = shared ? SpanOf<T>(array, function, argument, {kAny, kAny})
                              : SpanOf<T>(array, function, argument, {images, kAny, kAny});
-  return {values, Length(array, shared ? 0 : 1), Length(array, shared ? 1 : 2), shared};
+  return {values, Extent(array, shared ? 0 : 1), Extent(array, shared ? 1 : 2), shared};
 }
 
 PixelGrid GridOf(const py::array& image) {
-  return {Length(image, 0), static_cast<int>(Length(image, 1)), static_cast<int>(Length(image, 2))};
+  return {Extent(image, 0), static_cast<int>(Extent(image, 1)), static_cast<int>(Extent(image, 2))};
 }
 
 std::span<const std::int32_t> FacesOf(const py::array& tri, const char* function) {
@@ -192,7 +192,7 @@ nvdiffrast::AntialiasInput<T> AntialiasInputOf(const py::array& color, const Ant
           GridOf(color),
           ImageOf<T>(call.rast, function, "rast", color, 4),
           colors,
-          Length(color, 3)};
+          Extent(color, 3)};
 }
 
 py::array Antialias(const py::array& color, const py::array& rast, const py::array& pos,
