@@ -178,9 +178,9 @@ TEST_F(ProductsOfGradients, SameBitsAsValues) {
           EXPECT_TRUE(g[0].is_product());
           EXPECT_EQ(g[2].is_product(), !twice);
           EXPECT_FALSE(g[1].is_product());
-          EXPECT_TRUE(products.adam->Step(g, 0.5).ok());
+          EXPECT_TRUE(products.adam->Step(g).ok());
           const auto v = Grad(values.Loss(batch, twice), values.adam->parameters());
-          EXPECT_TRUE(values.adam->Step(v, 0.5).ok());
+          EXPECT_TRUE(values.adam->Step(v).ok());
         }
         EXPECT_EQ(products.Encoded(), values.Encoded()) << batch << twice;
       }
