@@ -122,8 +122,7 @@ class Refused(unittest.TestCase):
             for save in (lambda: files.save_image(f"{folder}/a.png", positions),
                          lambda: files.save_image(f"{folder}/a.npy", positions),
                          lambda: files.save_weights(f"{folder}/a.npz", {"a": positions})):
-                with self.assertRaisesRegex(TypeError, "is a masked array"):
-                    save()
+                self.assertRaisesRegex(TypeError, "is a masked array", save)
 
     def test_other_devices(self):
         with self.assertRaisesRegex(TypeError, "^render: positions is on another device"):
@@ -134,7 +133,3 @@ class Refused(unittest.TestCase):
             _arrays.check_choice("render", "culling", "front", ("none", "back"))
         self.assertEqual(str(caught.exception),
                          "render: culling is 'front', expected one of 'none', 'back'")
-
-
-if __name__ == "__main__":
-    unittest.main()

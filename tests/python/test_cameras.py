@@ -2,7 +2,6 @@
 """Files of cameras."""
 
 import json
-import unittest
 
 import numpy as np
 
@@ -56,14 +55,9 @@ class CameraFiles(FolderTest):
         bad = self.folder / "bad.json"
         for text in ("{", '{"frames": 3}', '{"K": [[1, 2], [3]], "frames": []}', "[]", ""):
             bad.write_text(text)
-            with self.assertRaisesRegex(ValueError, "bad.json"):
-                cameras.load_cameras(bad)
+            self.assertRaisesRegex(ValueError, "bad.json", cameras.load_cameras, bad)
         stretched = some_cameras(1)[0].replace(rotation=2 * np.eye(3))
         with self.assertRaisesRegex(ValueError, "save_cameras: a.png: .*rotation"):
             cameras.save_cameras(bad, [cameras.View("a.png", stretched, WIDTH, HEIGHT)])
         with self.assertRaisesRegex(TypeError, "single Camera"):
             cameras.save_cameras(bad, [cameras.View("a.png", some_cameras(2), WIDTH, HEIGHT)])
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,21 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds for every operation of tilegrad.losses and tilegrad.compat on torch's tape: a second
-derivative is an error, never 0, and in autocast results are those of float32."""
+derivative is an error, never 0, in autocast results are those of float32, and bits depend on no
+thread."""
 
+import concurrent.futures
+import os
 import unittest
 
 import numpy as np
 
 import tilegrad
+from support import needs_torch, torch
+from test_fragments import Meshes
+from test_fragments import random_faces as faces_before_the_camera
+from test_kaolin import quiet, random_faces
+from test_nvdiffrast import random, wavy_grid
+from test_processes import in_child
 from tilegrad import losses
 
-try:
-    import torch
-
+if torch:
     import tilegrad.compat.nvdiffrast.torch as dr
-    from tilegrad.compat import kaolin
-except ImportError:
-    torch = None
+    from tilegrad.compat import kaolin, pytorch3d
 
 
 def corners():
@@ -54,7 +59,62 @@ def operations():
         "dr.antialias": (lambda p: dr.antialias(torch.rand(1, 9, 8, 3), rast, p, tri), pos)}
 
 
-@unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+@needs_torch
+class Determinism(unittest.TestCase):
+    """Images and gradients of whole chains, large enough that several workers share them."""
+
+    def setUp(self):
+        self.kaolins = random_faces(images=3, faces=200, dtype=torch.float32, size=0.1)
+        self.addCleanup(torch.set_num_threads, torch.get_num_threads())
+        self.expected = self.bits()
+
+    def nvdiffrast(self):
+        pos, tri = wavy_grid(12, images=2, dtype=torch.float32)
+        pos.requires_grad_()
+        attr = random(1, pos.shape[1], 2, dtype=torch.float32, requires_grad=True)
+        tex = random(1, 32, 32, 3, dtype=torch.float32, requires_grad=True)
+        rast, rast_db = dr.rasterize(dr.RasterizeCpuContext(), pos, tri, (150, 130))
+        uv, uv_da = dr.interpolate(attr, rast, tri, rast_db, diff_attrs="all")
+        color = dr.antialias(dr.texture(tex, uv, uv_da), rast, pos, tri)
+        color.pow(2).mean().backward()
+        return color, pos.grad, attr.grad, tex.grad
+
+    def kaolin(self):
+        corners, depth = self.kaolins[0].detach().requires_grad_(), self.kaolins[1]
+        image, mask, _ = quiet(kaolin.render.mesh.dibr_rasterization, 70, 150, depth, corners,
+                               depth[..., None], torch.ones(3, 200))
+        (image.sum() + mask.sum()).backward()
+        return image, mask, corners.grad
+
+    def pytorch3d(self):
+        corners = torch.tensor(faces_before_the_camera(200, dtype=np.float32), requires_grad=True)
+        ids, *images = pytorch3d.rasterize_meshes(Meshes(corners, 4), (70, 150), 0.01, 3)
+        sum(image.sum() for image in images).backward()
+        return ids, *images, corners.grad
+
+    def bits(self):
+        return b"".join(tensor.detach().numpy().tobytes() for work in (
+            self.nvdiffrast, self.kaolin, self.pytorch3d) for tensor in work())
+
+    def test_any_number_of_threads(self):
+        for count in (1, 2, 7):
+            torch.set_num_threads(count)
+            self.assertTrue(self.bits() == self.expected, count)
+
+    def test_python_threads_and_a_fork(self):
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            for got in [pool.submit(self.bits) for _ in range(4)]:
+                self.assertTrue(got.result() == self.expected)
+
+        def child():
+            os.environ["TILEGRAD_NUM_THREADS"] = "3"
+            torch.set_num_threads(1)  # torch's own do not survive a fork
+            return self.bits() == self.expected
+
+        self.assertTrue(in_child(child))
+
+
+@needs_torch
 class Operations(unittest.TestCase):
     def test_second_derivatives_are_errors(self):
         functional = torch.autograd.functional
@@ -118,7 +178,3 @@ class Operations(unittest.TestCase):
             mixed = seen()
         for one, other in zip(mixed, expected):
             self.assertTrue(torch.equal(one, other))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -10,12 +10,8 @@ import numpy as np
 
 import tilegrad
 from file_samples import FolderTest, dataset, run_program
+from support import needs_torch, torch
 from tilegrad import files
-
-try:
-    import torch.utils.data
-except ImportError:
-    torch = None
 
 
 def assert_same(test: unittest.TestCase, a: dict, b: dict) -> None:
@@ -131,20 +127,17 @@ class Batches(unittest.TestCase):
 
     def test_errors(self) -> None:
         data = files.Dataset(dataset())
-        with self.assertRaisesRegex(ValueError, "batches: size is 0"):
-            data.batches(0)
+        self.assertRaisesRegex(ValueError, "batches: size is 0", data.batches, 0)
         with self.assertRaisesRegex(ValueError, "views is 5, the dataset has 4"):
             files.Dataset(dataset(), views=5)
-        with self.assertRaisesRegex(ValueError, "split is 'dev'"):
-            files.Dataset(dataset(), "dev")
+        self.assertRaisesRegex(ValueError, "split is 'dev'", files.Dataset, dataset(), "dev")
         with self.assertRaisesRegex(ValueError, "^set_epoch: epoch is -1, must be >= 0"):
             data.set_epoch(-1)
         with self.assertRaisesRegex(ValueError, "^Dataset: seed is -1, must be >= 0"):
             files.Dataset(dataset(), views=2, seed=-1)
         with self.assertRaisesRegex(TypeError, r"^Dataset: item must be int, got 1.0 \(float\)"):
             data[1.0]
-        with self.assertRaisesRegex(IndexError, "^Dataset: item 99 of "):
-            data.truth(99)
+        self.assertRaisesRegex(IndexError, "^Dataset: item 99 of ", data.truth, 99)
 
 
 class Workers(unittest.TestCase):
@@ -154,7 +147,7 @@ class Workers(unittest.TestCase):
         again = pickle.loads(pickle.dumps(data))
         assert_same(self, data[2], again[2])
 
-    @unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+    @needs_torch
     def test_torch_loader_with_forked_workers(self) -> None:
         for in_memory in (False, True):
             data = files.Dataset(dataset(), views=2, in_memory=in_memory)
@@ -169,8 +162,7 @@ class Workers(unittest.TestCase):
 
 class Damage(FolderTest):
     def test_errors_name_the_file(self) -> None:
-        with self.assertRaisesRegex(FileNotFoundError, "none"):
-            files.Dataset(self.folder / "none")
+        self.assertRaisesRegex(FileNotFoundError, "none", files.Dataset, self.folder / "none")
         copy = self.folder / "copy"
         shutil.copytree(dataset(), copy)
         data = files.Dataset(copy)
@@ -184,12 +176,6 @@ class Damage(FolderTest):
         with self.assertRaisesRegex(FileNotFoundError, path.name):
             data[0]
         (copy / "models.jsonl").write_text("{}\n")
-        with self.assertRaisesRegex(ValueError, "models.jsonl.*line 1"):
-            files.Dataset(copy)
+        self.assertRaisesRegex(ValueError, "models.jsonl.*line 1", files.Dataset, copy)
         (copy / "models.jsonl").unlink()
-        with self.assertRaisesRegex(FileNotFoundError, "not complete"):
-            files.Dataset(copy)
-
-
-if __name__ == "__main__":
-    unittest.main()
+        self.assertRaisesRegex(FileNotFoundError, "not complete", files.Dataset, copy)

@@ -3,18 +3,12 @@
 
 import os
 import re
-import unittest
 
 import numpy as np
 
 from file_samples import FolderTest, dataset, run, run_program, textured_mesh
-from support import SOURCE
+from support import SOURCE, needs_torch
 from tilegrad import files
-
-try:
-    import torch
-except ImportError:
-    torch = None
 
 
 def code_of(page: str, language: str = "python") -> str:
@@ -41,7 +35,7 @@ class Docs(FolderTest):
         names = self.run_page("docs/python.md")
         self.assertLess(np.abs(names["guess"] - names["truth"]).max(), 0.01)
 
-    @unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+    @needs_torch
     def test_torch(self) -> None:
         """Blocks of code that needs torch are marked py, all others python."""
         names = self.run_page("docs/python.md", "py")
@@ -70,7 +64,3 @@ class Docs(FolderTest):
             np.testing.assert_allclose(view.camera.rotation, np.eye(3), atol=1e-8)
             np.testing.assert_allclose(view.camera.translation, [-1, 0, -4], atol=1e-8)
             np.testing.assert_allclose([view.camera.cx, view.camera.cy], [320, 240], atol=1e-12)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -132,8 +132,7 @@ class Errors(unittest.TestCase):
                              (r"^render: scene 0: positions\[4,1\]", {"positions": bad})):
             moved = {"uvs": None, "textures": None, "surfaces": None, "face_surfaces": None,
                      "per_corner": ()}
-            with self.assertRaisesRegex(ValueError, text):
-                render(scene.replace(**moved, **change))
+            self.assertRaisesRegex(ValueError, text, render, scene.replace(**moved, **change))
 
     def test_backward(self):
         renderer = Renderer()
@@ -191,8 +190,7 @@ class Errors(unittest.TestCase):
     def test_the_engine_goes_on_after_an_error(self):
         renderer, scene = Renderer(), patch()
         expected = np.array(renderer.render(scene, **IMAGE).color)
-        with self.assertRaises(ValueError):
-            renderer.render(scene, width=-1)
+        self.assertRaises(ValueError, renderer.render, scene, width=-1)
         self.assertTrue(np.array_equal(renderer.render(scene, **IMAGE).color, expected))
 
     def test_colors_that_look_like_bytes_warn(self):
@@ -238,7 +236,3 @@ class Errors(unittest.TestCase):
         uvs[index] = np.inf
         with self.assertRaisesRegex(ValueError, r"uvs\[" + ",".join(map(str, index)) + r"\] is inf"):
             renderer.render(scene.replace(uvs=uvs), **IMAGE, outputs=("uv",))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -17,13 +17,9 @@ import xml.etree.ElementTree
 import numpy as np
 
 from file_samples import FolderTest, dataset, run_program
-from support import SOURCE, long_test
+from support import SOURCE, long_test, torch
 from tilegrad import files
 
-try:
-    import torch
-except ImportError:
-    torch = None
 
 FOLDER = SOURCE / "examples/python"
 NOTEBOOKS = sorted((SOURCE / "examples/notebooks").glob("*.ipynb"))
@@ -242,7 +238,3 @@ class Notebooks(ExampleTest):
         pictures, fit = names["first_pictures"], names["fit_from_images"]
         self.assertLess(pictures["after"], 0.97 * pictures["before"])
         self.assertGreater(fit["result"].held_out["silhouette_iou"], 0.85)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes, images and weights: in, out, and what is wrong with them."""
 
-import unittest
-
 import numpy as np
 
 import tilegrad
@@ -67,8 +65,7 @@ class Meshes(FolderTest):
         with self.assertRaisesRegex(ValueError, "Mesh.scene: color_space is 'hsv'"):
             mesh.scene(CAMERA, color_space="hsv")
         mesh.face_materials[0] = 7
-        with self.assertRaisesRegex(ValueError, "Mesh.scene.*7"):
-            mesh.scene(CAMERA)
+        self.assertRaisesRegex(ValueError, "Mesh.scene.*7", mesh.scene, CAMERA)
         mesh.face_materials = np.zeros(3, np.int32)
         with self.assertRaisesRegex(ValueError, r"face_materials has shape \(3,\).*F = 2"):
             mesh.scene(CAMERA)
@@ -86,8 +83,7 @@ class Meshes(FolderTest):
             mesh = textured_mesh()
             for name, value in change.items():
                 setattr(mesh.materials[0], name, value)
-            with self.assertRaisesRegex(error, message):
-                files.save_mesh(self.folder / "a.glb", mesh)
+            self.assertRaisesRegex(error, message, files.save_mesh, self.folder / "a.glb", mesh)
         mesh = textured_mesh()
         mesh.textures[0].image = mesh.textures[0].image[..., 0]
         with self.assertRaisesRegex(ValueError, r"image of texture 'texels' has shape \(2, 2\)"):
@@ -107,8 +103,7 @@ class Meshes(FolderTest):
         mesh.save(self.folder / "c.glb")
         self.assertEqual((self.folder / "c.glb").read_bytes(),
                          (self.folder / "b.glb").read_bytes())
-        with self.assertRaisesRegex(ValueError, "'c.obj' must end in .glb"):
-            mesh.save("c.obj")
+        self.assertRaisesRegex(ValueError, "'c.obj' must end in .glb", mesh.save, "c.obj")
         near = files.Mesh(mesh.positions, mesh.faces)
         self.assertEqual(near.origin.tolist(), [0, 0, 0])
 
@@ -125,8 +120,7 @@ class Meshes(FolderTest):
         files.save_mesh(self.folder / "b.glb", mesh)
         self.assertEqual(len(files.load_mesh(self.folder / "b.glb").colors), 6)
         mesh.colors = np.ones((4, 3), np.float32)
-        with self.assertRaisesRegex(ValueError, "colors and corner_colors"):
-            mesh.scene(CAMERA)
+        self.assertRaisesRegex(ValueError, "colors and corner_colors", mesh.scene, CAMERA)
 
     def test_the_tables_of_an_obj_file(self) -> None:
         path = self.folder / "a.obj"
@@ -147,8 +141,7 @@ class Meshes(FolderTest):
             files.load_mesh(self.folder / "none.glb")
         bad = self.folder / "bad.obj"
         bad.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
-        with self.assertRaisesRegex(ValueError, "bad.obj.*line 4"):
-            files.load_mesh(bad)
+        self.assertRaisesRegex(ValueError, "bad.obj.*line 4", files.load_mesh, bad)
         with self.assertRaisesRegex(ValueError, "a.mp3"):
             (self.folder / "a.mp3").write_bytes(b"x")
             files.load_mesh(self.folder / "a.mp3")
@@ -157,14 +150,12 @@ class Meshes(FolderTest):
         with self.assertRaisesRegex(OSError, "file.txt"):
             (self.folder / "file.txt").write_text("")
             files.save_mesh(self.folder / "file.txt" / "a.glb", textured_mesh())
-        with self.assertRaises(TypeError):
-            files.load_mesh(3)
+        self.assertRaises(TypeError, files.load_mesh, 3)
 
     def test_gltf_camera(self) -> None:
         camera = files.MeshCamera("eye", np.eye(4), 0.8, 0.0, 0.1).camera(64, 48)
         self.assertAlmostEqual(float(camera.fy), 24 / np.tan(0.4), places=9)
         self.assertEqual(float(camera.cx), 32)
-
 
 
 class Images(FolderTest):
@@ -234,8 +225,7 @@ class Images(FolderTest):
             with self.assertRaisesRegex(TypeError, "save_image: image has dtype"):
                 files.save_image(self.folder / "a.png", value)
         for name in ("none.png", "none.exr", "none.npy"):
-            with self.assertRaisesRegex(FileNotFoundError, name):
-                files.load_image(self.folder / name)
+            self.assertRaisesRegex(FileNotFoundError, name, files.load_image, self.folder / name)
 
 
 class Weights(FolderTest):
@@ -270,8 +260,7 @@ class Weights(FolderTest):
 
     def test_errors(self) -> None:
         path = self.folder / "w.safetensors"
-        with self.assertRaisesRegex(FileNotFoundError, "w.safetensors"):
-            files.load_weights(path)
+        self.assertRaisesRegex(FileNotFoundError, "w.safetensors", files.load_weights, path)
         with self.assertRaisesRegex(TypeError, "save_weights: x has dtype complex128"):
             files.save_weights(path, {"x": np.zeros(2, complex)})
         with self.assertRaisesRegex(TypeError, "save_weights: x has dtype int16"):
@@ -283,7 +272,3 @@ class Weights(FolderTest):
         with self.assertRaisesRegex(ValueError, ".safetensors or .npz"):
             files.load_weights(self.folder / "w.pt")
         self.assertFalse(path.exists())
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -8,13 +8,10 @@ import warnings
 import numpy as np
 
 import tilegrad
+from support import needs_torch, torch
 from tilegrad import fragments
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     from tilegrad.compat import pytorch3d
 
 
@@ -142,8 +139,7 @@ class ToFragments(unittest.TestCase):
         scene = scene.replace(camera=scene.camera.replace(size=None))
 
         def fails(error, message, *arguments, **options):
-            with self.assertRaisesRegex(error, message):
-                fragments.to_fragments(*arguments, **options)
+            self.assertRaisesRegex(error, message, fragments.to_fragments, *arguments, **options)
 
         fails(TypeError, "to_fragments: source must be a Frame, a Scene or a list", 3)
         fails(ValueError, "to_fragments: source has no scene", [])
@@ -178,7 +174,7 @@ class Meshes:
         return torch.arange(self.images) * (len(self.corners) // self.images)
 
 
-@unittest.skipIf(torch is None, "torch is absent (Debian: python3-torch)")
+@needs_torch
 class RasterizeMeshes(unittest.TestCase):
     def test_is_the_naive_one(self):
         corners = random_faces(24)
@@ -251,7 +247,3 @@ class RasterizeMeshes(unittest.TestCase):
         corners[3, 1, 0] = float("nan")
         with self.assertRaisesRegex(ValueError, r"face_vertices\[30\] is nan"):
             pytorch3d.rasterize_meshes(Meshes(corners))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gradients of scenes: float64 differences, shapes, sums, the arrays that they go to."""
+"""Gradients of scenes: shapes, sums, the arrays that they go to. Differences: test_torch.py."""
 
 import unittest
 
 import numpy as np
 
-from scenes import IMAGE, LIGHTINGS, cotangents, patch
+from scenes import IMAGE, cotangents, patch
 from tilegrad import Camera, Renderer
 
 
@@ -15,54 +15,6 @@ class Gradients(unittest.TestCase):
     def names(self, lighting):
         extra = {"none": (), "spherical_harmonics": ("sh",)}.get(lighting, ("lights",))
         return self.NAMES + extra
-
-    def flat(self, scene, name):
-        """The numbers of a scene's part, to be changed in place; a rebuilt scene sees them."""
-        if name == "textures":
-            return scene._arguments["textures"].texels.reshape(-1)
-        if name in ("camera", "lights"):
-            return scene._arguments[name].numbers.reshape(-1)
-        if name == "surfaces":
-            return scene._arguments["surfaces"][0].numbers.reshape(-1)
-        return scene[name].reshape(-1)
-
-    def test_float64_differences(self):
-        """Directional derivatives along random directions, central differences with step h of a
-        smooth loss: their error is h^2 f'''/6 plus rounding 1e-16/h; both are below 1e-6 of the
-        derivative for the loss here with h = 1e-6. Alpha's kernel exp(-d^2/delta) has the largest
-        third derivative, delta^-1.5 = 3e4."""
-        renderer, h = Renderer(), 1e-6
-        outputs = ("color", "alpha", "attributes", "depth", "normals", "uv")
-        for lighting in LIGHTINGS:
-            scene = patch(np.float64, lighting)
-            frame = renderer.render(scene, outputs=outputs, **IMAGE)
-            self.assertGreater((frame.face_ids >= 0).sum(), 300)
-            pulled = cotangents(frame, outputs)
-            got = renderer.backward(frame, wrt=self.names(lighting), **pulled)
-
-            def loss():
-                moved = renderer.render(scene.replace(), outputs=outputs, **IMAGE)
-                self.assertTrue(np.array_equal(moved.face_ids, frame.face_ids))
-                return sum((pulled[n] * np.where(np.isfinite(getattr(moved, n)),
-                                                 getattr(moved, n), 0)).sum() for n in outputs)
-
-            for name in self.names(lighting):
-                values, gradient = self.flat(scene, name), getattr(got, name)
-                gradient = gradient[0] if name == "textures" else gradient
-                gradient = getattr(gradient, "numbers", gradient)
-                gradient = (gradient[0] if name == "surfaces" else gradient).reshape(-1)
-                direction = np.random.default_rng(1).uniform(-1, 1, values.shape)
-                if name == "camera":
-                    direction[16] = 0  # the near plane has no gradient
-                kept = values.copy()
-                values[:] = kept + h * direction
-                above = loss()
-                values[:] = kept - h * direction
-                below = loss()
-                values[:] = kept
-                expected = (above - below) / (2 * h)
-                self.assertAlmostEqual(gradient @ direction, expected,
-                                       delta=1e-5 * max(1, abs(expected)), msg=(lighting, name))
 
     def test_shapes_are_those_of_the_scene(self):
         renderer = Renderer()
@@ -150,7 +102,3 @@ class Gradients(unittest.TestCase):
         got = renderer.backward(frame, color=np.ones_like(frame.color), wrt="surfaces").surfaces
         self.assertEqual(got.base_color.shape, (1, 3))
         self.assertTrue((got.base_color > 1).all())
-
-
-if __name__ == "__main__":
-    unittest.main()

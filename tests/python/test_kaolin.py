@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """tilegrad.compat.kaolin: published numbers, gradients, bounds, conventions, errors."""
 
-import concurrent.futures
-import hashlib
 import json
 import math
-import multiprocessing
 import os
 import pathlib
 import unittest
@@ -13,21 +10,14 @@ import warnings
 
 import numpy as np
 
-from support import SOURCE
+from support import SOURCE, require_torch, torch
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     import tilegrad.compat.kaolin as kaolin
     from tilegrad.compat.kaolin.render.mesh import dibr
     mesh = kaolin.render.mesh
 
-
-def setUpModule():
-    if torch is None:
-        raise unittest.SkipTest("torch is absent (Debian: python3-torch)")
+setUpModule = require_torch
 
 
 def shared_vectors(name):
@@ -475,30 +465,3 @@ class Extremes(unittest.TestCase):
             self.assertTrue(((mask >= 0) & (mask <= 1)).all(), trial)
             (image.sum() + mask.sum()).backward()
             self.assertTrue(torch.isfinite(corners.grad).all(), trial)
-
-
-class Processes(unittest.TestCase):
-    """The same bits from threads and from forked children."""
-
-    def test_threads_and_forks(self):
-        corners, depth = random_faces(images=3, faces=200, dtype=torch.float32, size=0.1)
-        inputs = 4 * [(corners.detach(), depth)]
-        expected = render_bytes(inputs[0])
-        with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            self.assertEqual(list(pool.map(render_bytes, inputs)), 4 * [expected])
-        with multiprocessing.get_context("fork").Pool(2) as pool:
-            self.assertEqual(pool.map_async(render_bytes, inputs).get(60), 4 * [expected])
-
-
-def render_bytes(inputs):
-    corners, depth = inputs
-    corners = corners.detach().requires_grad_()
-    image, mask, _ = quiet(mesh.dibr_rasterization, 70, 70, depth, corners, depth[..., None],
-                           torch.ones(3, 200))
-    (image.sum() + mask.sum()).backward()
-    numbers = b"".join(t.detach().numpy().tobytes() for t in (image, mask, corners.grad))
-    return hashlib.sha256(numbers).hexdigest()
-
-
-if __name__ == "__main__":
-    unittest.main()

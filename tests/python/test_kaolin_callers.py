@@ -4,20 +4,14 @@
 import importlib
 import unittest
 
+from support import require_torch, torch
 from test_kaolin import double, quiet, random_faces
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     import tilegrad.compat.kaolin as kaolin
     mesh = kaolin.render.mesh
 
-
-def setUpModule():
-    if torch is None:
-        raise unittest.SkipTest("torch is absent (Debian: python3-torch)")
+setUpModule = require_torch
 
 
 class Callers(unittest.TestCase):
@@ -115,7 +109,3 @@ class Callers(unittest.TestCase):
                 getattr(module, "no_such_name")
             self.assertFalse(hasattr(module, "no_such_name"))
         self.assertIs(kaolin.ops, importlib.import_module("tilegrad.compat.kaolin.ops"))
-
-
-if __name__ == "__main__":
-    unittest.main()

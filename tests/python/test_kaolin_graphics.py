@@ -6,13 +6,10 @@ import unittest
 
 import numpy as np
 
+from support import require_torch, torch
 from test_kaolin import double, quiet
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     import tilegrad.compat.kaolin as kaolin
     from tilegrad.compat.kaolin.graphics import DIBRenderer as Renderer
     from tilegrad.compat.kaolin.graphics.dib_renderer.rasterizer import linear_rasterizer
@@ -21,10 +18,7 @@ else:
 
 SIZE = 17
 
-
-def setUpModule():
-    if torch is None:
-        raise unittest.SkipTest("torch is absent (Debian: python3-torch)")
+setUpModule = require_torch
 
 
 def quad():
@@ -168,7 +162,3 @@ class Interface(unittest.TestCase):
             Renderer(8, 8, mode="Gouraud")
         with self.assertRaisesRegex(AttributeError, "'SoftRenderer': .*docs/porting.md"):
             getattr(kaolin.graphics, "SoftRenderer")
-
-
-if __name__ == "__main__":
-    unittest.main()

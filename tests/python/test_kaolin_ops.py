@@ -5,23 +5,17 @@ import importlib.util
 import math
 import unittest
 
+from support import require_torch, torch
 from test_kaolin import double
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     import tilegrad.compat.kaolin as kaolin
     ops = kaolin.ops
     TETRAHEDRON = torch.tensor([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
 HAS_TOOLS = importlib.util.find_spec("tilegrad._tools") is not None
 
-
-def setUpModule():
-    if torch is None:
-        raise unittest.SkipTest("torch is absent (Debian: python3-torch)")
+setUpModule = require_torch
 
 
 def tetrahedron():
@@ -188,7 +182,3 @@ class Coordinates(unittest.TestCase):
             self.assertLess(float((got - wanted).abs().max()), 1e-15)
         self.assertEqual(ops.coords.spherical2cartesian(angle, angle)[2].tolist(),
                          torch.sin(angle).tolist())
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -6,12 +6,9 @@ import unittest
 import numpy as np
 
 import tilegrad
+from support import needs_torch, torch
 from tilegrad import losses
 
-try:
-    import torch
-except ImportError:
-    torch = None
 
 FACES = tilegrad.icosphere(1)[1]
 RANDOM = np.random.default_rng(3)
@@ -56,7 +53,7 @@ class Gradients(unittest.TestCase):
             self.assertAlmostEqual(small.value, loss(at).value, delta=1e-4, msg=name)
 
 
-@unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+@needs_torch
 class Torch(unittest.TestCase):
     def test_tensors_give_the_same(self):
         for name, (loss, at) in CASES.items():
@@ -99,11 +96,6 @@ class Errors(unittest.TestCase):
                 (lambda: losses.laplacian(POSITIONS * np.nan, FACES), "not finite"),
                 (lambda: losses.iou(TRUTH, TRUTH[:1]), "expected the same"),
                 (lambda: losses.chamfer(POSITIONS, POINTS[:0]), "b has no points")):
-            with self.assertRaisesRegex(ValueError, message):
-                call()
+            self.assertRaisesRegex(ValueError, message, call)
         with self.assertRaisesRegex(TypeError, "whole numbers"):
             losses.edge_length(POSITIONS, FACES.astype(np.float32))
-
-
-if __name__ == "__main__":
-    unittest.main()

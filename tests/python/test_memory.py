@@ -9,6 +9,7 @@ import numpy as np
 
 import tilegrad
 from scenes import ALL, IMAGE, cotangents, patch
+from test_arrays import DlpackOnly
 from tilegrad import Renderer, Scene
 
 
@@ -52,19 +53,8 @@ class Copies(unittest.TestCase):
     def test_other_arrays(self):
         """The buffer protocol and DLPack, for scenes and cotangents."""
         plain = patch()
-
-        class Dlpack:
-            def __init__(self, values):
-                self.values = values
-
-            def __dlpack__(self, stream=None):
-                return self.values.__dlpack__()
-
-            def __dlpack_device__(self):
-                return self.values.__dlpack_device__()
-
-        wrapped = plain.replace(positions=Dlpack(plain.positions), faces=memoryview(plain.faces),
-                                colors=memoryview(plain["colors"]))
+        wrapped = plain.replace(positions=DlpackOnly(plain.positions),
+                                faces=memoryview(plain.faces), colors=memoryview(plain["colors"]))
         self.assertTrue(np.shares_memory(wrapped.positions, plain.positions))
         self.assertTrue(np.shares_memory(wrapped.faces, plain.faces))
         renderer = Renderer()
@@ -72,7 +62,7 @@ class Copies(unittest.TestCase):
         expected = renderer.render(plain, **IMAGE)
         self.assertTrue(np.array_equal(frame.color, expected.color))
         weights = np.array(frame.alpha)
-        got = renderer.backward(frame, alpha=Dlpack(weights))
+        got = renderer.backward(frame, alpha=DlpackOnly(weights))
         self.assertTrue(np.array_equal(got.positions,
                                        renderer.backward(frame, alpha=weights).positions))
 
@@ -132,9 +122,4 @@ class Memory(unittest.TestCase):
         frame = Renderer().render(patch(), **IMAGE)
         self.assertTrue(frame.shared("color").flags.writeable)
         self.assertTrue(np.shares_memory(frame.shared("color"), frame.color))
-        with self.assertRaisesRegex(AttributeError, "uv was not rendered"):
-            frame.shared("uv")
-
-
-if __name__ == "__main__":
-    unittest.main()
+        self.assertRaisesRegex(AttributeError, "uv was not rendered", frame.shared, "uv")

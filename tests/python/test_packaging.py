@@ -172,7 +172,3 @@ class Modules(unittest.TestCase):
             self.assertNotIn("RPATH", dynamic)
             self.assertNotIn("RUNPATH", dynamic)
             self.assertNotIn("libtilegrad", dynamic)
-
-
-if __name__ == "__main__":
-    unittest.main()

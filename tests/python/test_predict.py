@@ -7,7 +7,6 @@ import pickle
 import signal
 import threading
 import time
-import unittest
 
 import numpy as np
 
@@ -70,8 +69,7 @@ class Predict(FolderTest):
         self.addCleanup(signal.signal, signal.SIGALRM, before)
         start = time.monotonic()
         signal.setitimer(signal.ITIMER_REAL, 0.5)
-        with self.assertRaisesRegex(TimeoutError, "the alarm"):
-            predictor.predict(image, refine=100_000)
+        self.assertRaisesRegex(TimeoutError, "the alarm", predictor.predict, image, refine=100_000)
         self.assertLess(time.monotonic() - start, 2.5)
 
     def test_many_at_once_are_each_alone(self) -> None:
@@ -125,8 +123,7 @@ class Predict(FolderTest):
         colored = self._program()
         files.save_image(self.image, image[..., [0, 3]])
         self.assertEqual(self._program(), colored)
-        with self.assertRaisesRegex(ValueError, "no alpha channel"):
-            predictor.prepare(image[..., :1])
+        self.assertRaisesRegex(ValueError, "no alpha channel", predictor.prepare, image[..., :1])
         with self.assertWarnsRegex(RuntimeWarning, "prepare: image.*divide by 255"):
             predictor.prepare(image.astype(np.float32))
 
@@ -139,21 +136,13 @@ class Predict(FolderTest):
                 (opaque, None, "not cut out"), (image[..., :3], None, "no alpha channel"),
                 (image * np.uint8(0), None, "mask is empty"),
                 (image, image[:9, :9, 3], "mask is 9 x 9"), (image[0, 0], None, "image has shape")):
-            with self.assertRaisesRegex(ValueError, message):
-                predictor.predict(wrong, mask)
-        with self.assertRaisesRegex(ValueError, "refine is -1"):
-            predictor.predict(image, refine=-1)
+            self.assertRaisesRegex(ValueError, message, predictor.predict, wrong, mask)
+        self.assertRaisesRegex(ValueError, "refine is -1", predictor.predict, image, refine=-1)
         with self.assertRaisesRegex(ValueError, r"predict_prepared: images has shape \(4, 8, 8\)"):
             predictor.predict_prepared(np.zeros((4, 8, 8), np.uint8))
-        with self.assertRaisesRegex(FileNotFoundError, "none"):
-            files.Predictor(self.folder / "none")
+        self.assertRaisesRegex(FileNotFoundError, "none", files.Predictor, self.folder / "none")
         checkpoint = self.folder / "c.safetensors"
         content = pathlib.Path(files.load_checkpoint(run()).file).read_bytes()
         for at in (0, 5, 200, len(content) // 2, len(content) - 1):
             checkpoint.write_bytes(content[:at])
-            with self.assertRaisesRegex(ValueError, "c.safetensors"):
-                files.Predictor(checkpoint)
-
-
-if __name__ == "__main__":
-    unittest.main()
+            self.assertRaisesRegex(ValueError, "c.safetensors", files.Predictor, checkpoint)

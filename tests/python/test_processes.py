@@ -289,7 +289,3 @@ print(renderer.threads, len(os.listdir("/proc/self/task")) - before)
         code = "import tilegrad; print(tilegrad.files.mesh_endings()[0], tilegrad.fragments.__name__)"
         self.assertEqual(run_python(code).stdout, ".glb tilegrad.fragments\n")
         self.assertIn("no attribute 'file'", run_python("import tilegrad; tilegrad.file").stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()

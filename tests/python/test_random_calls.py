@@ -17,14 +17,10 @@ import numpy as np
 
 import tilegrad
 from scenes import ALL, LIGHTINGS, patch
-from support import long_test
+from support import long_test, needs_torch, torch
 from tilegrad import Camera, Light, Renderer, Scene, Surface, Texture
 
-try:
-    import torch
-except ImportError:
-    torch = None
-else:
+if torch:
     import tilegrad.compat.nvdiffrast.torch as dr
     import tilegrad.torch
     from tilegrad.compat import kaolin
@@ -284,7 +280,7 @@ class RandomCalls(unittest.TestCase):
 
         self.run_seeds(call)
 
-    @unittest.skipIf(torch is None, "torch is absent (Debian: python3-torch)")
+    @needs_torch
     def test_torch(self):
         def call(seed):
             world = World(seed)
@@ -312,7 +308,7 @@ class RandomCalls(unittest.TestCase):
         self.run_seeds(call)
 
 
-    @unittest.skipIf(torch is None, "torch is absent (Debian: python3-torch)")
+    @needs_torch
     def test_ported_functions(self):
         f4 = {"dtype": torch.float32}
         pos = torch.tensor([[[-1, -1, 0.5, 1], [1, -1, 0.5, 1], [-1, 1, -0.5, 1]]], **f4)
@@ -353,7 +349,3 @@ class RandomCallsLong(RandomCalls):
     """Four minutes of it: one for each of the tests above."""
 
     SECONDS = 60
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,13 +2,13 @@
 """What is refused before it is lost or fills the memory, and with which exception."""
 
 import os
-import unittest
 from unittest import mock
 
 import numpy as np
 
 import tilegrad
 from file_samples import FolderTest, textured_mesh
+from support import needs_torch, torch
 from tilegrad import Light, Renderer, Scene, Surface, files
 
 TRIANGLE = dict(positions=np.array([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], np.float32),
@@ -29,8 +29,7 @@ class Numbers(FolderTest):
                 files.save_mesh(self.folder / "a.glb", mesh)
             self.assertFalse((self.folder / "a.glb").exists())
         mesh.materials[1].base_color = (0, np.nan, 1, 1)
-        with self.assertRaisesRegex(ValueError, "blue.*base_color"):
-            mesh.scene(TRIANGLE["camera"])
+        self.assertRaisesRegex(ValueError, "blue.*base_color", mesh.scene, TRIANGLE["camera"])
 
     def test_what_the_lighting_does_not_use(self) -> None:
         nan = np.nan
@@ -88,8 +87,7 @@ class Names(FolderTest):
                      lambda: files.save_layers(self.folder / "a.exr", {bad: plane}),
                      lambda: files.save_mesh(self.folder / "a.glb", mesh),
                      lambda: files.save_cameras(self.folder / "a.json", [view])):
-            with self.assertRaisesRegex(ValueError, r"^save_\w+: .*'a\\ud800' has half of a pair"):
-                call()
+            self.assertRaisesRegex(ValueError, r"^save_\w+: .*'a\\ud800' has half of a pair", call)
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_names_that_no_file_has(self) -> None:
@@ -104,8 +102,7 @@ class Names(FolderTest):
                          lambda: files.save_image(stem + ".npy", one),
                          lambda: files.save_weights(stem + ".npz", {"a": one}),
                          lambda: files.save_cameras(stem, [])):
-                with self.assertRaisesRegex(ValueError, "cannot be the name of a file"):
-                    call()
+                self.assertRaisesRegex(ValueError, "cannot be the name of a file", call)
         files.save_image(os.fsencode(self.folder / "a.npy"), one)
         np.testing.assert_array_equal(files.load_image(self.folder / "a.npy"), one)
 
@@ -114,8 +111,7 @@ class Names(FolderTest):
         for format in ("opencv", "nerf", "colmap"):
             path = self.folder / format
             for views in ([], [files.View("a", camera, 0, 5)], [files.View("a", camera, 5, -1)]):
-                with self.assertRaises(ValueError):
-                    files.save_cameras(path, views, format=format)
+                self.assertRaises(ValueError, files.save_cameras, path, views, format=format)
             self.assertFalse(path.exists())
         with self.assertRaisesRegex(ValueError, "line break"):
             files.save_cameras(path, [files.View("a\nb", camera, 5, 5)], format="colmap")
@@ -157,16 +153,12 @@ class Memory(FolderTest):
                     load(self.folder / name)
                 load(self.folder / name, max_bytes=20 << 20)
             with mock.patch.dict(os.environ, {"TILEGRAD_READ_LIMIT": "many"}):
-                with self.assertRaisesRegex(ValueError, "LIMIT: \"many\""):
-                    load(self.folder / name)
+                self.assertRaisesRegex(ValueError, "LIMIT: \"many\"", load, self.folder / name)
 
 
+@needs_torch
 class Tensors(FolderTest):
     def test_odd_ones_are_type_errors_wherever_they_go(self) -> None:
-        try:
-            import torch
-        except ImportError:
-            self.skipTest("no torch")
         plain = torch.ones(3, 3)
         self.write(plain)
         odd = (plain.clone().requires_grad_(), torch.nn.Parameter(plain),
@@ -177,14 +169,9 @@ class Tensors(FolderTest):
         for value in odd:
             for name in ("a.png", "a.exr", "a.npy", "a.npz", "a.safetensors"):
                 with self.subTest(kind=str(value.dtype), name=name):
-                    with self.assertRaises(TypeError):
-                        self.write(value, name)
+                    self.assertRaises(TypeError, self.write, value, name)
 
     def test_signs_that_torch_keeps_apart(self) -> None:
-        try:
-            import torch
-        except ImportError:
-            self.skipTest("no torch")
         lazy = torch.view_as_complex(torch.ones(3, 3, 2)).conj().imag
         self.assertTrue(lazy.is_neg())
         files.save_weights(self.folder / "a.npz", {"a": lazy})
@@ -200,7 +187,3 @@ class Tensors(FolderTest):
                 files.save_weights(path, {"a": value})
             else:
                 files.save_image(path, value)
-
-
-if __name__ == "__main__":
-    unittest.main()

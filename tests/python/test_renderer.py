@@ -148,7 +148,3 @@ class Scenes(unittest.TestCase):
     def test_lists_of_numbers_are_float32(self):
         scene = Scene([[0, 0, -1], [1, 0, -1], [0, 1, -1]], [[0, 1, 2]], Camera())
         self.assertEqual(scene.dtype, np.float32)
-
-
-if __name__ == "__main__":
-    unittest.main()

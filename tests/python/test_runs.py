@@ -133,10 +133,8 @@ class Fit(FolderTest):
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, lighting="neon"), "expected one of"),
                 (lambda: tilegrad.fit("photos", CAMERAS), "a folder has its own"),
                 (lambda: tilegrad.fit(IMAGES / 100, CAMERAS), "outside of")):
-            with self.assertRaisesRegex(ValueError, message):
-                call()
-        with self.assertRaisesRegex(OSError, "nowhere"):
-            tilegrad.fit("nowhere")
+            self.assertRaisesRegex(ValueError, message, call)
+        self.assertRaisesRegex(OSError, "nowhere", tilegrad.fit, "nowhere")
         with self.assertRaisesRegex(TypeError, "expected a function"):
             tilegrad.fit(IMAGES, CAMERAS, callback=3)
 
@@ -310,7 +308,3 @@ class Train(unittest.TestCase):
     def test_errors(self):
         with self.assertRaisesRegex(OSError, "there are best, "):
             tilegrad.train("qick", data="x", out="y")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -49,8 +49,7 @@ class Framing(unittest.TestCase):
     def test_errors(self):
         for mesh, message in ((np.zeros((0, 3)), "no faces"),
                               (np.full((3, 3), np.nan), "not finite")):
-            with self.assertRaisesRegex(ValueError, message):
-                tilegrad.Camera.framing(mesh)
+            self.assertRaisesRegex(ValueError, message, tilegrad.Camera.framing, mesh)
         with self.assertRaisesRegex(ValueError, "margin is 0.5"):
             tilegrad.Camera.framing(POSITIONS, margin=0.5)
 
@@ -124,13 +123,6 @@ class Others(unittest.TestCase):
         self.assertEqual(back.colors.shape, (len(POSITIONS), 3))
 
     def test_what_is_no_mesh(self):
-        with self.assertRaisesRegex(TypeError, "got int, expected a Mesh"):
-            tilegrad.render(3)
-        with self.assertRaisesRegex(ValueError, "triangles"):
-            meshes.as_mesh((POSITIONS, [[0, 1, 2, 3]]))
-        with self.assertRaises(OSError):
-            tilegrad.render("none.glb")
-
-
-if __name__ == "__main__":
-    unittest.main()
+        self.assertRaisesRegex(TypeError, "got int, expected a Mesh", tilegrad.render, 3)
+        self.assertRaisesRegex(ValueError, "triangles", meshes.as_mesh, (POSITIONS, [[0, 1, 2, 3]]))
+        self.assertRaises(OSError, tilegrad.render, "none.glb")

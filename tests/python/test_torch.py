@@ -12,18 +12,13 @@ import numpy as np
 
 import tilegrad
 from scenes import patch
+from support import needs_torch, torch
 from tilegrad import Camera, Light, Surface, Texture
 
-try:
-    import torch
-
+if torch:
     import tilegrad.torch as tg
-except ImportError:
-    torch = None
 
 SIZE = {"width": 9, "height": 8, "delta": 4e-3}
-needs_torch = unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
-
 
 def arguments(dtype=np.float64, **changes):
     """A warped patch of 18 faces with everything that a scene may have, in arrays."""
@@ -58,7 +53,7 @@ class Gradients(unittest.TestCase):
     """torch.autograd.gradcheck: central differences with steps of 1e-6 in float64. Their own error
     is 1e-10 by rounding and about 1e-12 of third derivatives, which are below delta^-1.5 = 4e3."""
 
-    def check(self, name, outputs=("color", "alpha"), **changes):
+    def check(self, name, outputs, **changes):
         given = tensors(**changes)
         texture = given["textures"]
         leaf = texture.texels if name == "textures" else given[name]
@@ -76,50 +71,26 @@ class Gradients(unittest.TestCase):
         self.assertGreater(float(torch.autograd.grad(sum(i.sum() for i in images(leaf)),
                                                      leaf)[0].abs().max()), 1e-3)
 
-    def test_positions(self):
-        self.check("positions", ("color", "alpha", "attributes", "depth", "normals", "uv"))
-
-    def test_positions_under_every_light(self):
-        for lighting in ("none", "lambert", "spherical_harmonics"):
-            self.check("positions", lighting=lighting)
-
-    def test_camera(self):
-        self.check("camera", ("color", "alpha", "attributes", "depth"))
-
-    def test_colors(self):
-        self.check("colors")
-
-    def test_uvs_of_corners(self):
-        self.check("uvs", ("color", "uv"))
-
-    def test_textures(self):
-        self.check("textures", ("color",))
-
-    def test_attributes(self):
-        self.check("attributes", ("attributes",))
-
-    def test_normals(self):
-        normals = np.random.default_rng(1).normal(size=(16, 3)) * 0.2 + (0, 0, 1)
-        self.check("normals", ("color", "normals"), normals=normals)
-
-    def test_lights(self):
-        for lighting in ("lambert", "phong"):
-            self.check("lights", ("color",), lighting=lighting)
-
-    def test_light_directions(self):
-        directions = np.random.default_rng(2).normal(size=(16, 3)) * 0.2 + (0.2, 0.1, 1)
-        self.check("light_directions", ("color",), lights=None, light_directions=directions)
-
-    def test_sh(self):
-        self.check("sh", ("color",), lighting="spherical_harmonics")
-
-    def test_surfaces(self):
-        self.check("surfaces", ("color",))
-
-    def test_batches(self):
-        """Two images: what each has of its own, and what they share."""
-        for name in ("positions", "colors", "textures", "lights", "camera", "uvs"):
-            self.check(name, ("color", "alpha"), count=2)
+    def test_every_input(self):
+        around = np.random.default_rng(1).normal(size=(16, 3)) * 0.2 + (0, 0, 1)
+        for name, outputs, changes in (
+                ("positions", ("color", "alpha", "attributes", "depth", "normals", "uv"), {}),
+                *(("positions", ("color", "alpha"), {"lighting": lighting})
+                  for lighting in ("none", "lambert", "spherical_harmonics")),
+                ("camera", ("color", "alpha", "attributes", "depth"), {}),
+                ("colors", ("color", "alpha"), {}), ("uvs", ("color", "uv"), {}),
+                ("textures", ("color",), {}), ("attributes", ("attributes",), {}),
+                ("normals", ("color", "normals"), {"normals": around}),
+                ("lights", ("color",), {"lighting": "lambert"}),
+                ("lights", ("color",), {"lighting": "phong"}),
+                ("light_directions", ("color",), {"lights": None, "light_directions": around}),
+                ("sh", ("color",), {"lighting": "spherical_harmonics"}),
+                ("surfaces", ("color",), {}),
+                # Two images: what each has of its own, and what they share.
+                *((name, ("color", "alpha"), {"count": 2})
+                  for name in ("positions", "colors", "textures", "lights", "camera", "uvs"))):
+            with self.subTest(name, **changes):
+                self.check(name, outputs, **changes)
 
     def test_camera_of_free_numbers(self):
         given = tensors(lighting="none")
@@ -230,8 +201,7 @@ class Graphs(unittest.TestCase):
         loss = rendered(self.given).color.sum()
         one = torch.autograd.grad(loss, self.positions, retain_graph=True)[0]
         self.assertTrue(torch.equal(one, self.gradient(loss)))
-        with self.assertRaisesRegex(RuntimeError, "second time"):
-            self.gradient(loss)
+        self.assertRaisesRegex(RuntimeError, "second time", self.gradient, loss)
 
     def test_only_what_is_needed_is_computed(self):
         colors = self.given["colors"].requires_grad_()
@@ -288,8 +258,7 @@ class Graphs(unittest.TestCase):
                         lambda: functional.hvp(call, start, ones),
                         lambda: functional.vhp(call, start, ones),
                         lambda: functional.hessian(call, start)):
-                with self.assertRaisesRegex(RuntimeError, "first derivatives only"):
-                    ask()
+                self.assertRaisesRegex(RuntimeError, "first derivatives only", ask)
             gradient = torch.autograd.grad(call(self.positions), self.positions,
                                            create_graph=True)[0]
             self.assertTrue(torch.equal(gradient, self.gradient(call(self.positions))))
@@ -404,10 +373,8 @@ class Errors(unittest.TestCase):
             rendered({**given, "camera": torch.eye(3)})
         with self.assertRaisesRegex(ValueError, r"colors has shape \(5, 3\).*V = 16"):
             rendered({**given, "colors": torch.zeros(5, 3)})
-        with self.assertRaisesRegex(TypeError, "colours"):
-            rendered(given, colours=1)
-        with self.assertRaisesRegex(ValueError, "outputs is 'rgb'"):
-            rendered(given, outputs=("rgb",))
+        self.assertRaisesRegex(TypeError, "colours", rendered, given, colours=1)
+        self.assertRaisesRegex(ValueError, "outputs is 'rgb'", rendered, given, outputs=("rgb",))
         with self.assertRaisesRegex(ValueError, r"rotation has shape \(3,\)"):
             tg.camera(rotation=torch.zeros(3))
         with self.assertRaisesRegex(ValueError, r"fx has shape \(3,\), expected \(2,\), as the "
@@ -418,8 +385,7 @@ class Errors(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "delta has no gradient"):
             rendered(given, delta=torch.tensor(1e-3, requires_grad=True))
         given["positions"][3, 1] = float("nan")
-        with self.assertRaisesRegex(ValueError, r"positions\[3,1\] is nan"):
-            rendered(given)
+        self.assertRaisesRegex(ValueError, r"positions\[3,1\] is nan", rendered, given)
 
     def test_six_numbers_without_a_rotation(self):
         for numbers in ([0, 0, 0, 1, 0, 0], [1, 2, 3, 2, 4, 6], [1, 0, 0, 0, 0, 0], [math.nan] * 6):
@@ -464,7 +430,3 @@ class Errors(unittest.TestCase):
         given["surfaces"] = Surface(texture=0)
         given["face_surfaces"] = None
         self.assertTrue(torch.isfinite(rendered(given).color).all())
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -6,17 +6,12 @@ import unittest
 import numpy as np
 
 import tilegrad
+from support import needs_torch, torch
 from tilegrad import Camera, Texture
 
-try:
-    import torch
-
+if torch:
     import tilegrad.torch as tg
     from test_torch import rendered, tensors
-except ImportError:
-    torch = None
-
-needs_torch = unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
 
 
 @needs_torch
@@ -144,7 +139,3 @@ class Types(unittest.TestCase):
             changed = rendered(given)
             self.assertEqual(tilegrad.stats()["copies"], 2)
             self.assertFalse(torch.equal(changed.color, expected))
-
-
-if __name__ == "__main__":
-    unittest.main()
