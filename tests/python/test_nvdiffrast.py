@@ -243,6 +243,9 @@ class Gradients(unittest.TestCase):
             self.check(lambda a, uv, db: dr.interpolate(
                 a, torch.cat([uv, rast[..., 2:]], -1), tri, db, diff_attrs=[1, 0]),
                 attr, rast[..., :2].clone().requires_grad_(), rast_db.clone().requires_grad_())
+        of_rast, = torch.autograd.grad(dr.interpolate(attr, rast.requires_grad_(), tri)[0].sum(),
+                                       rast)
+        self.assertTrue((of_rast[..., 2:] == 0).all())  # depth and triangle
 
     def test_texture(self):
         uv = random(2, 4, 5, 2, seed=1, requires_grad=True)
@@ -253,11 +256,16 @@ class Gradients(unittest.TestCase):
             for boundary in ("wrap", "clamp", "zero"):
                 self.check(lambda *a: dr.texture(*a, boundary_mode=boundary), tex, uv)
                 self.check(lambda *a: dr.texture(*a, boundary_mode=boundary), tex, uv, uv_da, bias)
+        self.check(lambda t, u: dr.texture(t, u, filter_mode="nearest"), tex, uv)
+        self.check(lambda *a: dr.texture(*a, filter_mode="linear-mipmap-nearest"), tex, uv, uv_da)
+        self.check(lambda t, u, b: dr.texture(t, u, mip_level_bias=b, boundary_mode="zero"), tex,
+                   uv, (2 * bias + 1).detach().requires_grad_())
 
     def test_texture_of_cube_and_with_levels_of_its_own(self):
         uv = random(1, 4, 5, 3, seed=5, requires_grad=True)
         uv_da = (0.3 * random(1, 4, 5, 6, seed=2)).requires_grad_()
         cube = random(1, 6, 4, 4, 2, seed=4, requires_grad=True)
+        self.check(lambda *a: dr.texture(*a, boundary_mode="cube"), cube, uv)
         self.check(lambda *a: dr.texture(*a, boundary_mode="cube"), cube, uv, uv_da)
         tex = random(1, 4, 8, 2, seed=4, requires_grad=True)
         levels = [random(1, 2, 4, 2, seed=6, requires_grad=True),
@@ -273,6 +281,10 @@ class Gradients(unittest.TestCase):
         topology = dr.antialias_construct_topology_hash(tri)
         self.check(lambda c, p: dr.antialias(c, rast, p, tri, topology), color,
                    pos.requires_grad_())
+        shared = pos[0].detach().clone().requires_grad_()
+        ranges = torch.tensor([[0, 8], [3, 4]], dtype=torch.int32)
+        rast, _ = dr.rasterize(self.context, shared.detach(), tri, (9, 8), ranges=ranges)
+        self.check(lambda c, p: dr.antialias(c, rast, p, tri), color, shared)
 
     def test_pos_gradient_boost(self):
         pos, tri = wavy_grid(2)
@@ -362,8 +374,9 @@ class Errors(unittest.TestCase):
                    self.rast_db, "some")
         self.check(ValueError, r"diff_attrs is \[2\], must be in 0..1", dr.interpolate, attr,
                    self.rast, self.tri, self.rast_db, [2])
-        self.check(ValueError, "pixel 0 of rast names triangle 9", dr.interpolate, attr,
-                   torch.full_like(self.rast, 9), self.tri)
+        for wrong in (9, 0.5, -1, -0.5, 3, 3e38, math.nan):
+            self.check(ValueError, "pixel 0 of rast names triangle", dr.interpolate, attr,
+                       torch.full_like(self.rast, wrong), self.tri)
         self.check(ValueError, "face 0 has vertex 2, but there are 2", dr.interpolate,
                    attr[:, :2], self.rast, self.tri)
 

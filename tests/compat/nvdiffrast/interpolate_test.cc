@@ -51,34 +51,6 @@ Scene<double> TwoViews(int n = 3, int height = 12, int width = 15) {
   return scene;
 }
 
-TEST(Interpolate, PositionsComeBackAtPixelCentres) {
-  // Attributes x, y, w: perspective-correct, x/w and y/w of the surface are those of the centre.
-  const Scene<double> scene = TwoViews();
-  Attributes<double> attributes;
-  for (std::size_t v = 0; v < scene.positions.size() / 4; ++v) {
-    for (const std::size_t i : {0, 1, 3}) attributes.values.push_back(scene.positions[4 * v + i]);
-  }
-  attributes.diff = {};
-  const auto rasterized = Rasterize(scene);
-  const auto images = Interpolated(InputOf(scene, attributes, rasterized));
-  std::size_t seen = 0;
-  for (std::size_t p = 0; p < scene.grid().pixels(); ++p) {
-    const double* out = &images.out[3 * p];
-    if (rasterized.rast[4 * p + 3] == 0) {
-      EXPECT_EQ(out[0], 0);
-      EXPECT_EQ(out[2], 0);
-      continue;
-    }
-    // A centre within 1/2048 pixel of the mesh's border may be kept on it.
-    const auto x = static_cast<int>(p % 15), y = static_cast<int>(p / 15 % 12);
-    const PixelCentre at = CentreOf(scene.grid(), x, y);
-    EXPECT_NEAR(out[0] / out[2], at.x, 2e-4);
-    EXPECT_NEAR(out[1] / out[2], at.y, 2e-4);
-    ++seen;
-  }
-  EXPECT_GT(seen, 150u);
-}
-
 TEST(Interpolate, PixelDifferentialsAreDifferencesBetweenPixels) {
   // One face over the image: values a small step beside a pixel follow from a finer image.
   Scene<double> scene;
@@ -102,45 +74,6 @@ TEST(Interpolate, PixelDifferentialsAreDifferencesBetweenPixels) {
       const double* da = &coarse.out_da[static_cast<std::size_t>(2 * (4 * y + x))];
       EXPECT_NEAR(da[0], (at(cx + 1, cy) - at(cx - 1, cy)) * 50.5, 1e-4);
       EXPECT_NEAR(da[1], (at(cx, cy + 1) - at(cx, cy - 1)) * 50.5, 1e-4);
-    }
-  }
-}
-
-TEST(Interpolate, GradientsByDifferences) {
-  for (const bool shared : {false, true}) {
-    const Scene<double> scene = TwoViews();
-    Rasterized<double> rasterized = Rasterize(scene);
-    Attributes<double> attributes;
-    attributes.shared = shared;
-    attributes.values = RandomNumbers<double>(scene.vertices() * 3 * (shared ? 1 : 2), 4);
-    const auto d_out = RandomNumbers<double>(scene.grid().pixels() * 3, 5);
-    const auto d_da = RandomNumbers<double>(scene.grid().pixels() * 4, 6);
-    Numbers<double> d_attributes(attributes.values.size()), d_rast(rasterized.rast.size()),
-        d_db(rasterized.rast.size());
-    const Workers workers(2);
-    ASSERT_TRUE(InterpolateBackward<double>(InputOf(scene, attributes, rasterized), {d_out, d_da},
-                                            workers, {d_attributes, d_rast, d_db})
-                    .ok());
-    const auto loss = [&] {
-      const auto images = Interpolated(InputOf(scene, attributes, rasterized), workers);
-      return Dot<double>(images.out, d_out) + Dot<double>(images.out_da, d_da);
-    };
-    ExpectGradient("attribute", &attributes.values, d_attributes, loss);
-    ExpectGradient("rast_db", &rasterized.rast_db, d_db, loss);
-    // z/w and face ids have no gradient; u and v are checked pixel by pixel.
-    for (std::size_t p = 0; p < scene.grid().pixels(); ++p) {
-      EXPECT_EQ(d_rast[4 * p + 2], 0);
-      EXPECT_EQ(d_rast[4 * p + 3], 0);
-      for (std::size_t i = 0; i < 2; ++i) {
-        double& u = rasterized.rast[4 * p + i];
-        const double before = u;
-        u = before + 1e-5;
-        const double up = loss();
-        u = before - 1e-5;
-        const double down = loss();
-        u = before;
-        EXPECT_NEAR(d_rast[4 * p + i], (up - down) / 2e-5, 1e-7);
-      }
     }
   }
 }
@@ -240,29 +173,6 @@ TEST(Interpolate, FloatIsTheReferenceUpToRounding) {
       ExpectWithin("d_attributes", got.d_attributes, want.d_attributes,
                    [&](std::size_t i) { return 69 * kRounding * pulls[i]; });
     });
-  }
-}
-
-TEST(Interpolate, BadInputIsNamed) {
-  const Scene<float> scene = AsScene<float>(WavyGrid(1, 1, 4, 4));
-  auto rasterized = Rasterize(scene);
-  Attributes<float> attributes;
-  attributes.values = RandomNumbers<float>(12, 8);
-  attributes.diff = {3};
-  Numbers<float> out(48), out_da(32);
-  const auto message = [&] {
-    return Interpolate<float>(InputOf(scene, attributes, rasterized), Workers(1), {out, out_da})
-        .message();
-  };
-  EXPECT_NE(message().find("attribute 3, but there are 3"), std::string::npos);
-  attributes.diff = {0};
-  rasterized.rast[4 * 5 + 3] = 9;
-  EXPECT_NE(message().find("pixel 5 of rast names triangle 9"), std::string::npos);
-  rasterized.rast[4 * 5 + 3] = 0.5f;
-  EXPECT_NE(message().find("pixel 5 of rast names triangle 0.5"), std::string::npos);
-  for (const float id : {-1.0f, std::nanf(""), 3e38f, -0.5f, 3.0f}) {
-    rasterized.rast[4 * 5 + 3] = id;
-    EXPECT_NE(message().find("pixel 5 of rast names triangle"), std::string::npos) << id;
   }
 }
 

@@ -307,35 +307,6 @@ TEST(RasterizeBackward, BarycentricsByComplexStep) {
   }
 }
 
-TEST(RasterizeBackward, SumsOverPixelsAndImages) {
-  for (const bool shared : {false, true}) {
-    Scene<double> scene = WavyGrid(2, 9, 11, 13);
-    scene.images = 2;
-    scene.shared = shared;
-    if (shared) scene.ranges = {0, 8, 3, 4};
-    if (!shared) {
-      const auto other = WavyGrid(2, 10, 11, 13).positions;
-      scene.positions.insert(scene.positions.end(), other.begin(), other.end());
-    }
-    const auto out = Rasterize(scene);
-    const auto d_rast = RandomNumbers<double>(out.rast.size(), 11);
-    auto d_db = RandomNumbers<double>(out.rast.size(), 12);
-    Numbers<double> gradient(scene.positions.size());
-    const Workers workers(2);
-    ASSERT_TRUE(
-        RasterizeBackward<double>(scene.input(), {out.rast, d_rast, d_db}, workers, gradient).ok());
-    auto weights = d_rast;
-    for (std::size_t i = 0; i < weights.size(); i += 4) weights[i + 2] = weights[i + 3] = 0;
-    ExpectGradient("position", &scene.positions, gradient, [&] {
-      const auto moved = Rasterize(scene, workers);
-      EXPECT_TRUE(
-          std::equal(moved.rast.begin(), moved.rast.end(), out.rast.begin(),
-                     [i = 0](double a, double b) mutable { return i++ % 4 != 3 || a == b; }));
-      return Dot<double>(moved.rast, weights) + Dot<double>(moved.rast_db, d_db);
-    });
-  }
-}
-
 TEST(RasterizeBackward, StaysFiniteWhereWIsTiny) {
   Scene<float> scene = AsScene<float>(WavyGrid(2, 9, 40, 40));
   for (float& v : scene.positions) v *= 1e-37f;  // the same image, gradients of 1e38 and more

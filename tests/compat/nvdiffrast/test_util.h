@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes, and gradients by differences, for the tests of nvdiffrast's operations.
+// Scenes for the tests of nvdiffrast's operations. Their gradients: test_nvdiffrast.py.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -66,30 +66,6 @@ void OnEveryTarget(const Body& body) {
     SCOPED_TRACE(target);
     body();
   }
-}
-
-// Holds `gradient` to central differences of loss() by each number of *at. The step is the one at
-// which the error of the differences, about step^2, meets their rounding, about 1e-16 / step; both
-// are below 1e-9 for losses and third derivatives of order 1 to 10.
-template <class Loss>
-void ExpectGradient(const char* what, Numbers<double>* at, const Numbers<double>& gradient,
-                    const Loss& loss, double tolerance = 1e-7) {
-  constexpr double kStep = 1e-5;
-  ASSERT_EQ(at->size(), gradient.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < at->size(); ++i) {
-    const double before = (*at)[i];
-    (*at)[i] = before + kStep;
-    const double up = loss();
-    (*at)[i] = before - kStep;
-    const double down = loss();
-    (*at)[i] = before;
-    const double expected = (up - down) / (2 * kStep);
-    largest = std::max(largest, std::abs(expected));
-    EXPECT_NEAR(gradient[i], expected, tolerance * std::max(1.0, std::abs(expected)))
-        << what << " " << i;
-  }
-  EXPECT_GT(largest, 1e-3) << what << ": the test sees no gradient";
 }
 
 // A mesh over positions in clip space, with its images.

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// The K nearest faces of pixels: against every face for every pixel, sorted; the gradient against
-// differences; the same bits for any number of workers; errors.
+// The K nearest faces of pixels: against every face for every pixel, sorted; errors. The gradient:
+// test_fragments.py.
 #include "compat/pytorch3d/layered_raster.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <complex>
 #include <limits>
 #include <tuple>
 #include <vector>
 
 #include "base/rng.h"
+#include "compat/pytorch3d/layered_fragment.h"
 
 namespace tilegrad::compat::pytorch3d::layered_raster_test {
 
@@ -46,8 +48,8 @@ std::size_t Count(const LayeredOptions& o, std::size_t images) {
 
 template <class T>
 Layers<T> Draw(const std::vector<T>& v, const std::vector<FaceRange>& images,
-               const LayeredOptions& options, int threads = 2) {
-  const Workers workers(threads);
+               const LayeredOptions& options) {
+  const Workers workers(2);
   Layers<T> out(Count(options, images.size()));
   const Status status = RasterizeLayers<T>(v, images, options, workers, out.View());
   EXPECT_TRUE(status.ok()) << status.message();
@@ -128,75 +130,6 @@ TEST(LayeredRaster, FloatIsDouble) {
   EXPECT_LT(other, exact.z.size() / 1000);
 }
 
-TEST(LayeredRaster, SameBitsForAnyNumberOfWorkers) {
-  Rng rng(6);
-  LayeredOptions o;
-  o.size = {50, 70};
-  o.faces_per_pixel = 5;
-  o.blur_radius = 0.01;
-  const auto v = RandomFaces<float>(300, 0.3, &rng);
-  const std::vector<FaceRange> images = {{0, 200}, {100, 200}};
-  const auto one = Draw(v, images, o, 1);
-  std::vector<float> d_z(one.z.size()), d_bary(one.bary.size()), d_dists(one.z.size());
-  for (auto* d : {&d_z, &d_bary, &d_dists}) {
-    for (float& x : *d) x = static_cast<float>(rng.Uniform(-1, 1));
-  }
-  const auto backward = [&](int threads) {
-    const Workers workers(threads);
-    std::vector<float> d_v(v.size(), 7);
-    EXPECT_TRUE(
-        RasterizeLayersBackward<float>(v, o, workers, {one.faces, d_z, d_bary, d_dists, d_v}).ok());
-    return d_v;
-  };
-  for (const int threads : {2, 7}) {
-    EXPECT_EQ(Draw(v, images, o, threads), one);
-    EXPECT_EQ(backward(threads), backward(1));
-  }
-}
-
-TEST(LayeredRaster, GradientIsThatOfDifferences) {
-  Rng rng(7);
-  LayeredOptions o;
-  o.size = {21, 13};
-  o.faces_per_pixel = 3;
-  o.blur_radius = 0.05;
-  o.rule.clip_barycentrics = true;
-  auto v = RandomFaces<double>(12, 0.8, &rng);
-  for (std::size_t i = 2; i < v.size(); i += 3) v[i] += 1;
-  const std::vector<FaceRange> images = {{0, 8}, {4, 8}};
-  const auto out = Draw(v, images, o);
-  std::vector<double> d_z(out.z.size()), d_bary(out.bary.size()), d_dists(out.z.size());
-  for (auto* d : {&d_z, &d_bary, &d_dists}) {
-    for (double& x : *d) x = rng.Uniform(-1, 1);
-  }
-  std::vector<double> d_v(v.size());
-  const Workers workers(2);
-  ASSERT_TRUE(
-      RasterizeLayersBackward<double>(v, o, workers, {out.faces, d_z, d_bary, d_dists, d_v}).ok());
-  // With the lists held fixed.
-  const auto value = [&] {
-    double sum = 0;
-    for (std::size_t i = 0; i < out.faces.size(); ++i) {
-      if (out.faces[i] < 0) continue;
-      const int p = static_cast<int>(i / 3 % 273);
-      const double x = double(21 - 2 * (p % 21) - 1) / 13, y = double(13 - 2 * (p / 21) - 1) / 13;
-      const auto at = FragmentOf(v.data() + 9 * out.faces[i], x, y, o.rule);
-      sum += d_z[i] * at.z + d_dists[i] * at.dist;
-      for (std::size_t k = 0; k < 3; ++k) sum += d_bary[3 * i + k] * at.bary[k];
-    }
-    return sum;
-  };
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    const double at = v[i], step = 1e-6;
-    v[i] = at + step;
-    const double up = value();
-    v[i] = at - step;
-    const double expected = (up - value()) / (2 * step);
-    v[i] = at;
-    EXPECT_NEAR(d_v[i], expected, 1e-4 * (1 + std::abs(expected)));
-  }
-}
-
 TEST(LayeredRaster, Errors) {
   const Workers workers(1);
   std::vector<float> v(18, 1);
@@ -224,6 +157,59 @@ TEST(LayeredRaster, Errors) {
   std::vector<float> d_v(18);
   EXPECT_EQ(RasterizeLayersBackward<float>(v, o, workers, {out.faces, {}, {}, {}, d_v}).message(),
             "pix_to_face[3] is 2, outside of [-1, 2)");
+}
+
+// One face at one pixel: known values, and the adjoint against a complex step.
+using Complex = std::complex<double>;
+
+// x to the left: this one is counter-clockwise as seen.
+constexpr double kFace[9] = {0.5, -0.5, 1, -0.5, -0.5, 2, 0, 0.5, 4};
+
+TEST(LayeredFragment, KnownValues) {
+  const auto flat = FragmentOf(kFace, 0.0, 0.0, {false, false});
+  EXPECT_NEAR(flat.bary[0], 0.25, 1e-7);
+  EXPECT_NEAR(flat.bary[2], 0.5, 1e-7);
+  EXPECT_NEAR(flat.z, 0.25 + 0.5 + 2, 1e-6);
+  EXPECT_TRUE(flat.inside);
+  // Distance to the edge from (0.5, -0.5) to (0, 0.5): 0.5 * 0.5 / sqrt(1.25).
+  EXPECT_NEAR(flat.dist, -0.05, 1e-12);
+  const auto deep = FragmentOf(kFace, 0.0, 0.0, {true, false});
+  // 1/z is linear on the screen: 0.25 + 0.25 / 2 + 0.5 / 4.
+  EXPECT_NEAR(deep.z, 2.0, 1e-6);
+  EXPECT_NEAR(deep.bary[0], 0.5, 1e-6);
+}
+
+TEST(LayeredFragment, ClippedOutside) {
+  const auto at = FragmentOf(kFace, 0.0, 0.75, {false, true});
+  EXPECT_FALSE(at.inside);
+  EXPECT_NEAR(at.dist, 0.0625, 1e-12);
+  EXPECT_EQ(at.bary[0], 0);
+  EXPECT_EQ(at.bary[1], 0);
+  EXPECT_NEAR(at.bary[2], 1, 1e-12);
+  EXPECT_NEAR(at.z, 4, 1e-12);
+}
+
+TEST(LayeredFragment, AdjointIsThatOfAComplexStep) {
+  Rng rng(3);
+  for (int trial = 0; trial < 400; ++trial) {
+    const FragmentRule rule{trial % 2 == 0, trial / 2 % 2 == 0};
+    double v[9], d_v[9] = {};
+    for (int i = 0; i < 9; ++i) v[i] = i % 3 == 2 ? rng.Uniform(0.5, 3) : rng.Uniform(-1, 1);
+    const double px = rng.Uniform(-1, 1), py = rng.Uniform(-1, 1);
+    const double d_z = rng.Uniform(-1, 1), d_dist = rng.Uniform(-1, 1);
+    const std::array<double, 3> d_bary = {rng.Uniform(-1, 1), rng.Uniform(-1, 1), 1};
+    FragmentBackward<double>(v, px, py, rule, d_bary, d_z, d_dist, d_v);
+    for (int i = 0; i < 9; ++i) {
+      constexpr double kStep = 1e-30;
+      std::vector<Complex> shifted(v, v + 9);
+      shifted[static_cast<std::size_t>(i)] += Complex(0, kStep);
+      const auto at = FragmentOf<Complex>(shifted.data(), Complex(px), Complex(py), rule);
+      Complex sum = d_z * at.z + d_dist * at.dist;
+      for (std::size_t k = 0; k < 3; ++k) sum += d_bary[k] * at.bary[k];
+      const double expected = sum.imag() / kStep;
+      EXPECT_NEAR(d_v[i], expected, 1e-9 * (1 + std::abs(expected))) << trial << " " << i;
+    }
+  }
 }
 
 }  // namespace tilegrad::compat::pytorch3d::layered_raster_test
