@@ -22,6 +22,7 @@
 #include "base/sanitizers.h"
 #include "base/simd_target.h"
 #include "support/forked.h"
+#include "support/temp_folder.h"
 
 namespace tilegrad::base_test {
 
@@ -37,18 +38,6 @@ TEST(Workers, CallsEachIndexOnceAndNeverTwoAtATimePerWorker) {
     });
     for (const auto& c : calls) EXPECT_EQ(c, 1);
   }
-}
-
-TEST(Workers, NestedLoopsKeepWorkersApart) {
-  Workers workers(3);
-  std::vector<std::atomic<int>> busy(3);
-  std::atomic<int> total = 0;
-  workers.For(20, [&](std::size_t, std::size_t w) {
-    ASSERT_EQ(busy[w]++, 0);
-    workers.For(20, [&](std::size_t, std::size_t) { ++total; });
-    --busy[w];
-  });
-  EXPECT_EQ(total, 400);
 }
 
 // Threads that wait for the rest of an inner loop could take waiting tasks of the outer one. Inner
@@ -273,13 +262,7 @@ TEST(InlineVector, HoldsEachElementOnce) {
   EXPECT_EQ(shared.use_count(), 2);
 }
 
-class FileTest : public testing::Test {
- protected:
-  FileTest()
-      : folder_(Path(testing::TempDir()) / ("tilegrad_file_" + std::to_string(::getpid()))) {}
-  ~FileTest() override { std::filesystem::remove_all(folder_); }
-  Path folder_;
-};
+class FileTest : public TempFolderTest {};
 
 TEST_F(FileTest, WritesWholeAndReadsBack) {
   const Path path = folder_ / "a" / "b.txt";
@@ -333,7 +316,6 @@ TEST_F(FileTest, NamesOfTheGreatestLength) {
 
 // Of dead processes, and of our own process number: in a container the next run may get it again.
 TEST_F(FileTest, WhatKilledWritesLeftIsRemoved) {
-  ASSERT_TRUE(MakeFolder(folder_).ok());
   const std::string gone = "4194305";  // beyond the kernel's largest number of a process
   const std::string own = std::to_string(::getpid()), parent = std::to_string(::getppid());
   for (const std::string& name : {"a." + gone + ".tmp", "b." + own + ".tmp"})
@@ -347,16 +329,6 @@ TEST_F(FileTest, WhatKilledWritesLeftIsRemoved) {
   for (const std::string& name : others) EXPECT_TRUE(std::filesystem::exists(folder_ / name));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}),
             static_cast<std::ptrdiff_t>(others.size()));
-}
-
-TEST_F(FileTest, HalfWrittenFilesOfOtherNamesStay) {
-  ASSERT_TRUE(MakeFolder(folder_).ok());
-  for (const std::string name : {"a.png", "b.png", "a.png.old", "a"}) {
-    ASSERT_TRUE(AppendText(folder_ / (name + ".4194305.tmp"), "half", false).ok());
-  }
-  for (const char* name : {"a.png", "c.png"}) RemoveTemporariesOf(folder_ / name);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.png.4194305.tmp"));
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 3);
 }
 
 TEST_F(FileTest, FailedWriteLeavesTheOldFile) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "report/tables.h"
+#include "support/expect.h"
 
 namespace tilegrad::bench::report_test {
 
@@ -15,9 +16,7 @@ std::string Sample(const std::string& name, double cpu, double wall, const std::
 }
 
 std::vector<Measurement> Parse(const std::string& samples) {
-  const auto all = ParseMeasurements(R"({"benchmarks":[)" + samples + "]}");
-  EXPECT_TRUE(all.ok()) << all.status().message();
-  return all.ok() ? *all : std::vector<Measurement>();
+  return Ok(ParseMeasurements(R"({"benchmarks":[)" + samples + "]}")).value();
 }
 
 const std::string kLimits = R"(,"limit_ms":0.5,"limit_high_ms":1.0,"share":1,"faces":7)";
@@ -55,10 +54,7 @@ TEST(BenchReport, CountersWithoutVariationAreRead) {
 TEST(BenchReport, SpeedTableHasRatiosAndLimits) {
   const std::string table = SpeedTable(Parse(kSamples));
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);  // head, line, one row
-  EXPECT_NE(
-      table.find("| S1 | forward | both | 3.00 |  | 10 | 500 | 2.00 | 0.50-1.00 | 17-33 % |\n"),
-      std::string::npos)
-      << table;
+  ExpectIn(table, "| S1 | forward | both | 3.00 |  | 10 | 500 | 2.00 | 0.50-1.00 | 17-33 % |\n");
 }
 
 TEST(BenchReport, RequestTableHasRatiosToTheSilhouette) {
@@ -67,10 +63,8 @@ TEST(BenchReport, RequestTableHasRatiosToTheSilhouette) {
                          Sample("S2/forward/trilinear texture/shaded", 10, 9, "") + "," +
                          Sample("S2/backward/trilinear texture/shaded", 15, 9, ""));
   const std::string table = RequestTable(all);
-  EXPECT_NE(table.find("| S2 | silhouette | 4.00 | 1.00 | 5.00 | 1.00 |"), std::string::npos);
-  EXPECT_NE(table.find("| S2 | trilinear texture | 10.00 | 2.50 | 15.00 | 3.00 |"),
-            std::string::npos)
-      << table;
+  ExpectIn(table, "| S2 | silhouette | 4.00 | 1.00 | 5.00 | 1.00 |",
+           "| S2 | trilinear texture | 10.00 | 2.50 | 15.00 | 3.00 |");
   EXPECT_TRUE(RequestTable(Parse(kSamples)).empty());
 }
 
@@ -81,8 +75,7 @@ TEST(BenchReport, GrowthAsCurvesAndTable) {
   ASSERT_EQ(plot.series[0].points.size(), 2u);
   EXPECT_EQ(plot.series[0].points[1].x, 1);
   EXPECT_EQ(plot.series[0].points[1].y, 50);
-  EXPECT_NE(GrowthTable(all, "delta").find("| 0.01 | 5 | 500 |\n| 1 | 50 |  |\n"),
-            std::string::npos);
+  ExpectIn(GrowthTable(all, "delta"), "| 0.01 | 5 | 500 |\n| 1 | 50 |  |\n");
   EXPECT_TRUE(GrowthTable(all, "faces").empty());
 }
 
@@ -97,10 +90,8 @@ TEST(LogPlotSvg, DrawsPointsWhereTheyBelongAndEscapesTexts) {
   const std::string svg =
       train::LogPlotSvg({"a & b", "y", {{{"<s>"}, {{1, 1, ""}, {100, 10, ""}}}}});
   EXPECT_EQ(svg.rfind("<svg", 0), 0u);
-  EXPECT_NE(svg.find("points=\"80.0,384.0 470.0,24.0 \""), std::string::npos) << svg;
-  EXPECT_NE(svg.find("a &amp; b"), std::string::npos);
-  EXPECT_NE(svg.find("&lt;s&gt;"), std::string::npos);
-  EXPECT_NE(train::LogPlotSvg({"x", "y", {}}).find("</svg>"), std::string::npos);
+  ExpectIn(svg, "points=\"80.0,384.0 470.0,24.0 \"", "a &amp; b", "&lt;s&gt;");
+  ExpectIn(train::LogPlotSvg({"x", "y", {}}), "</svg>");
 }
 
 }  // namespace tilegrad::bench::report_test

@@ -6,25 +6,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
-#include "base/file.h"
 #include "base/rng.h"
-#include "base/simd_target.h"
 #include "raster/project_ref.h"
+#include "support/expect.h"
 #include "support/shared_data.h"
 
 namespace tilegrad::raster::project_test {
 
 TEST(Project, AgreesWithTheCamerasOfDibR) {
-  const auto path = SharedFile("vectors/08_cameras.json");
-  if (!path) GTEST_SKIP() << "shared/vectors/08_cameras.json is not here";
-  const auto json = nlohmann::json::parse(ReadText(*path).value());
-  std::vector<float> positions;
-  for (const auto& p : json["points"]) {
-    for (const auto& x : p) positions.push_back(x.get<float>());
-  }
+  TILEGRAD_VECTORS_OR_SKIP(json, "08_cameras.json");
+  const auto positions = Numbers<float>(json["points"]);
   const std::vector<std::int32_t> faces = {0, 1, 2};
   constexpr int kSize = 64;
   int checked = 0;
@@ -75,8 +68,7 @@ TEST(Project, EveryTargetEqualsTheReferenceForAnyCount) {
     const CameraT<double> camera = CameraCast<double>(points.camera);
     ScreenMeshBuffersT<double> truth;
     ProjectRef<double>({positions, points.faces, &camera, false}, 80, 60, &truth);
-    for (const auto& target : RunnableTargets()) {
-      ASSERT_TRUE(ForceTarget(target).ok());
+    for (const std::string target : EveryTarget()) {
       ScreenMeshBuffers mesh;
       Project(points.source(false), 80, 60, &mesh);
       ASSERT_EQ(mesh.x.size(), vertices);
@@ -87,7 +79,6 @@ TEST(Project, EveryTargetEqualsTheReferenceForAnyCount) {
       }
       EXPECT_EQ(mesh.v2, truth.v2);
     }
-    ASSERT_TRUE(ForceTarget("").ok());
   }
 }
 
@@ -167,14 +158,12 @@ TEST(Project, OverflowingFacesAreRejected) {
   Points points{{kMost, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, {}};
   points.camera.translation[0] = kMost;
   points.camera.translation[2] = -2;
-  for (const auto& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     ScreenMeshBuffers mesh;
     Project(points.source(false), 32, 32, &mesh);
     ASSERT_EQ(mesh.reject.size(), 1u);
     EXPECT_EQ(mesh.reject[0], kFaceOverflow) << target;
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 }  // namespace tilegrad::raster::project_test

@@ -147,12 +147,11 @@ void ExpectShared(const Json& of, const Json& gradient, std::size_t n, const Res
 
 // 1e-10: both sides compute in double.
 TEST(N3mrColors, DoubleGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("16_n3mr.json");
-  if (!file) GTEST_SKIP() << "vectors/16_n3mr.json is not there";
+  TILEGRAD_VECTORS_OR_SKIP(file, "16_n3mr.json");
   int cases = 0;
-  ForSharedImages(*file,
+  ForSharedImages(file,
                   [&](const Json& of, const Json& inputs, const Json& gradient, std::size_t n) {
-                    const SharedScene<double> at(*file, of, inputs, n, gradient["eps"]);
+                    const SharedScene<double> at(file, of, inputs, n, gradient["eps"]);
                     const int asked = AskedOf(gradient["outputs"]);
                     ExpectShared(of, gradient, n, Reference(at.scene, at.d, asked), 1e-10, 1e-10);
                     ExpectShared(of, gradient, n, Fast(at.scene, at.d, asked), 1e-10, 1e-10);

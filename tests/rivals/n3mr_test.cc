@@ -82,10 +82,9 @@ void ForSharedImages(const Json& file, const Check& check) {
 // 1e-10: both sides compute in double; a gradient's largest entries are D / eps, its terms up to
 // 1e4.
 TEST(N3mr, DoubleGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("16_n3mr.json");
-  if (!file) GTEST_SKIP() << "vectors/16_n3mr.json is not there";
+  TILEGRAD_VECTORS_OR_SKIP(file, "16_n3mr.json");
   int cases = 0;
-  ForSharedImages(*file,
+  ForSharedImages(file,
                   [&](const Json& scene, const Json& inputs, const Json& gradient, std::size_t n) {
                     const int size = scene["image_size"];
                     const auto corners = Numbers(inputs["face_vertices"][n]);

@@ -5,9 +5,9 @@
 
 #include <complex>
 
-#include "base/simd_target.h"
 #include "rivals/softras_color_ref.h"
 #include "rivals/test_util.h"
+#include "support/expect.h"
 
 namespace tilegrad::rivals::softras_color_test {
 
@@ -61,9 +61,7 @@ void ExpectFastIsReference(const SoftRasScene<double>& scene, const std::vector<
   std::vector<double> color(d_color.size());
   SoftRasColorRef<double>(scene, color);
   const Gradients want = Backward(scene, d_color);
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
-    SCOPED_TRACE(target);
+  for (const std::string target : EveryTarget()) {
     const FastImage got = Fast(scene, d_color);
     EXPECT_LT(Difference(got.color, color), 1e-4);
     EXPECT_LE(Difference(got.d_corners, want.corners),
@@ -105,10 +103,9 @@ struct SharedCase {
 
 // 1e-10: both sides compute in double; the file's independent version agrees to 1e-13.
 TEST(SoftRasColors, ReferenceGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("15b_softras_color.json");
-  if (!file) GTEST_SKIP() << "vectors/15b_softras_color.json is not there";
+  TILEGRAD_VECTORS_OR_SKIP(file, "15b_softras_color.json");
   int cases = 0;
-  for (const Json& of : (*file)["scenes"]) {
+  for (const Json& of : file["scenes"]) {
     for (const Json& one : of["cases"]) {
       for (std::size_t n = 0; n < of["face_vertices"].size(); ++n, ++cases) {
         SCOPED_TRACE(of["name"].get<std::string>() + " " + one["texture"].get<std::string>() +

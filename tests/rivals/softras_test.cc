@@ -5,9 +5,9 @@
 
 #include <complex>
 
-#include "base/simd_target.h"
 #include "rivals/softras_ref.h"
 #include "rivals/test_util.h"
+#include "support/expect.h"
 
 namespace tilegrad::rivals::softras_test {
 
@@ -66,11 +66,10 @@ void ForSharedCases(const Json& file, const Check& check) {
 
 // 1e-10: both sides compute in double; the file's own independent version agrees to 2e-13.
 TEST(SoftRas, ReferenceGivesTheNumbersOfThePublishedKernels) {
-  const auto file = SharedVectors("15_softras.json");
-  if (!file) GTEST_SKIP() << "vectors/15_softras.json is not there";
+  TILEGRAD_VECTORS_OR_SKIP(file, "15_softras.json");
   int cases = 0;
   ForSharedCases(
-      *file, [&](const Json& scene, const SoftRasOptions& options, std::size_t n, const Json& one) {
+      file, [&](const Json& scene, const SoftRasOptions& options, std::size_t n, const Json& one) {
         const int size = scene["image_size"];
         const auto corners = Numbers(scene["face_vertices"][n]);
         const auto d_alpha = Numbers(scene["upstream_alpha"][n]);
@@ -179,8 +178,7 @@ TEST(SoftRas, FloatIsTheReference) {
   trials.push_back({"hard", {.distance = SoftDistance::kHard}});
   trials.push_back({"near plane", {.sigma = 1e-3, .near_plane = 2.4}});
   trials.push_back({"hard alpha", {.alpha = SoftAlpha::kHard, .sigma = 1e-3}});
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
+  for (const std::string target : EveryTarget()) {
     for (const Trial& trial : trials) {
       SCOPED_TRACE(target + std::string(", ") + trial.name);
       Rng rng(9);

@@ -6,36 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <vector>
 
 #include "base/rng.h"
 #include "support/shared_data.h"
 
 namespace tilegrad::rivals::test {
-
-using Json = nlohmann::json;
-
-inline std::optional<Json> SharedVectors(const std::string& name) {
-  const std::optional<Path> path = SharedFile("vectors/" + name);
-  if (!path) return std::nullopt;
-  std::ifstream file(*path);
-  return Json::parse(file);
-}
-
-// Numbers of nested lists, in order.
-inline void Flatten(const Json& from, std::vector<double>* to) {
-  if (!from.is_array()) return to->push_back(from.get<double>());
-  for (const Json& part : from) Flatten(part, to);
-}
-template <class T = double>
-std::vector<T> Numbers(const Json& from) {
-  std::vector<double> all;
-  Flatten(from, &all);
-  return {all.begin(), all.end()};
-}
 
 template <class T>
 double Largest(const std::vector<T>& values) {

@@ -5,13 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
+#include <map>
+#include <numbers>
 
 #include "base/rng.h"
 #include "scene/level_set.h"
 #include "scene/shapes.h"
 #include "scene/simplify.h"
 #include "scene/topology.h"
+#include "support/expect.h"
 
 namespace tilegrad::edit_mesh_test {
 
@@ -26,20 +30,35 @@ bool IsManifold(const EditMesh& mesh) {
   return EditMesh::Make(packed.positions, packed.faces).ok();
 }
 
-long Euler(const EditMesh& mesh) {
-  const Mesh packed = mesh.Pack();
-  const Topology t = BuildTopology(packed.faces, packed.positions.size());
-  return static_cast<long>(packed.positions.size()) - static_cast<long>(t.edges.size()) +
-         static_cast<long>(packed.faces.size());
+ScalarGrid GridOf(int n, const std::function<float(glm::vec3)>& value) {
+  ScalarGrid grid{{n, n, n}, glm::vec3(-1), 2.0f / static_cast<float>(n - 1), {}};
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k)
+        grid.values.push_back(value(grid.low + grid.cell * glm::vec3(i, j, k)));
+  return grid;
+}
+
+long Euler(const Mesh& mesh) {
+  const auto edges = BuildTopology(mesh.faces, mesh.positions.size()).edges.size();
+  return static_cast<long>(mesh.positions.size()) - static_cast<long>(edges) +
+         static_cast<long>(mesh.faces.size());
+}
+
+double Volume(const Mesh& mesh) {
+  double sum = 0;
+  for (const Face& f : mesh.faces) {
+    const glm::dvec3 a(mesh.positions[static_cast<std::size_t>(f[0])]),
+        b(mesh.positions[static_cast<std::size_t>(f[1])]),
+        c(mesh.positions[static_cast<std::size_t>(f[2])]);
+    sum += glm::dot(a, glm::cross(b, c)) / 6;
+  }
+  return sum;
 }
 
 Mesh Torus(int n) {
-  ScalarGrid grid{{n, n, n}, glm::vec3(-1), 2.0f / static_cast<float>(n - 1), {}};
-  for (int i = 0; i < n * n * n; ++i) {
-    const glm::vec3 p = grid.low + grid.cell * glm::vec3(i / n / n, i / n % n, i % n);
-    grid.values.push_back(0.25f - std::hypot(std::hypot(p.x, p.y) - 0.6f, p.z));
-  }
-  return LevelSet(grid);
+  return LevelSet(
+      GridOf(n, [](glm::vec3 p) { return 0.25f - std::hypot(std::hypot(p.x, p.y) - 0.6f, p.z); }));
 }
 
 TEST(EditMesh, RefusesWhatIsNotAClosedManifold) {
@@ -83,7 +102,7 @@ TEST(EditMesh, LinkConditionRefusesWhatWouldChangeTheTopology) {
 // Any collapses that are allowed, in any order.
 TEST(EditMesh, StaysAManifoldOfTheSameTopology) {
   EditMesh mesh = Make(Torus(13));
-  ASSERT_EQ(Euler(mesh), 0);
+  ASSERT_EQ(Euler(mesh.Pack()), 0);
   Rng rng(3);
   int collapsed = 0;
   for (int round = 0; round < 3000; ++round) {
@@ -98,7 +117,7 @@ TEST(EditMesh, StaysAManifoldOfTheSameTopology) {
   }
   EXPECT_GT(collapsed, 50);
   EXPECT_TRUE(IsManifold(mesh));
-  EXPECT_EQ(Euler(mesh), 0);
+  EXPECT_EQ(Euler(mesh.Pack()), 0);
 }
 
 TEST(EditMesh, CollapsedEdgesStandWhereTheyAreTold) {
@@ -113,23 +132,20 @@ TEST(EditMesh, CollapsedEdgesStandWhereTheyAreTold) {
 
 TEST(Simplified, KeepsShapeAndTopologyWithFewFaces) {
   const Mesh fine = Torus(41);
-  const auto coarse = Simplified(fine, {.error = 0.01f, .patch = 0.005f});
-  ASSERT_TRUE(coarse.ok()) << coarse.status().message();
+  const auto coarse = Ok(Simplified(fine, {.error = 0.01f, .patch = 0.005f}));
   EXPECT_LT(coarse->faces.size(), fine.faces.size() / 10);
-  const EditMesh checked = Make(*coarse);
-  EXPECT_EQ(Euler(checked), 0);
+  Make(*coarse);  // a closed manifold
+  EXPECT_EQ(Euler(*coarse), 0);
   for (const glm::vec3& p : coarse->positions)
     EXPECT_NEAR(std::hypot(std::hypot(p.x, p.y) - 0.6f, p.z), 0.25f, 0.02f);
 }
 
 TEST(Simplified, EndsAtTheFacesAndTheLengthAskedFor) {
   const Mesh fine = Torus(41);
-  const auto few = Simplified(fine, {.error = 0, .most_faces = 1000});
-  ASSERT_TRUE(few.ok());
+  const auto few = Ok(Simplified(fine, {.error = 0, .most_faces = 1000}));
   EXPECT_LE(few->faces.size(), 1000u);
   EXPECT_GE(few->faces.size(), 996u);
-  const auto fine_enough = Simplified(fine, {.error = 1, .longest = 0.2f});
-  ASSERT_TRUE(fine_enough.ok());
+  const auto fine_enough = Ok(Simplified(fine, {.error = 1, .longest = 0.2f}));
   for (const Face& f : fine_enough->faces) {
     for (std::size_t k = 0; k < 3; ++k) {
       const glm::vec3 a = fine_enough->positions[static_cast<std::size_t>(f[k])],
@@ -137,6 +153,44 @@ TEST(Simplified, EndsAtTheFacesAndTheLengthAskedFor) {
       EXPECT_LE(glm::length(a - b), 0.2001f);
     }
   }
+}
+
+// Checkerboards, lone points and diagonal neighbours: all that is ambiguous in cells.
+TEST(LevelSet, OfRandomNumbersIsAClosedManifold) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Rng rng(seed);
+    const double share = 0.1 + 0.04 * static_cast<double>(seed);
+    const Mesh mesh = LevelSet(GridOf(9, [&](glm::vec3) {
+      return static_cast<float>(rng.Uniform() < share ? 1 : -rng.Uniform());
+    }));
+    ASSERT_GT(mesh.faces.size(), 100u);
+    const auto edit = EditMesh::Make(mesh.positions, mesh.faces);
+    EXPECT_TRUE(edit.ok()) << "seed " << seed << ": " << edit.status().message();
+    EXPECT_GT(Volume(mesh), 0);
+  }
+}
+
+TEST(LevelSet, ZeroIsOutsideAndBordersAreClosed) {
+  EXPECT_TRUE(LevelSet(GridOf(5, [](glm::vec3) { return 0.0f; })).faces.empty());
+  const Mesh box = LevelSet(GridOf(5, [](glm::vec3) { return 1.0f; }));
+  EXPECT_EQ(Euler(box), 2);
+  EXPECT_GT(Volume(box), 1);  // the middle 3 x 3 x 3 points; the cube has 8
+}
+
+TEST(LevelSet, HasTheTopologyAndTheVolumeOfATorus) {
+  const Mesh torus = Torus(41);
+  EXPECT_EQ(Euler(torus), 0);
+  const double truth = 2 * std::numbers::pi * std::numbers::pi * 0.6 * 0.25 * 0.25;
+  EXPECT_NEAR(Volume(torus), truth, 0.02 * truth);
+}
+
+TEST(LevelSet, KeepsPartsApart) {
+  const Mesh two = LevelSet(GridOf(31, [](glm::vec3 p) {
+    return 0.4f -
+           std::min(glm::length(p - glm::vec3(0.5f, 0, 0)), glm::length(p + glm::vec3(0.5f, 0, 0)));
+  }));
+  EXPECT_EQ(Euler(two), 4);
+  EXPECT_TRUE(EditMesh::Make(two.positions, two.faces).ok());
 }
 
 }  // namespace tilegrad::edit_mesh_test

@@ -8,6 +8,7 @@
 
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
+#include "support/expect.h"
 
 namespace tilegrad::weak_perspective_test {
 
@@ -159,8 +160,7 @@ TEST(WeakPerspective, PinholesSeeTheSameButForDepth) {
       const double t = camera.translation[i];
       EXPECT_NEAR(seen[i] - t, (weak[i] - t) / (1 + weak[2] / distance), 1e-9);
     }
-    const auto back = WeakPerspectiveOf(pinhole, {0, 0, 0});
-    ASSERT_TRUE(back.ok()) << back.status().message();
+    const auto back = Ok(WeakPerspectiveOf(pinhole, {0, 0, 0}));
     EXPECT_NEAR(back->scale, camera.scale, 1e-9);
     const auto again = ProjectWeakly(*back, point);
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(again[i], weak[i], 1e-8);
@@ -171,8 +171,7 @@ TEST(WeakPerspective, PinholesSeeTheSameButForDepth) {
 TEST(WeakPerspective, OfAPinholeAroundAPoint) {
   Camera64 camera = PinholeOf(WeakPerspective{20, {30, 40}, {0.9, 0.1, -0.3, 0.2}}, 5.0);
   const Vec3Array centre = {0.4, -0.2, 0.7};
-  const auto weak = WeakPerspectiveOf(camera, centre);
-  ASSERT_TRUE(weak.ok());
+  const auto weak = Ok(WeakPerspectiveOf(camera, centre));
   const auto seen = SeenBy(camera, centre);
   const auto want = ProjectWeakly(*weak, centre);
   EXPECT_NEAR(seen[0], want[0], 1e-10);

@@ -102,29 +102,6 @@ TEST_F(OnEveryTarget, LookupsAreThoseOfTheReference) {
   }
 }
 
-TEST(TextureWraps, MirrorTurnsEveryOtherTile) {
-  const auto texels = RandomTexels(4, 4);
-  TexturePyramid pyramid;
-  pyramid.Build({texels, 4, 4, 3, Wrap::kMirror, Filter::kBilinear});
-  for (const float u : {0.1f, 0.45f, 0.8f}) {
-    const auto inside = Sample(pyramid, u, 0.3f, 0);
-    for (const float same : {-u, 2 - u, 2 + u, u - 4}) {
-      const auto other = Sample(pyramid, same, 0.3f, 0);
-      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(inside[c], other[c], 1e-5f) << same;
-    }
-  }
-}
-
-TEST(TextureWraps, RepeatHasNoSeamAndClampHoldsTheBorder) {
-  const auto texels = RandomTexels(4, 4);
-  TexturePyramid repeat, clamp;
-  repeat.Build({texels, 4, 4, 3, Wrap::kRepeat, Filter::kBilinear});
-  clamp.Build({texels, 4, 4, 3, Wrap::kClamp, Filter::kBilinear});
-  const auto left = Sample(repeat, 1e-6f, 0.3f, 0), right = Sample(repeat, 1 - 1e-6f, 0.3f, 0);
-  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(left[c], right[c], 2e-5f);
-  EXPECT_EQ(Sample(clamp, 0.05f, 0.3f, 0), Sample(clamp, -50, 0.3f, 0));
-}
-
 // Between levels a trilinear lookup goes from one to the other without a jump.
 TEST(TextureLevels, TrilinearIsContinuousInTheLevel) {
   const auto texels = RandomTexels(16, 16);

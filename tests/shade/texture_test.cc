@@ -79,6 +79,11 @@ TEST(Texture, RepeatTilesThePlaneAndClampHoldsTheBorder) {
     EXPECT_EQ(edge[c], texels[c]);
     EXPECT_EQ(far[c], texels[c]);
   }
+  const auto mirror = View(texels, Wrap::kMirror);  // turns every other tile
+  for (const double u : {-0.3, 1.7, 2.3, -3.7}) {
+    const auto there = Sample(mirror, u, 0.6);
+    for (std::size_t c = 0; c < kChannels; ++c) EXPECT_NEAR(there[c], inside[c], 1e-14) << u;
+  }
 }
 
 TEST(Texture, EndlessCoordinatesReadATexelNotTheMemoryBeside) {

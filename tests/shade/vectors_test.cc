@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "shade/combine_ref.h"
@@ -17,20 +15,7 @@
 
 namespace tilegrad::shade::vectors_test {
 
-using Json = nlohmann::json;
 using Vector = std::vector<double>;
-
-std::optional<Json> Load(const std::string& name) {
-  const auto path = SharedFile("vectors/" + name);
-  if (!path) return std::nullopt;
-  std::ifstream in(*path);
-  return Json::parse(in);
-}
-
-#define LOAD_OR_SKIP(json, name)                              \
-  const auto loaded = Load(name);                             \
-  if (!loaded) GTEST_SKIP() << name << " is not to be found"; \
-  const Json& json = *loaded
 
 // Both sides are in double; the data has 17 digits.
 constexpr double kTolerance = 1e-12;
@@ -76,7 +61,7 @@ void ExpectNear(const Vector& got, const Json& expected, const std::string& what
 
 // The expected numbers are whole or quarters by construction.
 TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
-  LOAD_OR_SKIP(json, "05_texture_mapping.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "05_texture_mapping.json");
   const Json& textures = json.at("kaolin_test_texture");
   for (const Filter filter : {Filter::kNearest, Filter::kBilinear}) {
     const std::string name = filter == Filter::kNearest ? "nearest" : "bilinear";
@@ -98,7 +83,7 @@ TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
 }
 
 TEST(VectorsTexture, ClampedWithCentresInside) {
-  LOAD_OR_SKIP(json, "05_texture_mapping.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "05_texture_mapping.json");
   const Json &expected = json.at("clamp_align_false_border"), &uvs = json.at("random_uv");
   const OwnedTexture nearest(json.at("random_texture"), Wrap::kClamp, Filter::kNearest);
   const OwnedTexture bilinear(json.at("random_texture"), Wrap::kClamp, Filter::kBilinear);
@@ -146,7 +131,7 @@ double IrradianceAt(const Vector& w, const Vec3<double>& n) {
 constexpr double kPrinted = 1e-9;
 
 TEST(VectorsHarmonics, BasisAndIrradiance) {
-  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "06_spherical_harmonics.json");
   const Json &normals = json.at("normals"), &w = json.at("lights9");
   for (std::size_t i = 0; i < normals.size(); ++i) {
     const Vec3<double> n = Vec(normals[i]);
@@ -156,7 +141,7 @@ TEST(VectorsHarmonics, BasisAndIrradiance) {
 }
 
 TEST(VectorsHarmonics, GradientsOfIrradiance) {
-  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "06_spherical_harmonics.json");
   const Json& normals = json.at("normals");
   const auto p = ShPolynomialOf<double>(Irradiance(json.at("lights9")));
   ShPolynomialT<double> d_p = {};
@@ -174,7 +159,7 @@ TEST(VectorsHarmonics, GradientsOfIrradiance) {
 
 // Light from one direction: its coefficients are the basis there.
 TEST(VectorsHarmonics, DiffuseFromADirection) {
-  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "06_spherical_harmonics.json");
   const Vector w = BasisAt(Vec(json.at("direction")));
   for (std::size_t i = 0; i < json.at("normals").size(); ++i) {
     const double light = IrradianceAt(w, Vec(json.at("normals")[i]));
@@ -208,7 +193,7 @@ struct PhongVectorsFile {
 };
 
 TEST(VectorsPhong, ColoursAndGradients) {
-  LOAD_OR_SKIP(json, "07_phong_lambert.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "07_phong_lambert.json");
   const PhongVectorsFile file(json);
   ColorFactorsT<double> d_factors = {};
   Vec3<double> d_light = {}, d_texture = {};
@@ -242,7 +227,7 @@ TEST(VectorsPhong, ColoursAndGradients) {
 }
 
 TEST(VectorsPhong, Lambert) {
-  LOAD_OR_SKIP(json, "07_phong_lambert.json");
+  TILEGRAD_VECTORS_OR_SKIP(json, "07_phong_lambert.json");
   const PhongVectorsFile file(json);
   for (std::size_t i = 0; i < json.at("normal").size(); ++i) {
     const LightT<double> one{file.light, 1};

@@ -47,9 +47,29 @@ class ProgramTest : public TempFolderTest {
   static void ExpectRefused(const std::string& arguments, int code, const Parts&... parts) {
     const Outcome outcome = RunProgram(arguments);
     EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
-    for (const std::string& part : {std::string(parts)...})
-      EXPECT_NE(outcome.output.find(part), std::string::npos)
-          << "\"" << part << "\" is not in: " << outcome.output;
+    if constexpr (sizeof...(parts) > 0) ExpectIn(outcome.output, parts...);
+  }
+  // With whatever code, but neither by a signal nor for a failure of the shell itself.
+  template <class... Parts>
+  static void ExpectError(const std::string& arguments, const Parts&... parts) {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_TRUE(outcome.exit_code > 0 && outcome.exit_code < 126) << arguments << outcome.output;
+    if constexpr (sizeof...(parts) > 0) ExpectIn(outcome.output, parts...);
+  }
+
+  // A dataset of procedural models, and two steps of a tiny network on it. Names are shell words.
+  static void MakeData(const std::string& data) {
+    ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 3 --out " + data);
+  }
+  static std::string TrainTiny(const std::string& data, const std::string& run,
+                               const std::string& config = "quick") {
+    return "train --config " + config + " --data " + data + " --out " + run +
+           " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
+           "network.code=8 --set network.hidden1=8 --set network.hidden2=8 --set "
+           "network.template_level=1";
+  }
+  static void MakeRun(const std::string& data, const std::string& run) {
+    ExpectDone(TrainTiny(data, run));
   }
 };
 

@@ -6,9 +6,11 @@
 
 #include <fstream>
 #include <map>
+#include <span>
 #include <string>
 
 #include "base/file.h"
+#include "support/expect.h"
 
 namespace tilegrad {
 
@@ -56,13 +58,15 @@ class TempFolderTest : public testing::Test {
   Path folder_;
 };
 
-// The message of a status names all of these.
-template <class... Parts>
-void ExpectMessage(const Status& status, const Parts&... parts) {
-  EXPECT_FALSE(status.ok());
-  for (const std::string& part : {std::string(parts)...}) {
-    EXPECT_NE(status.message().find(part), std::string::npos)
-        << "\"" << part << "\" is not in: " << status.message();
+// `read` gives the status of a file's bytes. Of every beginning of a file, each `step` bytes
+// longer, it is an error that has `part`.
+template <class Read>
+void ExpectCutsRefused(std::span<const std::uint8_t> whole, const std::string& part,
+                       const Read& read, std::size_t step = 1) {
+  for (std::size_t size = 0; size < whole.size(); size += step) {
+    SCOPED_TRACE(size);
+    ExpectMessage(read(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))),
+                  part);
   }
 }
 

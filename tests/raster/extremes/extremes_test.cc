@@ -18,6 +18,7 @@
 
 #include "base/simd_target.h"
 #include "raster/extremes/truth.h"
+#include "support/expect.h"
 
 namespace tilegrad::test::extremes_test {
 
@@ -63,13 +64,11 @@ void Report(const SceneRange& range, const CheckCounts& c) {
 }
 
 void CheckOnTargets(std::uint64_t first, std::uint64_t count, std::size_t most_faces) {
-  for (const std::string& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     const SceneRange range{first, count, most_faces};
     Report(range, CheckScenes(range));
     first += count;
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 TEST(Extremes, ScenesOnEveryTarget) { CheckOnTargets(0, 700, 2000); }
@@ -167,13 +166,13 @@ TEST_P(NonFinite, InputIsNamed) {
     const float kept = *number;
     *number = GetParam();
     const std::string expected = "scene 0: camera." + std::string(name) + " is ";
-    EXPECT_NE(Run().find(expected), std::string::npos) << Run();
+    ExpectIn(Run(), expected);
     *number = kept;
   }
   const double kept = e_.options.delta;
   for (double* option : {&e_.options.delta, &e_.options.max_alpha_error}) {
     *option = static_cast<double>(GetParam());
-    EXPECT_NE(Run().find("options."), std::string::npos) << Run();
+    ExpectIn(Run(), "options.");
     *option = kept;
   }
 }
@@ -189,12 +188,10 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Extremes, OneSceneAlone) {
   const char* number = std::getenv("TILEGRAD_SCENE");
   if (number == nullptr) GTEST_SKIP() << "TILEGRAD_SCENE names no scene";
-  for (const std::string& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     const std::uint64_t n = std::strtoull(number, nullptr, 10);
     CheckScenes({n, 1, n < 1000000 ? 2000u : 50000u});
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 }  // namespace tilegrad::test::extremes_test

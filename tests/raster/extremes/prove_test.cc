@@ -23,11 +23,7 @@ class ProveTest : public TempFolderTest {
     const auto text = ReadText(output_);
     return text.ok() ? *text : text.status().message();
   }
-  ProofTally Tally() const {
-    auto tally = ReadTally(state_);
-    EXPECT_TRUE(tally.ok()) << tally.status().message();
-    return tally.ok() ? *tally : ProofTally();
-  }
+  ProofTally Tally() const { return Ok(ReadTally(state_)).value(); }
 
   const Path state_ = folder_ / "tally.txt", output_ = folder_ / "output";
 };
@@ -53,7 +49,7 @@ TEST_F(ProveTest, AViolationIsKeptAndNamed) {
   tally.violations = {"scene 7 on EMU128: beyond E"};
   ASSERT_TRUE(WriteTally(state_, tally).ok());
   EXPECT_EQ(Prove(), 1);
-  EXPECT_NE(Output().find("VIOLATION scene 7 on EMU128: beyond E"), std::string::npos) << Output();
+  ExpectIn(Output(), "VIOLATION scene 7 on EMU128: beyond E");
   EXPECT_EQ(Tally().violations.size(), 1u);
   EXPECT_EQ(Tally().Sum().violations, 1u);
   EXPECT_EQ(Tally().Sum().ratio, 1.25);
@@ -64,7 +60,7 @@ TEST_F(ProveTest, AFileThatIsNoTallyIsRefusedAndKept) {
        {"", "hello\n", "tilegrad prove 1\nnext x\n", "tilegrad prove 1\na b 1\n"}) {
     Write("tally.txt", std::string(text));
     EXPECT_EQ(Prove(), 1) << text;
-    EXPECT_NE(Output().find("tally.txt"), std::string::npos) << Output();
+    ExpectIn(Output(), "tally.txt");
     EXPECT_EQ(*ReadText(state_), text);
   }
 }

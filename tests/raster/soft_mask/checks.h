@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "base/simd_target.h"
 #include "raster/soft_mask/soft_mask.h"
 #include "raster/soft_mask/test_util.h"
+#include "support/expect.h"
 
 namespace tilegrad::raster::test {
 
@@ -109,15 +109,12 @@ inline void CheckTransmittance(const SoftScene& scene, const SoftTruth& truth,
 inline void CheckScene(const SoftScene& scene, SoftMaskScratch* scratch, const SoftRun& run = {}) {
   const SoftTruth truth(scene);
   const auto d_alpha = ComparableGradient(scene, truth);
-  for (const std::string& target : RunnableTargets()) {
-    SCOPED_TRACE(target);
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     const SoftResult result = RunSoftMask(scene, d_alpha, scratch, run);
     CheckAlpha(scene, truth, result);
     CheckTransmittance(scene, truth, result);
     CheckGradient(scene, truth, d_alpha, result);
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 }  // namespace tilegrad::raster::test

@@ -5,16 +5,12 @@
 
 #include <cmath>
 #include <complex>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "base/rng.h"
 #include "raster/soft_mask/paper_ref.h"
 #include "support/shared_data.h"
 
 namespace tilegrad::raster::paper_test {
-
-using Json = nlohmann::json;
 
 // One image of the vectors: faces, ids and pixel centres in NDC.
 template <class T>
@@ -96,9 +92,7 @@ void CheckCase(const Json& v, const Json& c, double mask_tolerance, double gradi
 }
 
 TEST(SoftMaskPaper, GoldenNumbers) {
-  const auto path = SharedFile("vectors/01_dibr_soft_mask_simple.json");
-  if (!path) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
-  const Json vectors = Json::parse(std::ifstream(*path));
+  TILEGRAD_VECTORS_OR_SKIP(vectors, "01_dibr_soft_mask_simple.json");
   ASSERT_EQ(vectors["cases"].size(), 4u);
   for (const Json& c : vectors["cases"]) {
     SCOPED_TRACE("sigmainv " + c["sigmainv"].dump() + " boxlen " + c["boxlen"].dump());
