@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "base/rng.h"
-#include "base/simd_target.h"
 #include "compat/kaolin/projected_raster.h"
 #include "compat/kaolin/projected_soft_mask.h"
 #include "compat/projected_batch.h"
+#include "support/expect.h"
 
 namespace tilegrad::compat::kaolin::projected_test {
 
@@ -82,9 +82,8 @@ Images<T> Render(const ProjectedFacesOwner<T>& faces, const Case& c, const Worke
   const std::size_t pixels = faces.images * PixelCount(c.raster.size);
   Images<T> out{std::vector<std::int32_t>(pixels), std::vector<T>(pixels * faces.channels),
                 std::vector<T>(pixels)};
-  const Status status = RasterizeProjected<T>(faces.View(), c.raster, faces.features,
-                                              faces.channels, workers, out.ids, out.features);
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(RasterizeProjected<T>(faces.View(), c.raster, faces.features, faces.channels, workers, out.ids,
+                           out.features));
   const auto bound = ProjectedSoftMask<T>(faces.View(), c.mask, out.ids, workers, out.mask);
   EXPECT_TRUE(bound.ok()) << bound.status().message();
   out.bound = bound.value();
@@ -126,8 +125,7 @@ TEST(Projected, FloatIsDouble) {
   const Case c({130, 70}, 2000);  // several bins, tiles that are cut off
   const auto faces = RandomFaces(2, 150, 3, 0.2, &rng);
   const auto truth = Cast<double>(faces);
-  for (const std::string& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     auto images = Render(faces, c, workers);
     auto exact = Render(truth, c, workers);
     std::size_t other = 0;  // centres that rounding moves over an edge
@@ -159,7 +157,6 @@ TEST(Projected, FloatIsDouble) {
       EXPECT_NEAR(d.features[i], e.features[i], 1e-3 * (1 + std::abs(e.features[i])));
     }
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 }  // namespace tilegrad::compat::kaolin::projected_test

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "compat/nvdiffrast/test_util.h"
+#include "support/expect.h"
 
 namespace tilegrad::compat::nvdiffrast::interpolate_test {
 
@@ -38,8 +39,7 @@ Images<T> Interpolated(const InterpolateInput<T>& input, const Workers& workers 
   Images<T> images;
   images.out.assign(input.grid.pixels() * input.attributes.channels, T(-7));
   images.out_da.assign(input.grid.pixels() * 2 * input.diff_attrs.size(), T(-7));
-  const Status status = Interpolate<T>(input, workers, {images.out, images.out_da});
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(Interpolate<T>(input, workers, {images.out, images.out_da}));
   return images;
 }
 
@@ -90,9 +90,7 @@ struct Results {
     const auto images = Interpolated(input);
     out = images.out;
     out_da = images.out_da;
-    const Status status =
-        InterpolateBackward<T>(input, {d_out, d_da}, Workers(1), {d_attributes, d_rast, d_db});
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(InterpolateBackward<T>(input, {d_out, d_da}, Workers(1), {d_attributes, d_rast, d_db}));
   }
 };
 
@@ -158,7 +156,7 @@ TEST(Interpolate, FloatIsTheReferenceUpToRounding) {
     const auto pulls = PullsOn(input);
     const auto n = static_cast<double>(c.channels);
     const auto at_db = [&](std::size_t i) { return std::abs(double{rast32.rast_db[i]}); };
-    OnEveryTarget([&] {
+    for (const std::string target : EveryTarget()) {
       const Results<float> got(input, d_out, d_da);
       ExpectWithin("out", got.out, want.out, [](std::size_t) { return 6 * kRounding; });
       ExpectWithin("out_da", got.out_da, want.out_da, [&](std::size_t i) {
@@ -172,7 +170,7 @@ TEST(Interpolate, FloatIsTheReferenceUpToRounding) {
       });
       ExpectWithin("d_attributes", got.d_attributes, want.d_attributes,
                    [&](std::size_t i) { return 69 * kRounding * pulls[i]; });
-    });
+    }
   }
 }
 

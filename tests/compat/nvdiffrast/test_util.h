@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "base/simd_target.h"
 #include "compat/nvdiffrast/rasterize.h"
+#include "support/expect.h"
 
 namespace tilegrad::compat::nvdiffrast {
 
@@ -57,17 +57,6 @@ void ExpectWithin(const char* what, const Numbers<float>& got, const Numbers<dou
   }
 }
 
-// Calls body() with each instruction set of this machine.
-template <class Body>
-void OnEveryTarget(const Body& body) {
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
-    ASSERT_TRUE(scope.status().ok());
-    SCOPED_TRACE(target);
-    body();
-  }
-}
-
 // A mesh over positions in clip space, with its images.
 template <class T>
 struct Scene {
@@ -96,10 +85,9 @@ Rasterized<T> Rasterize(const Scene<T>& scene, const Workers& workers = Workers(
   out.rast.assign(4 * scene.grid().pixels(), T(-7));
   out.rast_db.assign(4 * scene.grid().pixels(), T(-7));
   Rasterizer rasterizer;
-  const Status status = rasterizer.Run(
+  Ok(rasterizer.Run(
       scene.input(), workers,
-      {out.rast, out.rast_db, peeled == nullptr ? std::span<float>() : std::span<float>(*peeled)});
-  EXPECT_TRUE(status.ok()) << status.message();
+      {out.rast, out.rast_db, peeled == nullptr ? std::span<float>() : std::span<float>(*peeled)}));
   return out;
 }
 

@@ -157,13 +157,13 @@ TEST_P(TextureInFloat, SamplesAreTheReferenceUpToRounding) {
       std::count_if(bounds.begin(), bounds.end(), [](const PixelBounds& b) { return b.kink; }));
   EXPECT_LT(kinks, bounds.size() / 50);
   const bool steps = nearest() || exact_.filter == TextureFilter::kLinearMipmapNearest;
-  OnEveryTarget([&] {
+  for (const std::string target : EveryTarget()) {
     ExpectWithin("sample", Sampled(lookups_), want, [&](std::size_t i) {
       const PixelBounds& b = bounds[i / exact_.channels];
       if (steps && b.kink) return 2.0;
       return nearest() ? 0 : 4 * b.place + 40 * r + 2 * b.level;
     });
-  });
+  }
 }
 
 // For each number of a level: by how much its gradient is off. Terms are weights times cotangents,
@@ -214,7 +214,7 @@ TEST_P(TextureInFloat, GradientsOfTexelsAreTheReferenceUpToRounding) {
   for (std::size_t l = 0; l < exact_.levels.size(); ++l) {
     tolerances.push_back(TexelBounds(input_, bounds, d_exact, l));
   }
-  OnEveryTarget([&] {
+  for (const std::string target : EveryTarget()) {
     for (const int workers : {1, 2, 5}) {
       const GradientsOf<float> got(lookups_, d_out, Workers(workers));
       for (std::size_t l = 0; l < exact_.levels.size(); ++l) {
@@ -222,7 +222,7 @@ TEST_P(TextureInFloat, GradientsOfTexelsAreTheReferenceUpToRounding) {
                      [&](std::size_t i) { return tolerances[l][i]; });
       }
     }
-  });
+  }
 }
 
 // What a gradient may be, and by how much it is off.
@@ -271,7 +271,7 @@ TEST_P(TextureInFloat, GradientsOfCoordinatesAreTheReferenceUpToRounding) {
   std::vector<CoordinateBounds> tolerances;
   for (const PixelBounds& b : bounds) tolerances.emplace_back(b, input_);
   const std::size_t n = input_.coordinates();
-  OnEveryTarget([&] {
+  for (const std::string target : EveryTarget()) {
     const GradientsOf<float> got(lookups_, d_out);
     ExpectWithin("uv", got.d_uv, want.d_uv,
                  [&](std::size_t i) { return tolerances[i / n].uv.error; });
@@ -279,7 +279,7 @@ TEST_P(TextureInFloat, GradientsOfCoordinatesAreTheReferenceUpToRounding) {
                  [&](std::size_t i) { return tolerances[i / n / 2].uv_da.error; });
     ExpectWithin("bias", got.d_bias, want.d_bias,
                  [&](std::size_t i) { return tolerances[i].level.error; });
-  });
+  }
 }
 
 constexpr auto kNearest = TextureFilter::kNearest, kLinear = TextureFilter::kLinear,
@@ -323,7 +323,7 @@ TEST(TextureInFloatAt, NoPointThereIsNothing) {
       }
       const std::size_t end = 10 + (cube ? 4 : 3);
       const Numbers<float> d_out(lookups.grid.pixels() * 3, 1.0f);
-      OnEveryTarget([&] {
+      for (const std::string target : EveryTarget()) {
         const auto out = Sampled(lookups);
         const GradientsOf<float> got(lookups, d_out);
         for (std::size_t p = 10; p < end; ++p) {
@@ -335,7 +335,7 @@ TEST(TextureInFloatAt, NoPointThereIsNothing) {
         for (const auto* numbers : {&out, &got.d_uv, &got.d_da, &got.d_bias, &got.d_levels[0]}) {
           for (const float v : *numbers) ASSERT_TRUE(std::isfinite(v));
         }
-      });
+      }
     }
   }
 }
