@@ -44,7 +44,7 @@ void RequireWithinRounding(const std::vector<float>& got, const std::vector<doub
 }
 
 // All three products of a convolution, and the same bits from one worker and from two. Winograd's
-// has another bound on its rounding (nn/kernels/conv2d_winograd_test.cc) and only the latter here.
+// has another bound on its rounding (nn/kernels/conv2d_test.cc) and only the latter here.
 void Convolution(Input input) {
   Numbers in(input);
   const TargetScope scope(TargetOf(&in));

@@ -3,8 +3,8 @@
 // float on every SIMD target against double.
 #include <gtest/gtest.h>
 
-#include "base/simd_target.h"
 #include "nn/gradient_check.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn::derivatives_test {
 
@@ -22,14 +22,11 @@ void Examine(const OpCase& c) {
   for (const Var* q : {&want.s, &want.first, &want.second}) {
     condition.push_back(Condition(*q, leaves));
   }
-  for (const auto& target : RunnableTargets()) {
-    SCOPED_TRACE(target);
-    ASSERT_TRUE(ForceTarget(target).ok());
+  for (const std::string target : EveryTarget()) {
     Context context(workers);
     ExpectFloatAgrees(c, want, condition, Differentiate(c.function, InFloat(context, leaves)));
     EXPECT_TRUE(context.status().ok()) << context.status().message();
   }
-  ASSERT_TRUE(ForceTarget("").ok());
 }
 
 void ExamineAll(void (*add)(CaseList&)) {

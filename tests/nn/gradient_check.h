@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <numeric>
 #include <span>
@@ -175,6 +176,57 @@ inline void ExpectFloatAgrees(const OpCase& c, const Derivatives& want,
   near(got.s, want.s, unit * condition[0]);
   near(got.first, want.first, 3 * unit * condition[1]);
   near(got.second, want.second, 9 * unit * condition[2]);
+}
+
+// The loss with other values of the leaves, which keep their own afterwards.
+inline double LossAt(std::vector<Var> leaves, const Inputs& values,
+                     const std::function<Var()>& loss) {
+  std::vector<Tensor> before;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    before.push_back(leaves[i].context().Copy(leaves[i].value()));
+    std::memcpy(leaves[i].value().raw(), values[i].value().raw(), before[i].bytes());
+  }
+  const double result = loss().item();
+  for (std::size_t i = 0; i < values.size(); ++i)
+    std::memcpy(leaves[i].value().raw(), before[i].raw(), before[i].bytes());
+  return result;
+}
+
+// Against differences in double, along a random direction of all leaves and then of each: to 1e-6
+// of the slope, and what rounding leaves of a difference of two losses, 16 eps loss / step. The
+// step is small because a rectifier of the many must not pass its kink.
+inline void ExpectGradientBy(const std::vector<Var>& leaves, const std::function<Var()>& loss,
+                             Rng& rng) {
+  Context& context = leaves[0].context();
+  const Var value = loss();
+  ASSERT_TRUE(value.valid()) << context.status().message();
+  const auto gradient = Grad(value, leaves);
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  Inputs direction, none;
+  for (const Var& leaf : leaves) {
+    direction.push_back(RandomConstant(context, leaf.shape(), rng));
+    none.push_back(Constant(context, context.Zeros(leaf.shape())));
+  }
+  constexpr double kStep = 1e-6;
+  const double rounding = 16 * 0x1.0p-52 * std::abs(value.item()) / kStep;
+  const auto check = [&](const Inputs& along) {
+    const double slope = Slope([&](const Inputs& moved) { return LossAt(leaves, moved, loss); },
+                               leaves, along, kStep);
+    EXPECT_NEAR(Dot(gradient, along), slope, 1e-6 * std::abs(slope) + rounding);
+    return slope;
+  };
+  EXPECT_GT(std::abs(check(direction)), 1000 * rounding);
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    Inputs one = none;
+    one[i] = direction[i];
+    check(one);
+  }
+}
+
+inline std::vector<Var> WeightsOf(Module& module) {
+  std::vector<Var> out;
+  for (const NamedVar& p : Parameters(module)) out.push_back(p.value);
+  return out;
 }
 
 }  // namespace tilegrad::nn

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers, initialisers, Adam, and a whole training step: same bits for any number of workers, no
-// memory from the heap after the first steps.
+// Layers, initialisers and Adam.
 #include "nn/layers.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "base/simd_target.h"
 #include "nn/nn.h"
 
 namespace tilegrad::nn::layers_test {
@@ -106,98 +104,24 @@ TEST(AdamOptimizer, NormOfAllGradients) {
   EXPECT_DOUBLE_EQ(GlobalNorm(context, g), 5.0);
 }
 
-// A small encoder and head in the manner of the paper's section 5.1.
-struct Trainer {
-  explicit Trainer(const Workers& workers, DType dtype = DType::kF32)
-      : context(workers, dtype), adam(context, Build(), {.learning_rate = 1e-3}) {}
-
-  std::vector<NamedVar> Build() {
-    Rng rng(11);
-    const ConvOptions half{.stride = 2, .padding = 2};
-    net.Add<Conv2dLayer>("conv1", context,
-                         ConvShape{.in = 4, .out = 9, .kernel = 5, .options = half}, rng);
-    net.Add<BatchNorm>("bn1", context, 9, BatchNormOptions{.relu = true});
-    net.Add<Conv2dLayer>("conv2", context,
-                         ConvShape{.in = 9, .out = 17, .kernel = 5, .options = half}, rng);
-    net.Add<BatchNorm>("bn2", context, 17, BatchNormOptions{.relu = true});
-    net.Add<Flatten>("flatten");
-    net.Add<LinearLayer>("fc1", context, LinearShape{.in = 17 * 16, .out = 50}, rng);
-    net.Add<BatchNorm>("bn3", context, 50, BatchNormOptions{.relu = true});
-    net.Add<LinearLayer>("fc2", context, LinearShape{.in = 50, .out = 30}, rng);
-    return Parameters(net);
-  }
-
-  Var Loss(std::uint64_t step) {
-    Rng rng(12, step);
-    Tensor image = context.Empty({6, 4, 16, 16});
-    FillUniform(image, rng, 0, 1);
-    Var y = Reshape(net.Forward(Constant(context, image), Mode::kTrain), {6, 10, 3});
-    const Var low = ReduceMin(y, {1}, Keep::kYes), high = ReduceMax(y, {1}, Keep::kYes);
-    y = y / (high - low + 0.1);
-    return Mean(Square(y - 0.3)) + 0.1 * Mean(Abs(Tanh(y)));
-  }
-
-  double Step(std::uint64_t step) {
-    const Var loss = Loss(step);
-    const auto gradients = Grad(loss, adam.parameters());
-    EXPECT_TRUE(adam.Step(gradients).ok());
-    return loss.item();
-  }
-
-  std::vector<float> Weights() {
-    std::vector<float> all;
-    for (const NamedTensor& t : State(net)) {
-      const auto span = t.value.span<float>();
-      all.insert(all.end(), span.begin(), span.end());
-    }
-    return all;
-  }
-
-  Context context;
-  Sequential net;
-  Adam adam;
-};
-
-// The vector kernels in float against the scalar references in double, through a whole step. Sums
-// are of up to 450 terms; rounding errors of a sum of n terms behave like sqrt(n) u (Higham, Mary:
-// A new approach to probabilistic rounding error analysis, 2019); eight layers there and eight
-// back, of which each batch norm may enlarge what it is given by 1 / deviation, here up to about 4.
-TEST(Training, FloatOnEveryTargetAgreesWithDouble) {
-  const double tolerance = 16 * 4 * std::sqrt(450.0) * 0x1.0p-24;
-  const Workers workers(2);
-  Trainer exact(workers, DType::kF64);
-  const auto want = Grad(exact.Loss(0), exact.adam.parameters());
-  const double norm = GlobalNorm(exact.context, want);
-  for (const auto& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
-    Trainer trainer(workers);  // of the same seed
-    const auto got = Grad(trainer.Loss(0), trainer.adam.parameters());
-    ASSERT_TRUE(trainer.context.status().ok());
-    double squares = 0;
-    for (std::size_t i = 0; i < want.size(); ++i) {
-      for (std::size_t k = 0; k < want[i].value().elements(); ++k) {
-        const double d = static_cast<double>(got[i].value().data<float>()[k]) -
-                         want[i].value().data<double>()[k];
-        squares += d * d;
-      }
-    }
-    EXPECT_LT(std::sqrt(squares), tolerance * norm) << target;
-  }
-  ASSERT_TRUE(ForceTarget("").ok());
-}
-
-TEST(Training, LoadingChecksBeforeItChanges) {
+TEST(Layers, LoadingChecksBeforeItChanges) {
   const Workers workers(1);
-  Trainer a(workers), b(workers);
-  a.Step(0);
-  const auto before = b.Weights();
-  auto state = State(a.net);
+  Context context(workers);
+  Rng rng(11);
+  Sequential a, b;
+  for (Sequential* net : {&a, &b}) {
+    net->Add<Conv2dLayer>("conv", context, ConvShape{.in = 4, .out = 9, .kernel = 5}, rng);
+    net->Add<LinearLayer>("fc", context, LinearShape{.in = 5, .out = 3}, rng);
+  }
+  const auto encoded = [&] { return EncodeSafetensors({State(b), {}}).value(); };
+  const Bytes before = encoded();
+  auto state = State(a);
   state.pop_back();
-  EXPECT_NE(LoadState(b.net, state).message().find("fc2.bias"), std::string::npos);
-  state = State(a.net);
+  EXPECT_NE(LoadState(b, state).message().find("fc.bias"), std::string::npos);
+  state = State(a);
   state[0].value = state[1].value;
-  EXPECT_NE(LoadState(b.net, state).message().find("conv1.weight"), std::string::npos);
-  EXPECT_EQ(b.Weights(), before);
+  EXPECT_NE(LoadState(b, state).message().find("conv.weight"), std::string::npos);
+  EXPECT_EQ(encoded(), before);
 }
 
 }  // namespace tilegrad::nn::layers_test

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <memory>
 
+#include "nn/game.h"
 #include "nn/gradient_check.h"
 #include "support/temp_folder.h"
 
@@ -15,51 +15,6 @@ namespace tilegrad::nn::networks_test {
 class Networks : public ::testing::Test {
  protected:
   Var Input(const Shape& shape) { return RandomParameter(context_, {shape, 0, 1}, rng_); }
-
-  // d(loss)/d(parameters) against differences, along a random direction of all parameters and then
-  // of each: to 1e-6 of the slope, and what rounding leaves of a difference of two losses, 16 eps
-  // loss / step. The step is small because a rectifier of the thousands must not pass its kink.
-  void ExpectGradient(Module& module, const std::function<Var()>& loss) {
-    std::vector<Var> parameters;
-    for (const NamedVar& p : Parameters(module)) parameters.push_back(p.value);
-    const Var value = loss();
-    ASSERT_TRUE(value.valid()) << context_.status().message();
-    const auto gradient = Grad(value, parameters);
-    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
-    Inputs direction, none;
-    for (const Var& p : parameters) {
-      direction.push_back(RandomConstant(context_, p.shape(), rng_));
-      none.push_back(Constant(context_, context_.Zeros(p.shape())));
-    }
-    constexpr double kStep = 1e-6;
-    const double rounding = 16 * 0x1.0p-52 * std::abs(value.item()) / kStep;
-    const auto check = [&](const Inputs& along) {
-      const double slope = Slope([&](const Inputs& moved) { return At(parameters, moved, loss); },
-                                 parameters, along, kStep);
-      EXPECT_NEAR(Dot(gradient, along), slope, 1e-6 * std::abs(slope) + rounding);
-      return slope;
-    };
-    EXPECT_GT(std::abs(check(direction)), 1000 * rounding);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      Inputs one = none;
-      one[i] = direction[i];
-      check(one);
-    }
-  }
-
-  // The loss with other values of the parameters.
-  double At(std::vector<Var> parameters, const Inputs& values, const std::function<Var()>& loss) {
-    std::vector<Tensor> before;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      before.push_back(context_.Copy(parameters[i].value()));
-      std::memcpy(parameters[i].value().raw(), values[i].value().raw(), before[i].bytes());
-    }
-    const double result = loss().item();
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      std::memcpy(parameters[i].value().raw(), before[i].raw(), before[i].bytes());
-    }
-    return result;
-  }
 
   Workers workers_{2};
   Context context_{workers_, DType::kF64};
@@ -86,9 +41,10 @@ TEST_F(Networks, UNetDifferentiated) {
   const Var x = Input({2, 3, 16, 8});
   EXPECT_EQ(net.Encode(x, Mode::kTrain).back().shape(), (Shape{2, 5, 2, 1}));
   EXPECT_EQ(net.Forward(x, Mode::kTrain).shape(), x.shape());
-  ExpectGradient(net, [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); });
+  ExpectGradientBy(
+      WeightsOf(net), [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); }, rng_);
   EXPECT_FALSE(net.Forward(Input({1, 3, 6, 8}), Mode::kTrain).valid());
-  EXPECT_NE(context_.TakeStatus().message().find("multiple of 8"), std::string::npos);
+  ExpectIn(context_.TakeStatus().message(), "multiple of 8");
 }
 
 TEST_F(Networks, UNetWithoutSkipsAndLarger) {
@@ -97,7 +53,8 @@ TEST_F(Networks, UNetWithoutSkipsAndLarger) {
            rng_);
   const Var x = Input({2, 3, 8, 8});
   EXPECT_EQ(net.Forward(x, Mode::kTrain).shape(), (Shape{2, 3, 32, 32}));
-  ExpectGradient(net, [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); });
+  ExpectGradientBy(
+      WeightsOf(net), [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); }, rng_);
 }
 
 // A map without edges has no place that differs from another: what one code gives is of one colour.
@@ -116,7 +73,9 @@ TEST_F(Networks, ResidualBlocksDifferentiated) {
   AddResidualBlock(blocks, "b", context_, 2, rng_);
   const Var image = Input({2, 2, 5, 6});
   EXPECT_EQ(blocks.Forward(image, Mode::kEval).shape(), image.shape());
-  ExpectGradient(blocks, [&] { return Mean(Square(blocks.Forward(image, Mode::kTrain) - 1.0)); });
+  ExpectGradientBy(
+      WeightsOf(blocks), [&] { return Mean(Square(blocks.Forward(image, Mode::kTrain) - 1.0)); },
+      rng_);
 }
 
 // WGAN-GP: d(critic loss + penalty)/d(weights), to 1e-6 of it, for each kind of critic.
@@ -128,11 +87,16 @@ TEST_F(Networks, CriticStepWithGradientPenalty) {
     const Var real = Input({2, 3, 12, 12}), fake = Input({2, 3, 12, 12});
     const auto features = critic.Features(real, Mode::kTrain);
     EXPECT_EQ(features.back().shape(), (Shape{2, 1, 3, 3}));
-    ExpectGradient(critic, [&] {
-      return Mean(critic.Forward(fake, Mode::kTrain)) - Mean(critic.Forward(real, Mode::kTrain)) +
-             10.0 * GradientPenalty(critic, Detach(0.3 * real + 0.7 * fake));
-    });
-    ExpectGradient(critic, [&] { return GradientPenalty(critic, Detach(real)); });
+    ExpectGradientBy(
+        WeightsOf(critic),
+        [&] {
+          return Mean(critic.Forward(fake, Mode::kTrain)) -
+                 Mean(critic.Forward(real, Mode::kTrain)) +
+                 10.0 * GradientPenalty(critic, Detach(0.3 * real + 0.7 * fake));
+        },
+        rng_);
+    ExpectGradientBy(
+        WeightsOf(critic), [&] { return GradientPenalty(critic, Detach(real)); }, rng_);
   }
 }
 
@@ -156,8 +120,7 @@ TEST_F(Networks, Vgg16HasTheStagesOfTorchvision) {
   // As a user has them: from a file.
   const Bytes bytes = EncodeSafetensors({SmallVgg16(context_, rng_), {}}).value();
   auto weights = DecodeSafetensors(context_, bytes).value().tensors;
-  const auto network = Vgg16::Load(context_, weights);
-  ASSERT_TRUE(network.ok()) << network.status().message();
+  const auto network = Ok(Vgg16::Load(context_, weights));
   const Var x = Input({1, 3, 64, 64}), y = Input({1, 3, 64, 64});
   const auto features = network->Features(x);
   ASSERT_EQ(features.size(), 5u);
@@ -179,6 +142,30 @@ TEST_F(Networks, FeatureWeightsThatDoNotFitAreNamed) {
   weights[2].value = context_.Zeros({5, 9, 5, 5});
   ExpectMessage(Vgg16::Load(context_, weights).status(),
                 "\"features.2.weight\" has shape [5, 9, 5, 5]");
+}
+
+// Steps of an adversarial game and of a U-Net in float: same bits for any number of workers, no
+// tensor from the heap after the first steps.
+TEST(NetworksTraining, SameBitsForAnyNumberOfWorkersOver100Steps) {
+  Bytes want;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    Game game(workers);
+    for (std::uint64_t step = 0; step < 100; ++step) game.Step(step);
+    if (want.empty()) want = game.Encoded();
+    EXPECT_EQ(game.Encoded(), want) << count;
+  }
+}
+
+TEST(NetworksTraining, MemoryIsReused) {
+  const Workers workers(2);
+  Game game(workers);
+  game.Step(0);
+  game.Step(1);
+  const MemoryStats warm = game.memory();
+  for (std::uint64_t step = 2; step < 8; ++step) EXPECT_TRUE(std::isfinite(game.Step(step)));
+  EXPECT_EQ(game.memory().misses, warm.misses);
+  EXPECT_EQ(game.memory().peak_bytes, warm.peak_bytes);
 }
 
 }  // namespace tilegrad::nn::networks_test

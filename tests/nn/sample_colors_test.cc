@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "base/simd_target.h"
 #include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn::sample_colors_test {
 
@@ -135,9 +135,7 @@ std::vector<double> RandomFlows() {
 // large as the colour: 64 * 1.5e-5.
 TEST(SampleColors, VectorsHoldToTheReference) {
   const OpResult want = RunOp(DType::kF64, RandomFlows(), 1);
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
-    SCOPED_TRACE(target);
+  for (const std::string target : EveryTarget()) {
     const OpResult got = RunOp(DType::kF32, RandomFlows(), 1);
     for (std::size_t i = 0; i < want.colors.size(); ++i)
       EXPECT_NEAR(got.colors[i], want.colors[i], 1.5e-5) << i;
@@ -155,8 +153,7 @@ TEST(SampleColors, ExtremesStayFinite) {
         flows.insert(flows.end(), {place, -place, narrow, 0.1});
     }
   }
-  for (const std::string& target : RunnableTargets()) {
-    const TargetScope scope(target);
+  for (const std::string target : EveryTarget()) {
     const OpResult got = RunOp(DType::kF32, flows, 1);
     for (const double x : got.colors) EXPECT_TRUE(std::isfinite(x)) << target;
     for (const double x : got.gradient) EXPECT_TRUE(std::isfinite(x)) << target;

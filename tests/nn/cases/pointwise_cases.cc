@@ -71,4 +71,95 @@ void AddPointwiseCases(CaseList& list) {
   }
 }
 
+void AddReduceCases(CaseList& list) {
+  const Shape shape = {list.Extent(), list.Extent(), list.Extent(5), 1 + list.Extent(18)};
+  const int roundings = 16 + static_cast<int>(shape.elements());
+  const auto add = [&](const std::string& name, const std::function<Var(const Var&)>& f) {
+    list.Add({name,
+              [f](const Inputs& v) { return Square(f(v[0])); },
+              {{shape, -0.7, 1, /*separated=*/true}},
+              roundings});
+  };
+  add("sum", [](const Var& x) { return Sum(x); });
+  add("mean", [](const Var& x) { return Mean(x); });
+  for (const Keep keep : {Keep::kNo, Keep::kYes}) {
+    add("sum 0", [=](const Var& x) { return Sum(x, {0}, keep); });
+    add("sum 1 3", [=](const Var& x) { return Sum(x, {1, 3}, keep); });
+    add("sum 0 2 3", [=](const Var& x) { return Sum(x, {0, 2, 3}, keep); });
+    add("mean 2", [=](const Var& x) { return Mean(x, {2}, keep); });
+    add("reduce max 1 2", [=](const Var& x) { return ReduceMax(x, {1, 2}, keep); });
+    add("reduce min 3", [=](const Var& x) { return ReduceMin(x, {3}, keep); });
+  }
+  list.Add({"sum to",
+            [](const Inputs& v) {
+              return Square(SumTo(v[0], {3, 1, 2}));
+            },
+            {{{2, 3, 4, 2}}},
+            32});
+}
+
+void AddShapeCases(CaseList& list) {
+  const Shape shape = {2, 3, 4 + list.Extent(9)};
+  const auto add = [&](const std::string& name, const std::function<Var(const Var&)>& f) {
+    list.Add({name, [f](const Inputs& v) { return Square(f(v[0])); }, {{shape}}, 32});
+  };
+  add("reshape", [](const Var& x) { return Reshape(x, {3, -1}); });
+  add("broadcast", [s = shape](const Var& x) { return BroadcastTo(x, {3, s[0], s[1], s[2]}); });
+  add("permute", [](const Var& x) { return Permute(x, {2, 0, 1}); });
+  add("concat", [](const Var& x) { return Concat({x, Scale(x, 2.0), x}, 1); });
+  for (int axis = 0; axis < 3; ++axis) {
+    add("slice", [=](const Var& x) { return Slice(x, axis, 1, 2); });
+    add("pad", [=](const Var& x) { return Pad(x, axis, 2, 1); });
+    add("gather", [=](const Var& x) {
+      const std::vector<std::int32_t> indices = {1, 0, 1, 1, 0};
+      return Gather(x, axis, x.context().Indices(indices));
+    });
+  }
+  const std::vector<std::int32_t> picks = {1, 0, 1, 3, 3, 3};
+  const auto pick = [picks](const Var& x) { return x.context().Indices(picks); };
+  list.Add({"take along",
+            [pick](const Inputs& v) {
+              return Square(TakeAlong(v[0], pick(v[0]).Reshaped({2, 3})));
+            },
+            {{{2, 4}}},
+            32});
+  list.Add({"place along",
+            [pick](const Inputs& v) {
+              return Square(PlaceAlong(v[0], pick(v[0]).Reshaped({2, 3}), 5));
+            },
+            {{{2, 3}}},
+            32});
+  list.Add({"broadcast 1",
+            [](const Inputs& v) {
+              return Square(BroadcastTo(v[0], {2, 3, 4}));
+            },
+            {{{3, 1}}},
+            32});
+  list.Add({"transpose", [](const Inputs& v) { return Square(Transpose(v[0])); }, {{{2, 5}}}});
+  list.Add({"scatter add",
+            [](const Inputs& v) {
+              const std::vector<std::int32_t> indices = {2, 0, 2, 2, 1};
+              return Square(ScatterAdd(v[0], 0, v[0].context().Indices(indices), 4));
+            },
+            {{{5, list.Extent(9)}}},
+            32});
+}
+
+void AddSoftmaxCases(CaseList& list) {
+  const Shape shape = {2, list.Extent(3), 1 + list.Extent(9)};
+  for (int axis = 0; axis < 3; ++axis) {
+    const InputSpec x = {shape, -3, 3, /*separated=*/true};
+    list.Add({"softmax", [=](const Inputs& v) { return Softmax(v[0], axis); }, {x}, 64});
+    list.Add({"log softmax", [=](const Inputs& v) { return LogSoftmax(v[0], axis); }, {x}, 64});
+  }
+  const InputSpec logits = {{4, 5}, -3, 3, true};
+  list.Add({"cross-entropy",
+            [](const Inputs& v) {
+              const std::vector<std::int32_t> labels = {4, 0, 2, 2};
+              return CrossEntropy(v[0], v[0].context().Indices(labels));
+            },
+            {logits},
+            96});
+}
+
 }  // namespace tilegrad::nn

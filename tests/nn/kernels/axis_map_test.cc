@@ -30,8 +30,7 @@ TEST(AxisMap, EqualsReference) {
         outer, 5, 4, inner, begin.data(), index.data(), weight.data(), x.data(), y.data()};
     const auto want = Reference(problem, AsDoubles(x), AsDoubles(weight));
     const auto magnitude = Reference(problem, Magnitudes(x), Magnitudes(weight));
-    for (const auto& target : RunnableTargets()) {
-      const OnTarget on(target);
+    for (const std::string target : EveryTarget()) {
       std::vector<float> first;
       for (const int workers : {1, 2, 7}) {
         std::fill(y.begin(), y.end(), -77.0f);
@@ -54,8 +53,7 @@ TEST(AxisMap, OneTermEachAlongTheLastAxis) {
   const AxisMapProblem<float> problem{
       outer, 2, 3, 1, begin.data(), index.data(), weight.data(), x.data(), y.data()};
   const std::vector<float> want = Reference(problem, x, weight);
-  for (const auto& target : RunnableTargets()) {
-    const OnTarget on(target);
+  for (const std::string target : EveryTarget()) {
     for (const int workers : {1, 7}) {
       std::fill(y.begin(), y.end(), -77.0f);
       MapAxis(problem, Workers(workers));

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "base/simd_target.h"
 #include "gtest/gtest.h"
 #include "nn/kernels/kernel_trial.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn {
 
@@ -23,17 +23,5 @@ inline void ExpectWithinRounding(const std::vector<float>& got, const std::vecto
     ASSERT_LE(error, Gamma(roundings) * magnitude[i]) << "at " << i << ", expected " << want[i];
   }
 }
-
-// Runs its scope's kernels on one SIMD target.
-class OnTarget {
- public:
-  explicit OnTarget(const std::string& name) : trace_(__FILE__, __LINE__, name), scope_(name) {
-    EXPECT_TRUE(scope_.status().ok());
-  }
-
- private:
-  testing::ScopedTrace trace_;
-  TargetScope scope_;
-};
 
 }  // namespace tilegrad::nn

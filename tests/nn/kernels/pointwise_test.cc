@@ -38,8 +38,7 @@ void CheckUnary(const UnaryCase& c, std::size_t n, Rng& rng, const Workers& work
 
 TEST(Pointwise, UnaryEqualsReference) {
   const Workers workers(2);
-  for (const auto& target : RunnableTargets()) {
-    const OnTarget on(target);
+  for (const std::string target : EveryTarget()) {
     Rng rng(5);
     for (const UnaryCase& c : kUnary) {
       for (std::size_t n : {0, 1, 3, 4, 7, 8, 9, 33, 40000}) CheckUnary(c, n, rng, workers);
@@ -55,8 +54,7 @@ float Apply(UnaryOp op, float x) {
 
 TEST(Pointwise, LimitsAndNaN) {
   const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
-  for (const auto& target : RunnableTargets()) {
-    const OnTarget on(target);
+  for (const std::string target : EveryTarget()) {
     for (const UnaryCase& c : kUnary) {
       EXPECT_TRUE(std::isnan(Apply(c.op, nan))) << static_cast<int>(c.op);
     }
@@ -101,8 +99,7 @@ TEST(Pointwise, BinaryEqualsReference) {
                                    a.data(), b.data(),    want.data(),   0.2};
       BinaryRangeRef(problem, {0, n / box.extents[4], 0, box.extents[4]});
       problem.y = got.data();
-      for (const auto& target : RunnableTargets()) {
-        const OnTarget on(target);
+      for (const std::string target : EveryTarget()) {
         Binary(problem, workers);
         ASSERT_EQ(got, want) << static_cast<int>(op);
       }

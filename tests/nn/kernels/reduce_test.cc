@@ -25,8 +25,7 @@ TEST(Reduce, SumIsWithinRoundingOfTheReference) {
     std::vector<double> want(l.outputs()), magnitude(l.outputs());
     ReduceSumRef(l, AsDoubles(x).data(), want.data(), 0, l.outputs());
     ReduceSumRef(l, Magnitudes(x).data(), magnitude.data(), 0, l.outputs());
-    for (const auto& target : RunnableTargets()) {
-      const OnTarget on(target);
+    for (const std::string target : EveryTarget()) {
       std::vector<float> got(l.outputs(), -77.0f);
       ReduceSum(l, x.data(), got.data(), workers);
       ExpectWithinRounding(got, want, magnitude, l.inputs_each());
@@ -96,8 +95,7 @@ TEST(BatchNormKernel, EqualsReferenceWithinRounding) {
                                  double scale) {
       ExpectWithinRounding(got, exact, std::vector<double>(got.size(), scale), n);
     };
-    for (const auto& target : RunnableTargets()) {
-      const OnTarget on(target);
+    for (const std::string target : EveryTarget()) {
       const NormRun<float> got(c, x, dy);
       expect_near(got.mean, want.mean, 1);
       expect_near(got.variance, want.variance, 2);
@@ -129,8 +127,7 @@ TEST(Reduce, SumOfSquaresIsExactToDouble) {
   for (std::size_t n : {0, 1, 5, 13, 200003}) {
     const auto x = RandomFloats(rng, n);
     const double want = SumOfSquaresRef(x.data(), n);
-    for (const auto& target : RunnableTargets()) {
-      const OnTarget on(target);
+    for (const std::string target : EveryTarget()) {
       const double got = SumOfSquares(x.data(), n, Workers(2));
       EXPECT_NEAR(got, want, static_cast<double>(n) * 0x1.0p-53 * want);
       EXPECT_EQ(got, SumOfSquares(x.data(), n, Workers(7)));

@@ -12,7 +12,7 @@
 // turned by 180 degrees; with a stride of 2 it goes the way of the transposed transforms.
 //
 // The transforms hold 0, 1, -1 and 1/2 only, so that little accuracy is lost: the error is 0.6
-// to 2.4 times that of the direct kernels (tests/nn/kernels/conv2d_winograd_test.cc).
+// to 2.4 times that of the direct kernels (tests/nn/kernels/conv2d_test.cc).
 #pragma once
 
 #include <cstddef>
