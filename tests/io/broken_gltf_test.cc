@@ -39,13 +39,6 @@ class BrokenGltfTest : public TempFolderTest {
   Status LoadGlb(const Bytes& bytes) { return LoadMesh(Write("bad.glb", bytes)).status(); }
 };
 
-TEST_F(BrokenGltfTest, TheWholeOneLoads) {
-  const auto loaded = LoadMesh(Write("good.gltf", Triangle().dump()));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}}));
-  EXPECT_EQ(loaded->mesh.positions[1], glm::vec3(1, 0, 0));
-}
-
 TEST_F(BrokenGltfTest, AccessorBeyondItsView) {
   Json json = Triangle();
   json["accessors"][0]["count"] = 4;
@@ -95,10 +88,8 @@ TEST_F(BrokenGltfTest, ReferencesToNowhere) {
 // What only colours need is a warning.
 TEST_F(BrokenGltfTest, MaterialsAndTexturesThatAreNotThere) {
   const auto expect_one = [&](const Json& json, const std::string& part) {
-    const auto loaded = LoadMesh(Write("a.gltf", json.dump()));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-    ASSERT_EQ(loaded->warnings.size(), 1u);
-    EXPECT_NE(loaded->warnings[0].find(part), std::string::npos) << loaded->warnings[0];
+    const auto loaded = Ok(LoadMesh(Write("a.gltf", json.dump())));
+    ExpectOnly(loaded->warnings, part);
   };
   Json json = Triangle();
   json["meshes"][0]["primitives"][0]["material"] = 5;
@@ -188,14 +179,6 @@ TEST_F(BrokenGltfTest, JsonThatIsBrokenOrTooDeep) {
   EXPECT_TRUE(Load(json).ok()) << Load(json).message();
 }
 
-TEST_F(BrokenGltfTest, CompressedGeometrySaysWhatToDo) {
-  Json json = Triangle();
-  json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-  ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
-  json["accessors"][0].erase("bufferView");
-  ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
-}
-
 // tinygltf quotes the whole of a buffer that it cannot decode.
 TEST_F(BrokenGltfTest, MessagesAreShort) {
   Json json = Triangle();
@@ -231,11 +214,9 @@ TEST_F(BrokenGltfTest, ImagesBeyondTheirBufferAreWarnings) {
   json["images"] = {{{"bufferView", 2}, {"mimeType", "image/png"}, {"name", "photo"}}};
   for (const long length : {1000000000L, 3000000000L, 40L}) {
     json["bufferViews"][2] = {{"buffer", 0}, {"byteOffset", 40}, {"byteLength", length}};
-    const auto loaded = LoadMesh(Write("image.gltf", json.dump()));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-    ASSERT_EQ(loaded->warnings.size(), 1u);
-    EXPECT_NE(loaded->warnings[0].find("photo"), std::string::npos) << loaded->warnings[0];
-    EXPECT_NE(loaded->warnings[0].find("beyond its buffer"), std::string::npos);
+    const auto loaded = Ok(LoadMesh(Write("image.gltf", json.dump())));
+    ExpectOnly(loaded->warnings, "photo");
+    ExpectIn(loaded->warnings[0], "beyond its buffer");
   }
 }
 
@@ -265,19 +246,6 @@ TEST_F(BrokenGltfTest, ImagesThatBeginBehindTheirBuffer) {
   }
 }
 
-TEST_F(BrokenGltfTest, ImageBesideTheFileWithAPercentEncodedName) {
-  ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 99)).ok());
-  Json json = Triangle();
-  json["meshes"][0]["primitives"][0]["material"] = 0;
-  json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
-  json["textures"] = {{{"source", 0}}};
-  json["images"] = {{{"uri", "my%20wood.png"}}};
-  const auto loaded = LoadMesh(Write("side.gltf", json.dump()));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  ASSERT_EQ(loaded->mesh.textures.size(), 1u) << loaded->warnings.at(0);
-  EXPECT_EQ(loaded->mesh.textures[0].image.pixels[0], 99);
-}
-
 Mesh TexturedBox() {
   Mesh mesh = Box({0, 0, 0}, {1, 2, 3});
   SetColor(mesh, {0.25f, 0.5f, 0.75f, 1});
@@ -287,14 +255,12 @@ Mesh TexturedBox() {
   return mesh;
 }
 
-TEST_F(BrokenGltfTest, GlbCutAtEveryLength) {
+TEST_F(BrokenGltfTest, GlbCutOrWithLyingLengths) {
   const Bytes whole = EncodeGlb(TexturedBox()).value();
-  for (std::size_t length = 0; length < whole.size(); length += length < 64 ? 1 : 61)
-    ExpectMessage(LoadGlb(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(length))), "bad.glb");
-}
-
-TEST_F(BrokenGltfTest, GlbWithLyingLengths) {
-  const Bytes whole = EncodeGlb(TexturedBox()).value();
+  ExpectCutsRefused(std::span(whole).first(64), "bad.glb",
+                    [&](const Bytes& cut) { return LoadGlb(cut); });
+  ExpectCutsRefused(
+      whole, "bad.glb", [&](const Bytes& cut) { return LoadGlb(cut); }, 61);
   std::uint32_t json_length = 0;
   std::memcpy(&json_length, &whole[12], 4);
   // Length of the file, of the JSON chunk, of the binary chunk.

@@ -29,12 +29,9 @@ class CountedColors : public TempFolderTest {
   // With one warning that has `said`; "" for none.
   Mesh Load(const Path& path, const std::string& said) {
     SCOPED_TRACE(path);
-    auto loaded = LoadMesh(path);
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    if (!loaded.ok()) return {};
+    auto loaded = Ok(LoadMesh(path));
     EXPECT_EQ(loaded->warnings.size(), said.empty() ? 0u : 1u);
-    for (const std::string& warning : loaded->warnings)
-      EXPECT_NE(warning.find(said), std::string::npos) << warning;
+    for (const std::string& warning : loaded->warnings) ExpectIn(warning, said);
     return std::move(loaded->mesh);
   }
 
@@ -165,11 +162,10 @@ TEST_F(CountedColors, OfSomeVerticesAndOfSixteenBits) {
 
 TEST_F(CountedColors, OfMaterials) {
   Write("m.mtl", "newmtl a\nKd 255 128 0\nnewmtl b\nKd 51 51 51\nnewmtl c\nKd 1 0 0.5\n");
-  const auto loaded = LoadMesh(
+  const auto loaded = Ok(LoadMesh(
       Write("a.obj",
             "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl "
-            "c\nf 1 2 3\n"));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+            "c\nf 1 2 3\n")));
   ExpectNear(loaded->mesh.materials.at(0).base_color, kOrange);
   ExpectNear(loaded->mesh.materials.at(1).base_color, {0.2f, 0.2f, 0.2f, 1});
   ExpectNear(loaded->mesh.materials.at(2).base_color, {1, 0, 0.5f, 1});

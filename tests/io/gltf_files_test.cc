@@ -73,9 +73,7 @@ class GltfFiles : public TempFolderTest {
 
   Path File() { return Write("a.gltf", json_.dump()); }
   LoadedMesh Load(std::size_t warnings = 0) {
-    auto loaded = LoadMesh(File());
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    if (!loaded.ok()) return {};
+    auto loaded = Ok(LoadMesh(File()));
     EXPECT_EQ(loaded->warnings.size(), warnings)
         << (loaded->warnings.empty() ? "none" : loaded->warnings[0]);
     return std::move(*loaded);

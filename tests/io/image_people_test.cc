@@ -158,8 +158,7 @@ TEST(Jpeg, TurnedByItsExifSegment) {
   ASSERT_EQ(Tiff(false, 6).size(), 38u);
   for (const std::string& extra : {exif, xmp + exif}) {
     const Bytes jpeg = FlatJpeg({200}).Make(extra, 16);
-    const auto image = DecodeImage(jpeg, "a.jpg");
-    ASSERT_TRUE(image.ok()) << image.status().message();
+    const auto image = Ok(DecodeImage(jpeg, "a.jpg"));
     EXPECT_EQ(image->width, 8);
     EXPECT_EQ(image->height, 16);
     EXPECT_EQ(DecodeImage(jpeg, "a.jpg", PixelOrder::kStored).value().width, 16);
@@ -258,9 +257,8 @@ TEST(Png, ProfilesAndGammaDoNotChangeNumbers) {
   using namespace std::string_literals;
   const std::string rows = "\0\x40\x80\0\xc0\xff"s;
   const auto plain = DecodeImage(SmallPng(8, 0, rows), "a.png");
-  const auto tagged = DecodeImage(
-      SmallPng(8, 0, rows, PngChunk("gAMA", Big(100000, 4)) + PngChunk("sRGB", "\0"s)), "a.png");
-  ASSERT_TRUE(tagged.ok()) << tagged.status().message();
+  const auto tagged = Ok(DecodeImage(
+      SmallPng(8, 0, rows, PngChunk("gAMA", Big(100000, 4)) + PngChunk("sRGB", "\0"s)), "a.png"));
   EXPECT_EQ(tagged->pixels, plain.value().pixels);
   EXPECT_EQ(tagged->pixels, (std::vector<std::uint8_t>{64, 128, 192, 255}));
 }

@@ -95,8 +95,7 @@ Bytes OneAndAHalf() {
 }
 
 void ExpectBird(const Bytes& file) {
-  const auto mat = ReadMat(file, "birds.mat");
-  ASSERT_TRUE(mat.ok()) << mat.status().message();
+  const auto mat = Ok(ReadMat(file, "birds.mat"));
   const auto images = MatPlace::Variable(*mat, "images");
   ASSERT_TRUE(images.ok());
   EXPECT_EQ(images->Field(0, "rel_path")->Text().value(), "a/b.jpg");
@@ -117,8 +116,7 @@ TEST(Mat, ReadsEveryKindOfNumber) {
              Matrix(6, {1, 1}, "", Element(9, OneAndAHalf())) +
                  Matrix(6, {1, 2}, "", Small(3, {0xFF, 0xFF, 2, 0})) +
                  Matrix(12, {1, 1}, "", Small(5, Words({0xFFFFFFFE}))) + Element(14, {}));
-  const auto mat = ReadMat(Header() + cells, "all.mat");
-  ASSERT_TRUE(mat.ok()) << mat.status().message();
+  const auto mat = Ok(ReadMat(Header() + cells, "all.mat"));
   const MatArray& all = mat->variables[0].second;
   ASSERT_EQ(all.elements.size(), 4u);
   EXPECT_EQ(all.elements[0].numbers[0], 1.5);
@@ -142,8 +140,7 @@ MatVariables Birds() {
 
 TEST(Mat, WritesWhatItReads) {
   for (const MatPacking packing : {MatPacking::kPlain, MatPacking::kCompressed}) {
-    const auto mat = ReadMat(EncodeMat(Birds(), packing), "b.mat");
-    ASSERT_TRUE(mat.ok()) << mat.status().message();
+    const auto mat = Ok(ReadMat(EncodeMat(Birds(), packing), "b.mat"));
     const auto images = MatPlace::Variable(*mat, "images");
     EXPECT_EQ(images->places(), 3u);
     EXPECT_EQ(images->Field(2, "rel_path")->Text().value(), "bird2.jpg");
@@ -163,8 +160,7 @@ TEST(Mat, WritesTheBytesOfTheLayout) {
 }
 
 TEST(Mat, ErrorsNameFileAndPlace) {
-  const auto mat = ReadMat(EncodeMat(Birds()), "b.mat");
-  ASSERT_TRUE(mat.ok());
+  const auto mat = Ok(ReadMat(EncodeMat(Birds()), "b.mat"));
   ExpectMessage(MatPlace::Variable(*mat, "sfm_anno").status(), "b.mat", "\"sfm_anno\"",
                 "images, S");
   const auto images = MatPlace::Variable(*mat, "images");

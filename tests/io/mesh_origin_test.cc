@@ -19,11 +19,7 @@ const glm::dvec3 kPlace(431000, 4600000, 300);
 
 class MeshOriginTest : public TempFolderTest {
  protected:
-  LoadedMesh Load(const Path& path) {
-    auto loaded = LoadMesh(path);
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    return loaded.ok() ? std::move(*loaded) : LoadedMesh{};
-  }
+  LoadedMesh Load(const Path& path) { return Ok(LoadMesh(path)).value(); }
 };
 
 // The unit sphere, its vertices with `digits` digits, around `place`.
@@ -64,8 +60,7 @@ void ExpectRound(const LoadedMesh& loaded, double tolerance) {
   for (const glm::vec3& p : loaded.mesh.positions)
     EXPECT_NEAR(glm::length(glm::dvec3(p)), 1, tolerance);
   ASSERT_FALSE(loaded.warnings.empty());
-  EXPECT_NE(loaded.warnings[0].find("(431000, 4600000, 300) was subtracted"), std::string::npos)
-      << loaded.warnings[0];
+  ExpectIn(loaded.warnings[0], "(431000, 4600000, 300) was subtracted");
 }
 
 TEST_F(MeshOriginTest, TextWithDigitsIsRound) {
@@ -89,15 +84,12 @@ TEST_F(MeshOriginTest, CoordinatesWithoutDigitsAreAWarning) {
   for (const Path& path : {Write("a.ply", Ply("float", rows)), Write("a.off", Off(rows))}) {
     const auto loaded = Load(path);
     ASSERT_EQ(loaded.warnings.size(), 2u);
-    EXPECT_NE(loaded.warnings[1].find("x, y come in steps of 0.5, and the mesh is 2 across"),
-              std::string::npos)
-        << loaded.warnings[1];
+    ExpectIn(loaded.warnings[1], "x, y come in steps of 0.5, and the mesh is 2 across");
   }
   // Seven digits leave 1 of the y.
   const auto short_text = Load(Write("b.obj", Obj(Rows("v {:.7g} {:.7g} {:.7g}\n", kPlace))));
   ASSERT_EQ(short_text.warnings.size(), 2u);
-  EXPECT_NE(short_text.warnings[1].find("y come in steps of 1,"), std::string::npos)
-      << short_text.warnings[1];
+  ExpectIn(short_text.warnings[1], "y come in steps of 1,");
 }
 
 // Nothing is subtracted from what float can hold, and not a bit changes.

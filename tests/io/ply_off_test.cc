@@ -59,12 +59,14 @@ TEST_F(PlyOffTest, PlyOfEveryEncodingIsTheSame) {
   for (const std::string& text :
        {Header("ascii") + kTextBody, Header("binary_little_endian") + BinaryBody(false),
         Header("binary_big_endian") + BinaryBody(true)}) {
-    const auto loaded = LoadMesh(Write("a.ply", text));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
     EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_EQ(loaded->mesh.positions[2], glm::vec3(1, 1, 0.5f));
     EXPECT_EQ(loaded->mesh.colors[1], glm::vec4(0, 1, 0, 1));
     EXPECT_EQ(loaded->mesh.colors[3], glm::vec4(0.2f, 0.2f, 0.2f, 1));
+    ExpectCutsRefused(Bytes(text.begin(), text.end() - 2), "bad.ply", [&](const Bytes& cut) {
+      return LoadPly({cut.begin(), cut.end()});
+    });
   }
 }
 
@@ -82,19 +84,10 @@ TEST_F(PlyOffTest, PlyWithATexture) {
                                 "property list uchar float texcoord\nend_header\n"
                                 "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0.25 1\n";
   for (const std::string& text : {by_vertex, by_corner}) {
-    const auto loaded = LoadMesh(Write("a.ply", text));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
     EXPECT_EQ(loaded->mesh.corner_uvs, (std::vector<glm::vec2>{{0, 0}, {1, 0}, {0.25f, 1}}));
     ASSERT_EQ(loaded->mesh.textures.size(), 1u);
     EXPECT_EQ(loaded->mesh.materials.at(0).base_color_texture, 0);
-  }
-}
-
-TEST_F(PlyOffTest, PlyCutAtEveryLength) {
-  for (const std::string& whole :
-       {Header("ascii") + kTextBody, Header("binary_little_endian") + BinaryBody(false)}) {
-    for (std::size_t length = 0; length + 2 < whole.size(); ++length)
-      ExpectMessage(LoadPly(whole.substr(0, length)), "bad.ply");
   }
 }
 
@@ -135,13 +128,11 @@ TEST_F(PlyOffTest, OffAndItsVariants) {
   const std::string body = "0 0 0\n1 0 0 # a comment\n\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n";
   for (const std::string head :
        {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\r\n", "# x\nOFF\n\n4 1 4\n"}) {
-    const auto loaded = LoadMesh(Write("a.off", head + body));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.off", head + body)));
     EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
   }
-  const auto colors = LoadMesh(Write(
-      "c.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0.5 0.25 1.0\n0 1 0 0 0 51\n3 0 1 2\n"));
-  ASSERT_TRUE(colors.ok()) << colors.status().message();
+  const auto colors = Ok(LoadMesh(Write(
+      "c.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0.5 0.25 1.0\n0 1 0 0 0 51\n3 0 1 2\n")));
   EXPECT_EQ(colors->mesh.colors,
             (std::vector<glm::vec4>{{1, 0, 0, 1}, {0.5f, 0.25f, 1, 1}, {0, 0, 0.2f, 1}}));
 }
@@ -186,8 +177,7 @@ TEST_F(PlyOffTest, PlyColorsOfFaces) {
                   std::string("4 1 2 3 4 255 0 0 255\n3 1 3 4 0 0 255 51\n")),
         std::pair("element face 2\n" + before + list,
                   std::string("255 0 0 4 1 2 3 4\n0 0 255 3 1 3 4\n"))}) {
-    const auto loaded = LoadMesh(Write("a.ply", Square("", header, body)));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.ply", Square("", header, body))));
     EXPECT_EQ(loaded->mesh.positions.size(), 5u);  // none doubled, the unused one stays
     EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{1, 2, 3}, {1, 3, 4}, {1, 3, 4}}));
     const auto colors = FaceColors(loaded->mesh);
@@ -199,13 +189,12 @@ TEST_F(PlyOffTest, PlyColorsOfFaces) {
   both.replace(both.find("end_header"), 0,
                "property uchar red\nproperty uchar green\nproperty uchar blue\n");
   both.replace(both.rfind("\n"), 0, " 1 2 3");
-  const auto loaded = LoadMesh(Write("b.ply", both));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const auto loaded = Ok(LoadMesh(Write("b.ply", both)));
   EXPECT_TRUE(loaded->mesh.corner_colors.empty());
   EXPECT_EQ(loaded->mesh.colors[1], kGreen);
   ASSERT_EQ(loaded->warnings.size(), 2u);
-  EXPECT_NE(loaded->warnings[0].find("colours of faces left out"), std::string::npos);
-  EXPECT_NE(loaded->warnings[1].find("left out: \"neighbours\""), std::string::npos);
+  ExpectIn(loaded->warnings[0], "colours of faces left out");
+  ExpectIn(loaded->warnings[1], "left out: \"neighbours\"");
 }
 
 TEST_F(PlyOffTest, PlyWithSeveralTextures) {
@@ -217,28 +206,24 @@ TEST_F(PlyOffTest, PlyWithSeveralTextures) {
       "texcoord\n";
   const std::string uv = " 6 0 0 1 0 1 1 ";
   const auto loaded =
-      LoadMesh(Write("a.ply", Square(textures, faces + "property int texnumber\n",
-                                     "3 1 2 3" + uv + "1\n3 1 3 4" + uv + "0\n3 1 2 4" + uv +
-                                         "1\n3 2 3 4" + uv + "7\n")));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+      Ok(LoadMesh(Write("a.ply", Square(textures, faces + "property int texnumber\n",
+                                        "3 1 2 3" + uv + "1\n3 1 3 4" + uv + "0\n3 1 2 4" + uv +
+                                            "1\n3 2 3 4" + uv + "7\n"))));
   const Mesh& mesh = loaded->mesh;
   ASSERT_EQ(mesh.materials.size(), 3u);
   std::vector<std::string> names;
   for (const std::int32_t m : mesh.face_materials) names.push_back(mesh.materials[m].name);
   EXPECT_EQ(names, (std::vector<std::string>{"b.png", "a.png", "b.png", ""}));
   EXPECT_EQ(mesh.materials[mesh.face_materials[3]].base_color_texture, -1);
-  ASSERT_EQ(loaded->warnings.size(), 1u);
-  EXPECT_NE(loaded->warnings[0].find("texnumber 7"), std::string::npos);
+  ExpectOnly(loaded->warnings, "texnumber 7");
   // Without texnumber the first one is everybody's; without uv there is none.
-  const auto first = LoadMesh(Write(
-      "b.ply", Square(textures, faces, "3 1 2 3" + uv + "\n3 1 3 4 0\n3 1 2 4 0\n3 2 3 4 0\n")));
-  ASSERT_TRUE(first.ok()) << first.status().message();
+  const auto first = Ok(LoadMesh(Write(
+      "b.ply", Square(textures, faces, "3 1 2 3" + uv + "\n3 1 3 4 0\n3 1 2 4 0\n3 2 3 4 0\n"))));
   EXPECT_EQ(first->mesh.materials.size(), 1u);
   EXPECT_EQ(first->warnings.size(), 1u);
-  const auto none = LoadMesh(Write(
+  const auto none = Ok(LoadMesh(Write(
       "c.ply",
-      Square(textures, "element face 1\nproperty list uchar int vertex_indices\n", "3 1 2 3\n")));
-  ASSERT_TRUE(none.ok()) << none.status().message();
+      Square(textures, "element face 1\nproperty list uchar int vertex_indices\n", "3 1 2 3\n"))));
   EXPECT_TRUE(none->mesh.materials.empty());
   EXPECT_EQ(none->warnings.size(), 1u);
 }
@@ -246,8 +231,7 @@ TEST_F(PlyOffTest, PlyWithSeveralTextures) {
 TEST_F(PlyOffTest, PlyStrips) {
   const std::string strips = "element tristrips 1\nproperty list int int vertex_indices\n";
   const auto loaded =
-      LoadMesh(Write("a.ply", Square("", strips, "12 1 2 4 3 -1 1 2 2 3 4 -1 3\n")));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+      Ok(LoadMesh(Write("a.ply", Square("", strips, "12 1 2 4 3 -1 1 2 2 3 4 -1 3\n"))));
   EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{1, 2, 4}, {4, 2, 3}, {2, 3, 4}}));
   EXPECT_EQ(loaded->mesh.positions.size(), 5u);
   ExpectMessage(LoadPly(Square("", strips, "3 1 2 5\n")), "tristrips 0 uses vertex 5");
@@ -262,11 +246,9 @@ TEST_F(PlyOffTest, PlyElementsInAnyOrder) {
       "property int a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
       "z\nend_header\n"
       "4 0 1 2 3\n7\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
-  const auto loaded = LoadMesh(Write("a.ply", text));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
   EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
-  ASSERT_EQ(loaded->warnings.size(), 1u);
-  EXPECT_NE(loaded->warnings[0].find("\"edge\""), std::string::npos);
+  ExpectOnly(loaded->warnings, "\"edge\"");
 }
 
 TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
@@ -275,8 +257,7 @@ TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
       "z\nproperty float quality\nproperty float f_dc_0\nproperty list uchar int ring\nelement "
       "face 1\nproperty list uchar int vertex_index\nproperty int flags\nend_header\n"
       "0 0 0 1 1 0\n1 0 0 1 1 0\n0 1 0 1 1 1 2\n3 0 1 2 0\n";
-  const auto loaded = LoadMesh(Write("a.ply", text));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
   ASSERT_EQ(loaded->warnings.size(), 1u);
   EXPECT_EQ(loaded->warnings[0],
             "properties left out: \"f_dc_0\", \"flags\", \"quality\", \"ring\"");
@@ -325,8 +306,7 @@ TEST_F(PlyOffTest, PlyBinaryNumbersThatNobodyReadsMayBeAnything) {
       at += v == 1 ? 24 : 20;
     }
     body += one.substr(one.size() - 17);
-    const auto loaded = LoadMesh(Write("a.ply", header + body));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.ply", header + body)));
     EXPECT_EQ(loaded->mesh.positions[2], glm::vec3(1, 1, 0.5f));
     EXPECT_EQ(loaded->mesh.colors[1], kGreen);
     ASSERT_EQ(loaded->warnings.size(), 1u);
@@ -344,11 +324,9 @@ TEST_F(PlyOffTest, PlyNumbersThatAreRead) {
            vertex + "\n1 0 0 0 0 2 1 0 0 1 0\n0 1 0 0 1 0 0 0 1 0 1\n3 0 1 2\n";
   };
   for (const std::string none : {"nan", "inf", "1.#QNAN"}) {
-    const auto loaded = LoadMesh(Write("a.ply", text("0 0 0 0 " + none + " 0 0 0 0 0 0")));
-    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    const auto loaded = Ok(LoadMesh(Write("a.ply", text("0 0 0 0 " + none + " 0 0 0 0 0 0"))));
     EXPECT_EQ(loaded->mesh.normals, (std::vector<glm::vec3>{{0, 0, 1}, {0, 0, 1}, {0, 1, 0}}));
-    ASSERT_EQ(loaded->warnings.size(), 1u);
-    EXPECT_NE(loaded->warnings[0].find("normals that are not finite"), std::string::npos);
+    ExpectOnly(loaded->warnings, "normals that are not finite");
     for (const auto& [at, name] : std::vector<std::pair<int, const char*>>{
              {0, "x"}, {1, "y"}, {2, "z"}, {6, "red"}, {8, "blue"}, {9, "s"}, {10, "t"}}) {
       std::string vertex;
@@ -371,22 +349,17 @@ TEST_F(PlyOffTest, PlyTextureCoordinatesThatAreLeftOutAreSaid) {
                   faces + "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n" +
                   "3 0 1 2 6 0 0 1 0 1 1\n" + second));
   };
-  const auto both = load("3 0 2 3 6 0 0 1 1 0 1\n");
-  ASSERT_TRUE(both.ok()) << both.status().message();
-  ASSERT_EQ(both->warnings.size(), 1u);
-  EXPECT_NE(both->warnings[0].find("coordinates of vertices left out"), std::string::npos);
-  const auto odd = load("4 0 1 2 3 6 0 0 1 1 0 1\n");
-  ASSERT_TRUE(odd.ok()) << odd.status().message();
+  const auto both = Ok(load("3 0 2 3 6 0 0 1 1 0 1\n"));
+  ExpectOnly(both->warnings, "coordinates of vertices left out");
+  const auto odd = Ok(load("4 0 1 2 3 6 0 0 1 1 0 1\n"));
   ASSERT_EQ(odd->warnings.size(), 2u);
-  EXPECT_NE(odd->warnings[1].find("not two for each corner"), std::string::npos);
+  ExpectIn(odd->warnings[1], "not two for each corner");
 }
 
 // Of vertices and of faces; not where a material is transparent itself, or all alpha is 1.
 TEST_F(PlyOffTest, AlphaOfColorsThatIsNotDrawnIsSaid) {
   const auto warnings = [&](const std::string& name, const std::string& text) {
-    const auto loaded = LoadMesh(Write(name, text));
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    return loaded.ok() ? loaded->warnings : std::vector<std::string>();
+    return Ok(LoadMesh(Write(name, text)))->warnings;
   };
   const std::string corners = "0 0 0\n1 0 0\n0 1 0\n";
   for (const auto& [name, text] :
@@ -396,8 +369,7 @@ TEST_F(PlyOffTest, AlphaOfColorsThatIsNotDrawnIsSaid) {
         std::pair("a.obj",
                   std::string("v 0 0 0 1 0 0 0.5\nv 1 0 0 1 0 0 1\nv 0 1 0 1 0 0 1\nf 1 2 3\n"))}) {
     const auto said = warnings(name, text);
-    ASSERT_EQ(said.size(), 1u) << name;
-    EXPECT_NE(said[0].find("alpha of colours is not drawn"), std::string::npos) << said[0];
+    ExpectOnly(said, "alpha of colours is not drawn");
   }
   EXPECT_TRUE(warnings("c.off", "OFF\n3 1 0\n" + corners + "3 0 1 2 255 0 0 255\n").empty());
   Write("m.mtl", std::string("newmtl m\nd 0.5\n"));
@@ -407,24 +379,10 @@ TEST_F(PlyOffTest, AlphaOfColorsThatIsNotDrawnIsSaid) {
                   .empty());
 }
 
-TEST_F(PlyOffTest, PlyFractionsThatCountTo255) {
-  std::string text = Header("ascii") + kTextBody;
-  for (auto at = text.find("uchar red"); at != std::string::npos; at = text.find("uchar red"))
-    text.replace(at, 5, "float");
-  text.replace(text.find("uchar green"), 5, "float").replace(text.find("uchar blue"), 5, "double");
-  const auto loaded = LoadMesh(Write("a.ply", text));
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_EQ(loaded->mesh.colors[3], glm::vec4(0.2f, 0.2f, 0.2f, 1));
-  ASSERT_EQ(loaded->warnings.size(), 2u);  // one of "neighbours"
-  EXPECT_NE(loaded->warnings[1].find("0 to 255"), std::string::npos);
-}
-
 TEST_F(PlyOffTest, OffColors) {
   const auto load = [&](const std::string& vertices, const std::string& face,
                         std::size_t warnings) {
-    auto loaded = LoadMesh(Write("a.off", vertices + face));
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    if (!loaded.ok()) return Mesh{};
+    auto loaded = Ok(LoadMesh(Write("a.off", vertices + face)));
     EXPECT_EQ(loaded->warnings.size(), warnings);
     return std::move(loaded->mesh);
   };
