@@ -12,6 +12,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
+#include "train/gradient_check.h"
 #include "train/tasks/single_image/step.h"
 #include "train/terms.h"
 
@@ -131,13 +132,12 @@ struct SmallProblem {
   std::vector<Sample> samples = {{0, {0, 1}}, {1, {2, 0}, true}, {0, {2, 1}}};
 
   SmallProblem() {
-    config.network = {.channels = 2,
-                      .code = 6,
-                      .hidden1 = 5,
-                      .hidden2 = 7,
-                      .sphere = {.level = 1, .radius = 0.175, .smoothing = 2, .symmetric = false},
-                      .fc_deviation = 0,
-                      .color_bias = 0.4};
+    config.network = TinyNetwork();
+    config.network.sphere.level = 1;
+    config.network.sphere.smoothing = 2;
+    config.network.fc_deviation = 0;
+    config.network.color_bias = 0.4;
+    config.network.output_deviation = NetworkConfig().output_deviation;
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
     config.batch = 3;
     store.models = 2;
@@ -174,43 +174,27 @@ Result<StepValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int6
   return values;
 }
 
-// Central differences in float64 on weights of every layer. The chain is piecewise smooth (ReLU,
-// visibility, L1, the box): h = 1e-6 keeps crossings of a kink improbable, truncation is O(h^2) =
-// 1e-12 and rounding 1e-16 / h = 1e-10 relative to a loss near 1; gradients of single weights are
-// 1e-4 and more, so 1e-5 relative (plus 1e-8 absolute) is what can be asked. One entry in fifty may
-// sit on a kink.
+// On weights of every layer; gradients of single weights are 1e-4 and more. The chain is piecewise
+// smooth (ReLU, visibility, L1, the box): one entry in fifty may sit on a kink.
 void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
   TrainStep step(context, p.config, p.store.size);
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
   StepValues values;
-  std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
-  const auto gradients = nn::Grad(step.Loss(batch, 0, &values), step.weights().adam().parameters());
+  const auto parameters = step.weights().adam().parameters();
+  const auto gradients = nn::Grad(step.Loss(batch, 0, &values), parameters);
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   EXPECT_LT(TermOf(values, "iou"), 0.95);  // the scene is not empty: silhouettes overlap
+  const auto loss = [&] {
+    StepValues moved;
+    step.Loss(batch, 0, &moved);
+    return moved.loss;
+  };
   Rng rng(9);
-  int checked = 0, off = 0;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    nn::Tensor& weight = parameters[i].value.value();
-    for (int k = 0; k < 3; ++k, ++checked) {
-      const std::size_t at = rng.Below(weight.elements());
-      const double h = 1e-6, before = weight.data<double>()[at];
-      StepValues up, down;
-      weight.data<double>()[at] = before + h;
-      step.Loss(batch, 0, &up);
-      weight.data<double>()[at] = before - h;
-      step.Loss(batch, 0, &down);
-      weight.data<double>()[at] = before;
-      const double want = (up.loss - down.loss) / (2 * h),
-                   got = gradients[i].value().data<double>()[at];
-      if (std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8) continue;
-      ++off;
-      EXPECT_NEAR(got, want, 0.05 * std::abs(want) + 1e-3)
-          << parameters[i].name << "[" << at << "]";
-    }
-  }
-  EXPECT_LE(off, checked / 50) << "of " << checked;
+  const Differences d =
+      CompareWithDifferences({parameters.begin(), parameters.end()}, loss, gradients, 3, 1e-8, rng);
+  EXPECT_LE(d.off, d.checked / 50) << "of " << d.checked;
 }
 
 TEST(Chain, Float64GradientsAgreeWithDifferences) {

@@ -21,6 +21,40 @@ inline std::vector<double> Uniform(std::size_t n, double low, double high, std::
   return out;
 }
 
+// Some entries of each parameter, drawn by `rng`, against central differences in float64 of a loss
+// with kinks. With h = 1e-6 crossings of a kink are improbable, truncation is O(h^2) = 1e-12 and
+// rounding 1e-16 / h = 1e-10 of the loss: 1e-5 relative and `floor` are what can be asked.
+struct Differences {
+  int checked = 0, off = 0;
+  int moving = 0;  // entries with a gradient
+};
+inline Differences CompareWithDifferences(const std::vector<nn::Var>& parameters,
+                                          const std::function<double()>& loss,
+                                          std::span<const nn::Var> gradients, int entries,
+                                          double floor, Rng& rng) {
+  Differences out;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    nn::Var parameter = parameters[p];  // shares its memory
+    for (int k = 0; k < entries; ++k, ++out.checked) {
+      const std::size_t at = rng.Below(parameter.value().elements());
+      double& number = parameter.value().data<double>()[at];
+      const double h = 1e-6, before = number;
+      const auto loss_at = [&](double x) {
+        number = x;
+        return loss();
+      };
+      const double up = loss_at(before + h), want = (up - loss_at(before - h)) / (2 * h);
+      number = before;
+      const double got = gradients[p].value().data<double>()[at];
+      out.moving += got != 0;
+      if (std::abs(got - want) <= 1e-5 * std::abs(want) + floor) continue;
+      ++out.off;
+      EXPECT_NEAR(got, want, 0.05 * std::abs(want) + 1e3 * floor) << p << "[" << at << "]";
+    }
+  }
+  return out;
+}
+
 class GradientCheck : public testing::Test {
  protected:
   using Function = std::function<nn::Var(const nn::Var&)>;
@@ -29,6 +63,10 @@ class GradientCheck : public testing::Test {
 
   nn::Var Const(const nn::Shape& shape, const std::vector<double>& x) {
     return nn::Constant(context_, context_.From(shape, std::span<const double>(x)));
+  }
+  nn::Tensor Random(const nn::Shape& shape, double low, double high, std::uint64_t seed) {
+    const auto n = static_cast<std::size_t>(shape.elements());
+    return context_.From(shape, std::span<const double>(Uniform(n, low, high, seed)));
   }
   double Value(const Function& f, const nn::Shape& shape, const std::vector<double>& x) {
     return f(Const(shape, x)).item();

@@ -2,20 +2,18 @@
 // The real program, which renders half of its pictures itself, is killed with SIGKILL at random
 // moments and resumed: the weights, moments and
 // curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <thread>
 
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "same_run.h"
+#include "support/process.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
 #include "train/run/checkpoint.h"
@@ -28,10 +26,9 @@ using Clock = std::chrono::steady_clock;
 class KillResume : public TempFolderTest {
  protected:
   KillResume() : workers_(1), context_(workers_) {
-    Write("tiny.toml", std::string(kTinyConfig) + "[stream]\nshare = 0.5\n");
+    Write("tiny.toml", kTinyConfig + "[stream]\nshare = 0.5\n");
     std::filesystem::create_directories(folder_ / "data");
-    const Status written = WriteNoiseDataset(folder_ / "data", Meshes::kBoxes);
-    EXPECT_TRUE(written.ok()) << written.message();
+    Ok(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes));
   }
 
   // Starts `tilegrad train` with the run folder `run`; what it prints is appended to <run>.txt.
@@ -47,17 +44,7 @@ class KillResume : public TempFolderTest {
                                       "--max-minutes",  minutes_,
                                       "--resume"};
     words.insert(words.end(), settings_.begin(), settings_.end());
-    std::vector<char*> arguments;
-    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    const std::string log = (folder_ / (run + ".txt")).string();
-    const pid_t child = ::fork();
-    if (child != 0) return child;
-    const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
-    if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(126);
-    prepare();
-    ::execv(arguments[0], arguments.data());
-    ::_exit(127);
+    return StartProcess(words, folder_ / (run + ".txt"), prepare);
   }
 
   void AwaitFirstStep(const std::string& run) const {
@@ -70,12 +57,6 @@ class KillResume : public TempFolderTest {
     }
   }
 
-  static int Wait(pid_t child) {
-    int status = 0;
-    EXPECT_EQ(::waitpid(child, &status, 0), child);
-    return status;
-  }
-
   std::string Output(const std::string& run) const {
     return ReadText(folder_ / (run + ".txt")).value();
   }
@@ -83,8 +64,7 @@ class KillResume : public TempFolderTest {
   // Runs to the end; the seconds it took.
   double Finish(const std::string& run, int workers) {
     const auto start = Clock::now();
-    const int status = Wait(Start(run, workers));
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << Output(run);
+    EXPECT_EQ(EndProcess(Start(run, workers)), 0) << Output(run);
     return Seconds(Clock::now() - start).count();
   }
 
@@ -96,7 +76,7 @@ class KillResume : public TempFolderTest {
       const pid_t child = Start(run, 1 + k % 2);
       std::this_thread::sleep_for(Seconds(rng.Uniform(0, seconds / kills)));
       ::kill(child, SIGKILL);
-      killed += WIFSIGNALED(Wait(child)) ? 1 : 0;
+      killed += EndProcess(child) == -SIGKILL;
     }
     return killed;
   }
@@ -164,14 +144,10 @@ TEST_F(KillResume, TerminationSavesAndSaysHowToGoOn) {
     const pid_t child = Start(run, 1);
     AwaitFirstStep(run);
     ::kill(child, signal);
-    const int status = Wait(child);
-    ASSERT_TRUE(WIFEXITED(status)) << Output(run);
-    EXPECT_EQ(WEXITSTATUS(status), 128 + signal) << Output(run);
-    EXPECT_NE(Output(run).find("--resume"), std::string::npos) << Output(run);
-    const auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    ASSERT_TRUE(found.ok()) << found.status().message();
-    const auto curve = ReadLog(folder_ / run);
-    ASSERT_TRUE(curve.ok());
+    ASSERT_EQ(EndProcess(child), 128 + signal) << Output(run);
+    ExpectIn(Output(run), "--resume");
+    const auto found = Ok(LoadNewestCheckpoint(context_, folder_ / run));
+    const auto curve = Ok(ReadLog(folder_ / run));
     ASSERT_FALSE(curve->empty());
     EXPECT_EQ(found->checkpoint.info.step, curve->back().step);  // nothing that was done is lost
   }
@@ -188,8 +164,7 @@ TEST_F(KillResume, SignalsThatWereIgnoredStayIgnored) {
   AwaitFirstStep("run");
   ::kill(child, SIGINT);
   ::kill(child, SIGHUP);
-  const int status = Wait(child);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << Output("run");
+  EXPECT_EQ(EndProcess(child), 0) << Output("run");
 }
 
 // The progress line, after two seconds, is the first that is written there.
@@ -200,19 +175,17 @@ TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
     int ends[2] = {-1, -1};
     if (::pipe(ends) != 0 || ::dup2(ends[1], 2) < 0 || ::close(ends[0]) != 0) ::_exit(126);
   });
-  const int status = Wait(child);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << Output("run");
+  EXPECT_EQ(EndProcess(child), 0) << Output("run");
 }
 
 TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
-  Write("tiny.toml", std::string(kTinyConfig));  // without the picture of what is streamed
+  Write("tiny.toml", kTinyConfig);  // without the picture of what is streamed
   const pid_t child = Start("run", 1, [] {
     const rlimit limit = {65536, 65536};  // more than the thumbnails, less than a checkpoint
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   });
-  const int status = Wait(child);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << Output("run");
-  EXPECT_NE(Output("run").find("File too large"), std::string::npos) << Output("run");
+  EXPECT_EQ(EndProcess(child), 1) << Output("run");
+  ExpectIn(Output("run"), "File too large");
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / "run" / "checkpoints"));  // no temporary left
 }
 

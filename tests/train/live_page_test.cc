@@ -66,8 +66,7 @@ class LivePageTest : public TempFolderTest {
   }
   LivePage Started() const {
     LivePage page({run_, {}, 100, {{"color", "Colour"}}});
-    const Status status = page.Start();
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(page.Start());
     return page;
   }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "gradient_check.h"
 #include "nn/nn.h"
@@ -21,7 +20,7 @@ using Losses = GradientCheck;
 
 TEST_F(Losses, IouGradient) {
   const nn::Shape shape = {3, 5, 4};
-  const auto truth = context_.From(shape, std::span<const double>(Uniform(60, 0, 1, 1)));
+  const auto truth = Random(shape, 0, 1, 1);
   ExpectGradient([&](const nn::Var& a) { return IouLoss(a, truth); }, shape, Uniform(60, 0, 1, 2));
 }
 
@@ -38,7 +37,7 @@ TEST_F(Losses, IouKnownValues) {
 
 TEST_F(Losses, ColorGradientAwayFromKinks) {
   const nn::Shape shape = {2, 3, 3, 2};
-  const auto truth = context_.From(shape, std::span<const double>(Uniform(36, 0, 0.4, 3)));
+  const auto truth = Random(shape, 0, 0.4, 3);
   ExpectGradient([&](const nn::Var& a) { return ColorL1Loss(a, truth); }, shape,
                  Uniform(36, 0.5, 1, 4));
 }
@@ -53,7 +52,7 @@ TEST_F(Losses, ColorIsThreeTimesThePlainMean) {
 
 TEST_F(Losses, HuberGradientOnBothSidesOfItsBend) {
   const nn::Shape shape = {2, 3, 3, 2};
-  const auto truth = context_.From(shape, std::span<const double>(Uniform(36, 0, 0.4, 3)));
+  const auto truth = Random(shape, 0, 0.4, 3);
   ExpectGradient([&](const nn::Var& a) { return ColorHuberLoss(a, truth, 0.3); }, shape,
                  Uniform(36, 0, 1, 4));
 }
@@ -137,21 +136,12 @@ TEST_F(Losses, ShapesThatDoNotFitAreErrors) {
 class LossVectors : public Losses {
  protected:
   void SetUp() override {
-    const auto path = SharedFile("vectors/09_mesh_and_mask_losses.json");
-    if (!path) GTEST_SKIP() << "vectors/09_mesh_and_mask_losses.json is not here";
-    json_ = nlohmann::json::parse(ReadText(*path).value());
+    TILEGRAD_VECTORS_OR_SKIP(json, "09_mesh_and_mask_losses.json");
+    json_ = json;
     faces_ = json_["faces"].get<std::vector<Face>>();
   }
   std::vector<double> Numbers(const std::string& key) const {
-    std::vector<double> out;
-    Collect(json_[key], out);
-    return out;
-  }
-  static void Collect(const nlohmann::json& node, std::vector<double>& out) {
-    if (node.is_number()) out.push_back(node.get<double>());
-    for (const auto& child : node) {
-      if (!node.is_number()) Collect(child, out);
-    }
+    return tilegrad::Numbers(json_[key]);
   }
   void ExpectMatches(const Function& loss, const nn::Shape& shape, const std::string& input,
                      const std::string& value, const std::string& gradient) {
@@ -164,7 +154,7 @@ class LossVectors : public Losses {
     for (std::size_t i = 0; i < want.size(); ++i)
       EXPECT_NEAR(d_x.value().data<double>()[i], want[i], 1e-9);
   }
-  nlohmann::json json_;
+  Json json_;
   std::vector<Face> faces_;
 };
 

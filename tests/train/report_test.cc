@@ -133,8 +133,7 @@ TEST_F(ReportTest, TextOfFilesStaysText) {
 
 TEST_F(ReportTest, DrawsTheModelsInOnePicture) {
   job_.sheet = folder_ / "sheet.png";
-  const auto summary = Make();
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto summary = Ok(Make());
   EXPECT_EQ(summary->sheet_columns,
             "input, prediction, prediction from another side, truth from there");
   const ImageU8 sheet = io::LoadImage(job_.sheet).value();
@@ -279,7 +278,7 @@ TEST_F(ReportTest, WildFilesOfARun) {
 TEST_F(ReportTest, CurvesOfNumbersNextToZero) {
   Write("run/metrics.jsonl",
         std::string("{\"step\":1,\"loss\":1e-320,\"iou\":-1.7976931348623157e308}\n"));
-  EXPECT_NE(Page().find("e-32"), std::string::npos);
+  ExpectIn(Page(), "e-32");
 }
 
 TEST_F(ReportTest, StopWritesNothing) {

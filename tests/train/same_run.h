@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nn/nn.h"
+#include "support/expect.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
 
@@ -17,9 +18,7 @@ namespace tilegrad::train {
 
 // Of the newest checkpoint, which is of step `steps`; empty where there is none.
 inline std::vector<nn::NamedTensor> FinalTensors(nn::Context& context, const Path& run, int steps) {
-  auto found = LoadNewestCheckpoint(context, run);
-  EXPECT_TRUE(found.ok()) << found.status().message();
-  if (!found.ok()) return {};
+  auto found = Ok(LoadNewestCheckpoint(context, run));
   EXPECT_EQ(found->checkpoint.info.step, steps);
   return std::move(found->checkpoint.tensors);
 }

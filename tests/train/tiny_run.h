@@ -14,7 +14,9 @@
 
 namespace tilegrad::train {
 
-inline constexpr const char* kTinyConfig = R"(name = "tiny"
+inline const std::string kOften = "log_every = 1\ncheckpoint_every = 3\nkeep_checkpoints = 2\n";
+
+inline const std::string kTinyConfig = R"(name = "tiny"
 [network]
 channels = 4
 code = 16
@@ -28,13 +30,10 @@ sharpness_start = 100
 [schedule]
 batch = 8
 views = 2
-log_every = 1
 sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
+)" + kOften;
 
-inline constexpr const char* kTinyTextured = R"(name = "tiny"
+inline const std::string kTinyTextured = R"(name = "tiny"
 [task]
 kind = "textured_image"
 [network]
@@ -52,13 +51,10 @@ sharpness = 500
 sharpness_start = 100
 [schedule]
 batch = 4
-log_every = 1
 sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
+)" + kOften;
 
-inline constexpr const char* kTinyClassifier = R"(name = "tiny"
+inline const std::string kTinyClassifier = R"(name = "tiny"
 [task]
 kind = "classify"
 [network]
@@ -67,13 +63,10 @@ most = 8
 levels = 3
 [schedule]
 batch = 8
-log_every = 1
 sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
+)" + kOften;
 
-inline constexpr const char* kTinyGan = R"(name = "tiny"
+inline const std::string kTinyGan = R"(name = "tiny"
 [task]
 kind = "gan"
 [network]
@@ -102,14 +95,11 @@ count = 8
 [schedule]
 steps = 12
 batch = 4
-log_every = 1
 sample_every = 12
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
+)" + kOften;
 
 // Of a miniature of photographs.
-inline constexpr const char* kTinyPhotographs = R"(name = "tiny"
+inline const std::string kTinyPhotographs = R"(name = "tiny"
 [task]
 kind = "photographs"
 [network]
@@ -129,11 +119,8 @@ average = 0.5
 [schedule]
 steps = 12
 batch = 4
-log_every = 1
 sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
+)" + kOften;
 
 // The value behind a key of a configuration.
 template <class T>

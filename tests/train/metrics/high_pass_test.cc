@@ -13,9 +13,7 @@ namespace tilegrad::train::high_pass_test {
 
 double Energy(const std::vector<float>& values, int channels, int height, int width,
               const std::vector<std::uint8_t>& covered = {}) {
-  const auto energy = HighPassEnergy({values, channels, height, width}, covered);
-  EXPECT_TRUE(energy.ok()) << energy.status().message();
-  return energy.ok() ? *energy : -1;
+  return Ok(HighPassEnergy({values, channels, height, width}, covered)).value();
 }
 
 TEST(HighPass, ConstantAndSlopeHaveNone) {

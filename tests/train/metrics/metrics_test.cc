@@ -40,15 +40,6 @@ TEST(VoxelIou, CountsVoxels) {
   EXPECT_DOUBLE_EQ(VoxelIou(none, none), 1.0);
 }
 
-TEST(CompareSurfaces, SamePointsScoreOne) {
-  const Points points = Cloud(500, 1);
-  const SurfaceScore score = CompareSurfaces(points, points, 0.02);
-  EXPECT_EQ(score.chamfer, 0);
-  EXPECT_EQ(score.precision, 1);
-  EXPECT_EQ(score.recall, 1);
-  EXPECT_EQ(score.f_score, 1);
-}
-
 TEST(CompareSurfaces, AgreesWithAllPairs) {
   for (const int count : {1, 2, 3, 17, 400}) {
     const Points a = Cloud(count, 2), b = Cloud(300, 3);

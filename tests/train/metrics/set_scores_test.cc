@@ -43,8 +43,7 @@ class SetScoresTest : public testing::Test {
 // Of commuting covariances: |m|^2 + sum of squared differences of deviations.
 TEST_F(SetScoresTest, FrechetOfAlignedNormals) {
   const double unit = std::sqrt(2.0 / 3);
-  const auto d = FrechetDistance(Cross(1, 3, 0, 0, 0), Cross(2, 5, 0, 3, -4));
-  ASSERT_TRUE(d.ok()) << d.status().message();
+  const auto d = Ok(FrechetDistance(Cross(1, 3, 0, 0, 0), Cross(2, 5, 0, 3, -4)));
   EXPECT_NEAR(*d, 25 + unit * unit * (1 + 4), 1e-6 * 50);
   EXPECT_NEAR(*FrechetDistance(Cross(1, 3, 0.3, 1, 1), Cross(1, 3, 0.3, 1, 1)), 0, 1e-6);
 }
@@ -55,8 +54,7 @@ TEST_F(SetScoresTest, FrechetOfTurnedNormals) {
   const double c2 = std::pow(std::cos(turn), 2), s2 = 1 - c2;
   const double trace = a1 * (b1 * c2 + b2 * s2) + a2 * (b1 * s2 + b2 * c2);
   const double root = std::sqrt(trace + 2 * std::sqrt(a1 * a2 * b1 * b2));
-  const auto d = FrechetDistance(Cross(1, 3, 0, 0, 0), Cross(2, 5, turn, 0, 0));
-  ASSERT_TRUE(d.ok()) << d.status().message();
+  const auto d = Ok(FrechetDistance(Cross(1, 3, 0, 0, 0), Cross(2, 5, turn, 0, 0)));
   EXPECT_NEAR(*d, a1 + a2 + b1 + b2 - 2 * root, 1e-5);
 }
 
@@ -84,8 +82,7 @@ TEST_F(SetScoresTest, KernelDistanceOfOneDistributionScattersAroundZero) {
 // Radii (k = 1) are 1 among the truth, 0.1 and 1 among what is generated.
 TEST_F(SetScoresTest, PrecisionAndRecallByHand) {
   const FeatureRows truth = Column({0, 1, 10, 11}), generated = Column({0.5f, 0.4f, 100, 101});
-  const auto coverage = PrecisionRecall(truth, generated, workers_, 1);
-  ASSERT_TRUE(coverage.ok()) << coverage.status().message();
+  const auto coverage = Ok(PrecisionRecall(truth, generated, workers_, 1));
   EXPECT_EQ(coverage->precision, 0.5);
   EXPECT_EQ(coverage->recall, 0);
   const auto narrow = PrecisionRecall(truth, Column({0, 0.5f, 1, 1.5f}), workers_, 1);
@@ -98,8 +95,7 @@ TEST_F(SetScoresTest, PrecisionAndRecallByHand) {
 }
 
 TEST_F(SetScoresTest, NearestIsTheFirstOfEquals) {
-  const auto nearest = NearestRows({{0, 0, 4, 3}, 2}, {{5, 0, 0, 2, 2, 0}, 2}, workers_);
-  ASSERT_TRUE(nearest.ok()) << nearest.status().message();
+  const auto nearest = Ok(NearestRows({{0, 0, 4, 3}, 2}, {{5, 0, 0, 2, 2, 0}, 2}, workers_));
   EXPECT_EQ((*nearest)[0].row, 1u);
   EXPECT_EQ((*nearest)[0].distance, 2);
   EXPECT_EQ((*nearest)[1].row, 0u);
@@ -108,8 +104,7 @@ TEST_F(SetScoresTest, NearestIsTheFirstOfEquals) {
 
 TEST_F(SetScoresTest, CopiesAreNoticed) {
   const FeatureRows train = Normals(50, 3, 0, 1), held_out = Normals(20, 3, 0, 2);
-  const auto copies = MeasureMemorisation(SliceRows(train, 5, 25), held_out, train, workers_);
-  ASSERT_TRUE(copies.ok()) << copies.status().message();
+  const auto copies = Ok(MeasureMemorisation(SliceRows(train, 5, 25), held_out, train, workers_));
   EXPECT_EQ(copies->sample_median, 0);
   EXPECT_GT(copies->held_out_median, 0);
   EXPECT_EQ(copies->nearer, 1);
@@ -145,8 +140,7 @@ TEST_F(SetScoresTest, DrawnRowsAreDistinct) {
 // Both sides have the same number of rows, and the floor is what equal distributions get.
 TEST_F(SetScoresTest, FloorStandsBesideTheScore) {
   const FeatureRows truth = Normals(101, 3, 0, 1);
-  const auto same = ScoreSets(truth, Normals(400, 3, 0, 2), 7, workers_);
-  ASSERT_TRUE(same.ok()) << same.status().message();
+  const auto same = Ok(ScoreSets(truth, Normals(400, 3, 0, 2), 7, workers_));
   EXPECT_EQ(same->n, 50u);
   EXPECT_LT(same->generated.frechet, 3 * same->floor.frechet);
   EXPECT_GT(same->floor.coverage.precision, 0.7);

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
 
@@ -80,25 +81,11 @@ TEST(FaceLight, IsTheCosineOfOutwardNormals) {
     dark += cosine < 0 ? 1 : 0;
   }
   EXPECT_GT(dark, 20);
-  // Central differences.
-  const nn::Var loss = nn::Sum(nn::Square(shade));
-  const auto gradients = nn::Grad(loss, {positions, light});
-  const auto value = [&] {
-    return nn::Sum(nn::Square(FaceLight(positions, ball.faces, light, 0.1))).item();
+  Rng rng(5);
+  const auto loss = [&] {
+    return nn::Sum(nn::Square(FaceLight(positions, ball.faces, light, 0.1)));
   };
-  for (const auto& [parameter, gradient, at] : {std::tuple(positions, gradients[0], 7),
-                                                {positions, gradients[0], 50},
-                                                {light, gradients[1], 1}}) {
-    nn::Var moved = parameter;  // shares its memory
-    double& x = moved.value().data<double>()[at];
-    const double before = x, h = 1e-6;
-    x = before + h;
-    const double up = value();
-    x = before - h;
-    const double down = value();
-    x = before;
-    EXPECT_NEAR(gradient.value().data<double>()[at], (up - down) / (2 * h), 1e-6);
-  }
+  nn::ExpectGradientBy({positions, light}, loss, rng);
 }
 
 }  // namespace tilegrad::train::face_cubes_test

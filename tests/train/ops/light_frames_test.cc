@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/rng.h"
+#include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "scene/camera.h"
 #include "scene/light_frame.h"
@@ -85,30 +86,19 @@ TEST(LightFrames, DirectionsKeepTheirAngles) {
   }
 }
 
-// Linear: differences are exact but for rounding.
 TEST(LightFrames, GradientsAgreeWithDifferences) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
   const std::vector<Camera> cameras = SomeCameras();
   Rng rng(4);
   for (const std::int64_t numbers : {3, 9}) {
-    const std::vector<double> at = Random(static_cast<std::size_t>(3 * numbers), rng),
-                              weight = Random(at.size(), rng);
-    nn::Var x = nn::Parameter(context, context.From({3, numbers}, std::span<const double>(at)));
-    const nn::Var w =
-        nn::Constant(context, context.From({3, numbers}, std::span<const double>(weight)));
+    const nn::Var x = nn::RandomParameter(context, {{3, numbers}}, rng),
+                  w = nn::RandomConstant(context, {3, numbers}, rng);
     const auto loss = [&] {
       return nn::Sum(w *
                      (numbers == 3 ? DirectionsToWorld(x, cameras) : HarmonicsToWorld(x, cameras)));
     };
-    const nn::Var gradient = nn::Grad(loss(), {x})[0];
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      x.value().data<double>()[i] = at[i] + 0.5;
-      const double up = loss().item();
-      x.value().data<double>()[i] = at[i] - 0.5;
-      EXPECT_NEAR(gradient.value().data<double>()[i], up - loss().item(), 1e-12);
-      x.value().data<double>()[i] = at[i];
-    }
+    nn::ExpectGradientBy({x}, loss, rng);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "train/gradient_check.h"
 
 namespace tilegrad::train::render_op_test {
 
@@ -103,9 +104,8 @@ class Rendering {
   nn::Var vars_[7];
 };
 
-// Central differences. Coverage, clamps and the nearest feature are kinks: h = 1e-6 keeps crossings
-// improbable; truncation is h^2, rounding 1e-16 / h relative to a loss of some hundreds, so 1e-7 of
-// it; gradients of single numbers are 1e-3 and more. One entry in twenty may sit on a kink.
+// Coverage, clamps and the nearest feature are kinks: one entry in twenty may sit on one. The loss
+// is some hundreds; gradients of single numbers are 1e-3 and more.
 void CheckDifferences(const ShadingModel& shading, const Parts& parts) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
@@ -114,25 +114,11 @@ void CheckDifferences(const ShadingModel& shading, const Parts& parts) {
   const auto gradients = nn::Grad(rendering.Loss(), rendering.parameters);
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   Rng rng(8);
-  int checked = 0, off = 0, moving = 0;
-  for (std::size_t p = 0; p < gradients.size(); ++p) {
-    nn::Tensor& tensor = rendering.parameters[p].value();
-    for (int k = 0; k < 12; ++k, ++checked) {
-      const std::size_t at = rng.Below(tensor.elements());
-      const double h = 1e-6, before = tensor.data<double>()[at];
-      const auto loss_at = [&](double x) {
-        tensor.data<double>()[at] = x;
-        return rendering.Loss().value().data<double>()[0];
-      };
-      const double want = (loss_at(before + h) - loss_at(before - h)) / (2 * h);
-      tensor.data<double>()[at] = before;
-      const double got = gradients[p].value().data<double>()[at];
-      moving += got != 0 ? 1 : 0;
-      if (std::abs(got - want) > 1e-5 * std::abs(want) + 1e-6) ++off;
-    }
-  }
-  EXPECT_LE(20 * off, checked);
-  EXPECT_GT(2 * moving, checked);  // most of it is seen
+  const auto loss = [&] { return rendering.Loss().item(); };
+  const Differences d =
+      CompareWithDifferences(rendering.parameters, loss, gradients, 12, 1e-6, rng);
+  EXPECT_LE(20 * d.off, d.checked);
+  EXPECT_GT(2 * d.moving, d.checked);  // most of it is seen
 }
 
 constexpr ShadingModel Lit(Lighting lighting) { return {.lighting = lighting}; }

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program under mpirun: the same bits on any number of ranks, a rank that is killed, and
 // ranks that must not work together.
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <fstream>
 #include <thread>
 
@@ -19,6 +16,7 @@
 #include "base/sanitizers.h"
 #include "base/simd_target.h"
 #include "nn/nn.h"
+#include "support/process.h"
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
 
@@ -30,7 +28,7 @@ using Words = std::vector<std::string>;
 constexpr const char* kWithoutMpi = "SKIPPED: built without MPI (libopenmpi-dev or libmpich-dev)";
 
 struct Ended {
-  int code = -1;  // 128 + signal of a process that a signal ended
+  int code = -1;  // negative: the signal that ended it
   std::string output;
 };
 
@@ -46,7 +44,7 @@ struct Kind {
 const Kind kGan = {"gan", kTinyGan, {"schedule.batch=8", "stages.shape=9"}};
 
 const Kind kKinds[] = {
-    {"single", std::string(kTinyConfig) + "[stream]\nshare = 0.5\n", {}},
+    {"single", kTinyConfig + "[stream]\nshare = 0.5\n", {}},
     {"textured", kTinyTextured},
     {"critic",
      kTinyTextured,
@@ -78,8 +76,7 @@ class Ranks : public TempFolderTest {
     }
     for (const char* data : {"data", "other_data"}) {
       std::filesystem::create_directories(folder_ / data);
-      const Status written = WriteNoiseDataset(folder_ / data, Meshes::kBoxes, 2);
-      ASSERT_TRUE(written.ok()) << written.message();
+      Ok(WriteNoiseDataset(folder_ / data, Meshes::kBoxes, 2));
     }
     WriteMiniature(folder_ / "cub", "cub");
     Use(kKinds[0]);
@@ -95,11 +92,9 @@ class Ranks : public TempFolderTest {
   }
   void MakeTextures(const std::string& run, const std::string& setting) const {
     Write("textures.toml", kTinyTextured);
-    const Ended ended =
-        Do({TILEGRAD_PROGRAM, "train", "--config", (folder_ / "textures.toml").string(), "--data",
-            (folder_ / "data").string(), "--out", (folder_ / run).string(), "--set",
-            "schedule.steps=2", "--set", setting, "--threads", "1"});
-    ASSERT_EQ(ended.code, 0) << ended.output;
+    ExpectDone({TILEGRAD_PROGRAM, "train", "--config", (folder_ / "textures.toml").string(),
+                "--data", (folder_ / "data").string(), "--out", (folder_ / run).string(), "--set",
+                "schedule.steps=2", "--set", setting, "--threads", "1"});
   }
 
   Words TrainWords(const std::string& run, int workers) const {
@@ -122,31 +117,23 @@ class Ranks : public TempFolderTest {
 
   // What it prints goes to a file of its own.
   pid_t Start(const Words& words, const std::string& log) const {
-    std::vector<char*> arguments;
-    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    const std::string file = (folder_ / log).string();
-    const pid_t child = ::fork();
-    if (child != 0) return child;
-    const int out = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(126);
-    ::execv(arguments[0], arguments.data());
-    ::_exit(127);
+    std::filesystem::remove(folder_ / log);
+    return StartProcess(words, folder_ / log);
   }
-
   Ended End(pid_t child, const std::string& log) const {
-    int status = 0;
-    EXPECT_EQ(::waitpid(child, &status, 0), child);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
-            ReadText(folder_ / log).value()};
+    const int code = EndProcess(child);
+    return {code, ReadText(folder_ / log).value()};
   }
-
   Ended Do(const Words& words) const { return End(Start(words, "log.txt"), "log.txt"); }
+  void ExpectDone(const Words& words) const {
+    const Ended ended = Do(words);
+    ASSERT_EQ(ended.code, 0) << ended.output;
+  }
 
   // One rank: without mpirun.
-  Ended TrainOn(int ranks, int workers, const std::string& run) const {
+  void TrainOn(int ranks, int workers, const std::string& run) const {
     const Words words = TrainWords(run, workers);
-    return Do(ranks == 1 ? words : OnRanks(ranks, words));
+    ExpectDone(ranks == 1 ? words : OnRanks(ranks, words));
   }
 
   void ExpectSame(const std::string& a, const std::string& b) {
@@ -159,12 +146,10 @@ class Ranks : public TempFolderTest {
       SCOPED_TRACE(kind.name);
       Use(kind);
       const std::string whole = std::string(kind.name) + "_whole";
-      const Ended alone = TrainOn(1, 1, whole);
-      ASSERT_EQ(alone.code, 0) << alone.output;
+      ASSERT_NO_FATAL_FAILURE(TrainOn(1, 1, whole));
       for (const auto& [ranks, workers] : ranks_and_workers) {
         const std::string run = fmt::format("{}_{}_{}", kind.name, ranks, workers);
-        const Ended ended = TrainOn(ranks, workers, run);
-        ASSERT_EQ(ended.code, 0) << ended.output;
+        ASSERT_NO_FATAL_FAILURE(TrainOn(ranks, workers, run));
         ExpectSame(whole, run);
         std::filesystem::remove_all(folder_ / run);
       }
@@ -213,20 +198,19 @@ class Ranks : public TempFolderTest {
     const Ended ended = End(mpirun, "killed.txt");
     EXPECT_LT(Clock::now() - start, std::chrono::seconds(10));
     EXPECT_NE(ended.code, 0);
-    EXPECT_NE(ended.output.find("signal 9"), std::string::npos) << ended.output;
+    ExpectIn(ended.output, "signal 9");
     for (const pid_t child : children) EXPECT_TRUE(IsGone(child)) << "a rank lives on";
   }
 
   void CheckKills(const std::vector<std::int64_t>& steps) {
-    ASSERT_EQ(TrainOn(1, 2, "whole").code, 0);
+    ASSERT_NO_FATAL_FAILURE(TrainOn(1, 2, "whole"));
     int ranks = 2;
     for (const std::int64_t step : steps) {
       KillOne(ranks, static_cast<std::size_t>(step) % static_cast<std::size_t>(ranks), "killed",
               step);
       ranks = ranks % 4 + 1 == 1 ? 2 : ranks % 4 + 1;  // 2, 3, 4, 2, ..
     }
-    const Ended ended = TrainOn(ranks, 1, "killed");
-    ASSERT_EQ(ended.code, 0) << ended.output;
+    ASSERT_NO_FATAL_FAILURE(TrainOn(ranks, 1, "killed"));
     ExpectSame("whole", "killed");
   }
 
@@ -325,7 +309,7 @@ TEST_F(Ranks, AreAtMostAsManyAsPortions) {
 
 TEST_F(Ranks, OfARunThatIsThereAreRefusedOnce) {
   steps_ = 1;
-  ASSERT_EQ(TrainOn(1, 1, "there").code, 0);
+  ASSERT_NO_FATAL_FAILURE(TrainOn(1, 1, "there"));
   Words words = OnRanks(3, TrainWords("there", 1));
   words.erase(std::find(words.begin(), words.end(), "--resume"));
   ExpectRefused(words, 2, "already holds a run");
@@ -347,47 +331,36 @@ TEST_F(Ranks, MakeADatasetOfTheSameBytes) {
                  "--limit",        "7",       "--size",   "32",
                  "--threads",      "1",       "--out",    (folder_ / out).string()};
   };
-  ASSERT_EQ(Do(words("one")).code, 0);
+  ExpectDone(words("one"));
   const Ended ended = Do(OnRanks(3, words("three")));
   ASSERT_EQ(ended.code, 0) << ended.output;
-  EXPECT_NE(ended.output.find("(0 model files kept from earlier)"), std::string::npos)
-      << ended.output;
-  std::size_t files = 0;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "one")) {
-    if (!entry.is_regular_file()) continue;
-    ++files;
-    const Path other = folder_ / "three" / std::filesystem::relative(entry.path(), folder_ / "one");
-    const auto want = ReadFile(entry.path()), got = ReadFile(other);
-    ASSERT_TRUE(want.ok() && got.ok()) << other;
-    EXPECT_EQ(*want, *got) << other;
-  }
-  EXPECT_GT(files, 9u);
+  ExpectIn(ended.output, "(0 model files kept from earlier)");
+  const auto files = Contents(folder_ / "one");
+  EXPECT_GT(files.size(), 9u);
+  EXPECT_TRUE(files == Contents(folder_ / "three"));
 }
 
 // Of each kind of evaluation, with more ranks than some have models.
 TEST_F(Ranks, EvaluateToTheSameBytes) {
   steps_ = 2;
-  const Ended made = Do({TILEGRAD_PROGRAM, "dataset", "--source", "procedural", "--limit", "12",
-                         "--size", "32", "--threads", "1", "--out", (folder_ / "made").string()});
-  ASSERT_EQ(made.code, 0) << made.output;
+  ExpectDone({TILEGRAD_PROGRAM, "dataset", "--source", "procedural", "--limit", "12", "--size",
+              "32", "--threads", "1", "--out", (folder_ / "made").string()});
   for (const Kind& kind : kKinds) {
     const std::string name = kind.name;
     if (name == kGan.name || name == "critic") continue;
     SCOPED_TRACE(kind.name);
     Use(kind);
     if (data_ == "data") data_ = "made";
-    ASSERT_EQ(TrainOn(1, 1, kind.name).code, 0);
+    ASSERT_NO_FATAL_FAILURE(TrainOn(1, 1, kind.name));
     const Path run = folder_ / kind.name;
     const Words words = {TILEGRAD_PROGRAM,    "eval", "--run",  run.string(),
                          "--views-per-model", "2",    "--data", (folder_ / data_).string(),
                          "--threads",         "1"};
-    const Ended alone = Do(words);
-    ASSERT_EQ(alone.code, 0) << alone.output;
+    ExpectDone(words);
     const auto table = ReadText(run / "eval.md"), figures = ReadText(run / "eval.json");
     for (const int ranks : {2, 3}) {
       for (const char* file : {"eval.md", "eval.json"}) std::filesystem::remove(run / file);
-      const Ended ended = Do(OnRanks(ranks, words));
-      ASSERT_EQ(ended.code, 0) << ended.output;
+      ExpectDone(OnRanks(ranks, words));
       EXPECT_EQ(ReadText(run / "eval.md").value(), table.value());
       EXPECT_EQ(ReadText(run / "eval.json").value(), figures.value());
     }
@@ -397,8 +370,7 @@ TEST_F(Ranks, EvaluateToTheSameBytes) {
 TEST_F(Ranks, OtherCommandsAreRefused) {
   const Ended ended = Do(OnRanks(2, {TILEGRAD_PROGRAM, "configs"}));
   EXPECT_EQ(ended.code, 2);
-  EXPECT_NE(ended.output.find("start this command without mpirun"), std::string::npos)
-      << ended.output;
+  ExpectIn(ended.output, "start this command without mpirun");
 }
 
 TEST_F(Ranks, WithoutThePluginSayHowToGetIt) {
