@@ -199,20 +199,23 @@ def reads_display_window(file):
 
 
 class Fit:
-    """What `tilegrad fit` made of a folder, or what it had said after `patience` seconds."""
+    """What `tilegrad fit` made of a folder, or what it had said when it said `until`."""
 
-    def __init__(self, program, folder, patience=60):
+    def __init__(self, program, folder, until=None):
         with tempfile.TemporaryDirectory() as place:
             out = pathlib.Path(place) / "fit"
             command = [program, "fit", folder, "--out", out, "--steps", "100", "--hold-out", "5",
                        "--json"]
+            self.text = ""
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                   text=True) as fit:
-                try:
-                    result, self.text = fit.communicate(timeout=patience)
-                except subprocess.TimeoutExpired:
-                    fit.kill()
-                    result, self.text = fit.communicate()
+                for line in fit.stderr:
+                    self.text += line
+                    if until and until in line:
+                        fit.kill()
+                        break
+                result = fit.stdout.read()
+                fit.wait()
                 self.code = fit.returncode
             scores = json.loads(result).get("held_out") if self.code == 0 else None
             self.iou = scores["silhouette_iou"] if scores else 0.0
@@ -234,28 +237,29 @@ def fitted(*words, iou=0.93):
                         and all(word in fit.text for word in words))
 
 
-# Folder of second/: (what is right, check, seconds that it may take).
+# Folder of second/: (what is right, check, and after which words of it no more is asked).
+SEARCH = "looking for cameras"
 FITS = {
-    "fit_base": ("the sphere", fitted(), 60),
-    "fit_cx0": ("the sphere: 0 is a number", fitted(iou=0.88), 60),  # half of it is in the pictures
-    "fit_parallel": ("the sphere, or the cause", either(fitted(iou=0.88), refused("parallel")), 60),
-    "fit_two_models": ("the larger one, and a word", fitted("sparse"), 60),
-    "fit_some_mask_paths": ("refused", refused("004.png"), 60),
-    "fit_one_without_alpha": ("refused", refused("003.png"), 60),
-    "fit_empty_mask": ("named; the others fitted", fitted("003.png", iou=0.91), 60),
-    "fit_narrow": ("warned, no lens", fitted("degrees"), 60),
-    # Their cameras are searched for: what is said before counts.
-    "fit_webp": ("read", lambda fit: not fit.refused and "not read" not in fit.text, 15),
+    "fit_base": ("the sphere", fitted()),
+    "fit_cx0": ("the sphere: 0 is a number", fitted(iou=0.88)),  # half of it is in the pictures
+    "fit_parallel": ("the sphere, or the cause", either(fitted(iou=0.88), refused("parallel"))),
+    "fit_two_models": ("the larger one, and a word", fitted("sparse")),
+    "fit_some_mask_paths": ("refused", refused("004.png")),
+    "fit_one_without_alpha": ("refused", refused("003.png")),
+    "fit_empty_mask": ("named; the others fitted", fitted("003.png", iou=0.91)),
+    "fit_narrow": ("warned, no lens", fitted("degrees")),
+    # Their cameras are searched for: what is said before that counts.
+    "fit_webp": ("read", lambda fit: SEARCH in fit.text and "not read" not in fit.text, SEARCH),
     "fit_mixed_kinds": ("what is skipped is named",
                         lambda fit: all(kind in fit.text.lower() for kind in ("heic", "tif", "bmp")),
-                        15),
+                        SEARCH),
 }
 
 
 def second_rows(program, folder):
     """As `rows`, of the files after further reports."""
-    for name, (right, check, patience) in FITS.items():
-        fit = Fit(program, folder / name, patience)
+    for name, (right, check, *until) in FITS.items():
+        fit = Fit(program, folder / name, *until)
         yield f"second/{name}", right, check(fit), fit
     for name, (right, check, view) in SECOND.items():
         shot = Shot(program, folder, (name, *view))
