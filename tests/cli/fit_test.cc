@@ -17,18 +17,14 @@ using Json = nlohmann::json;
 // As a place (x, y, z) of glTF stands in a world whose z points up.
 glm::vec3 WithZUp(glm::vec3 p) { return {p.x, -p.z, p.y}; }
 
-class FitCommand : public TempFolderTest {
+class FitCommand : public ProgramTest {
  protected:
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-
   // Views of a flat box in such a world, as NeRF's synthetic scenes have them, and the box itself
   // as box.obj.
   void MakeWorld() {
     const Mesh box = Box({0, 0, 0}, {0.9f, 0.36f, 0.63f});
     ASSERT_TRUE(io::SaveGlb(folder_ / "box.glb", box).ok());
-    const Outcome made =
-        RunProgram("views " + In("box.glb") + " --views 8 --held-out 0 --size 48 --out " + In("v"));
-    ASSERT_EQ(made.exit_code, 0) << made.output;
+    ExpectDone("views " + In("box.glb") + " --views 8 --held-out 0 --size 48 --out " + In("v"));
     const Path file = folder_ / "v/transforms_train.json";
     Json json = Json::parse(ReadText(file).value());
     for (Json& frame : json.at("frames")) {

@@ -8,29 +8,20 @@
 #include "io/glb_writer.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/source_dir.h"
 
 namespace tilegrad::hostile_names_test {
 
 constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n";
 
-constexpr const char* kTiny =
-    " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set network.code=8 "
-    "--set network.hidden1=8 --set network.hidden2=8 --set network.template_level=1";
-
 class HostileNames : public ProgramTest {
  protected:
-  std::string Quoted(const std::string& name) const {
-    return "'" + (folder_ / name).string() + "'";
-  }
+  std::string Quoted(const std::string& name) const { return "'" + In(name) + "'"; }
 
   // The control sequence is seen, not obeyed.
   void ExpectShown(const std::string& arguments, const std::string& shown) {
-    const Outcome outcome = RunProgram(arguments);
-    for (const char* raw : {"\x1b", "\x07", "\xc2\x9b"}) {
-      EXPECT_EQ(outcome.output.find(raw), std::string::npos) << arguments;
-    }
-    EXPECT_NE(outcome.output.find(shown), std::string::npos) << arguments << outcome.output;
+    const std::string said = RunProgram(arguments).output;
+    ExpectNotIn(said, "\x1b", "\x07", "\xc2\x9b");
+    ExpectIn(said, shown);
   }
 };
 
@@ -53,22 +44,18 @@ TEST_F(HostileNames, AreTextInMarkdownAndOneFieldInCsv) {
   ExpectDone("tradeoff " + Quoted(name) + " --size 16 --repetitions 1 --out " + Quoted("out") +
              " --errors 0.1 --deltas 0.01");
   const std::string text = ReadText(folder_ / "out/tradeoff.md").value();
-  EXPECT_EQ(text.find("<img"), std::string::npos) << text;
-  EXPECT_NE(text.find("&lt;img src=x onerror=alert(1)&gt;, \\|a\\| \\[b\\](c)"), std::string::npos)
-      << text;
-  const std::string csv = ReadText(folder_ / "out/tradeoff.csv").value();
-  EXPECT_NE(csv.find("\n\"<img"), std::string::npos) << csv;
+  ExpectNotIn(text, "<img");
+  ExpectIn(text, "&lt;img src=x onerror=alert(1)&gt;, \\|a\\| \\[b\\](c)");
+  ExpectIn(ReadText(folder_ / "out/tradeoff.csv").value(), "\n\"<img");
 }
 
 // A dataset of a stranger: its texts reach the pages and tables of every run that uses it.
 TEST_F(HostileNames, AreTextInReportsAndTables) {
   const std::string data = Quoted("data"), run = Quoted("run");
   const auto done = [](const std::string& arguments) {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    EXPECT_EQ(outcome.output.find('\x1b'), std::string::npos) << outcome.output;
+    ExpectNotIn(ExpectDone(arguments), "\x1b");
   };
-  done("dataset --source procedural --per-class 2 --size 16 --views 2 --out " + data);
+  MakeData(data);
   const std::string hostile =
       R"(</script><img src=x onerror=alert(1)>\"'|\n# \u202e\u001b[31m)";  // as JSON writes it
   for (const auto& [file, key] : {std::pair{"data/models.jsonl", "\"name\":\""},
@@ -84,57 +71,39 @@ TEST_F(HostileNames, AreTextInReportsAndTables) {
     }
     Write(file, text);
   }
-  done("train --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml --data " + data + " --out " +
-       run + kTiny);
+  done(TrainTiny(data, run));
   done("eval --run " + run + " --views-per-model 1");
   done("report --run " + run + " --models 2");
-  for (const char* file : {"run/report.html", "run/eval.md"}) {
-    const std::string text = ReadText(folder_ / file).value();
-    for (const char* raw : {"<img src=x", "\u202e", "\x1b"}) {
-      EXPECT_EQ(text.find(raw), std::string::npos) << file << " has " << raw;
-    }
-  }
-  const std::string page = ReadText(folder_ / "run/report.html").value();
-  EXPECT_NE(page.find("&lt;img src=x onerror=alert(1)&gt;"), std::string::npos);
+  for (const char* file : {"run/report.html", "run/eval.md"})
+    ExpectNotIn(ReadText(folder_ / file).value(), "<img src=x", "\u202e", "\x1b");
+  ExpectIn(ReadText(folder_ / "run/report.html").value(), "&lt;img src=x onerror=alert(1)&gt;");
 }
 
 // Names of folders are bytes; JSON is UTF-8. What is written finds its files again.
 TEST_F(HostileNames, OfDatasetsNeedNotBeUtf8) {
-  const auto done = [](const std::string& arguments) {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    return outcome.output;
-  };
   const std::string data = "caf\xe9 \xee\xbf\xa9", run = Quoted("run\xff");  // the last is U+EFE9
-  const std::string said = done(
+  const std::string said = ExpectDone(
       "dataset --source procedural --per-class 2 --size 16 --views 2 --json --out " + Quoted(data));
   const auto json = nlohmann::json::parse(said.substr(said.find('{')));
-  EXPECT_EQ(NameFromJson(json.at("folder").get<std::string>()), (folder_ / data).string());
-  done("train --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml --data " + Quoted(data) +
-       " --out " + run + kTiny);
+  EXPECT_EQ(NameFromJson(json.at("folder").get<std::string>()), In(data));
+  MakeRun(Quoted(data), run);
   EXPECT_TRUE(IsUtf8(ReadText(folder_ / "run\xff/run.json").value()));
-  done("train --resume " + run + " --steps 3");
-  done("eval --run " + run + " --views-per-model 1");
-  done("report --run " + run + " --models 1");
-  EXPECT_TRUE(IsFile(folder_ / "run\xff/report.html"));
+  ExpectDone("train --resume " + run + " --steps 3");
+  ExpectDone("eval --run " + run + " --views-per-model 1");
+  ExpectDone("report --run " + run + " --models 1");
+  EXPECT_TRUE(Exists("run\xff/report.html"));
   ASSERT_TRUE(io::SaveGlb(folder_ / "truth.glb", Icosphere(1, 1)).ok());
-  done("views " + Quoted("truth.glb") + " --views 3 --held-out 0 --size 16 --out " +
-       Quoted("v\xfe"));
-  done("fit " + Quoted("v\xfe") + " --steps 1 --out " + Quoted("f\xfd"));
-  done("fit --resume --steps 2 --out " + Quoted("f\xfd"));
+  ExpectDone("views " + Quoted("truth.glb") + " --views 3 --held-out 0 --size 16 --out " +
+             Quoted("v\xfe"));
+  ExpectDone("fit " + Quoted("v\xfe") + " --steps 1 --out " + Quoted("f\xfd"));
+  ExpectDone("fit --resume --steps 2 --out " + Quoted("f\xfd"));
 }
 
 // Half-written files of processes that are gone; those of others, and other files, stay.
 TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   const std::string data = Quoted("data"), run = Quoted("run");
-  ASSERT_EQ(
-      RunProgram("dataset --source procedural --per-class 2 --size 16 --views 3 --out " + data)
-          .exit_code,
-      0);
-  const std::string config = std::string(TILEGRAD_SOURCE_DIR) + "/configs/quick.toml";
-  ASSERT_EQ(RunProgram("train --config " + config + " --data " + data + " --out " + run + kTiny)
-                .exit_code,
-            0);
+  MakeData(data);
+  MakeRun(data, run);
   const std::string gone = ".4194305.tmp", own = "." + std::to_string(::getpid()) + ".tmp";
   std::vector<Path> left;
   for (const std::string name :
@@ -147,18 +116,16 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   const Path kept[] = {Write("run/eval.md" + own, "of a process that runs"),
                        Write("run/notes" + gone, "another's"),
                        Write("run/eval.md.tmp", "another's")};
-  EXPECT_EQ(RunProgram("eval --run " + run + " --views-per-model 1").exit_code, 0);
-  EXPECT_EQ(RunProgram("report --run " + run + " --models 1").exit_code, 0);
+  ExpectDone("eval --run " + run + " --views-per-model 1");
+  ExpectDone("report --run " + run + " --models 1");
   const std::string view = Quoted("out/view.png"), out = Quoted("out");
-  EXPECT_EQ(RunProgram("dataset-view --data " + data + " --split train --out " + view).exit_code,
-            0);
-  EXPECT_EQ(RunProgram("predict --run " + run + " --refine 1 --out " + out + " " + view).exit_code,
-            0);
+  ExpectDone("dataset-view --data " + data + " --split train --out " + view);
+  ExpectDone("predict --run " + run + " --refine 1 --out " + out + " " + view);
   const std::string render = "render " + Quoted("out/view_predicted.glb") +
                              " --size 8 --outputs color,depth --out " + Quoted("out/drawn.png") +
                              " --write-cameras ";
-  EXPECT_EQ(RunProgram(render + Quoted("out/cameras.json")).exit_code, 0);
-  EXPECT_EQ(RunProgram(render + Quoted("out/colmap") + " --force").exit_code, 0);
+  ExpectDone(render + Quoted("out/cameras.json"));
+  ExpectDone(render + Quoted("out/colmap") + " --force");
   for (const Path& file : left) EXPECT_FALSE(std::filesystem::exists(file)) << file;
   for (const Path& file : kept) EXPECT_TRUE(std::filesystem::exists(file)) << file;
 }

@@ -36,8 +36,8 @@ TEST_F(OptionWords, LeaveTheMeshesAlone) {
           In("a.glb") + " " + option + " " + In("b.glb") + rest}) {
       std::filesystem::remove_all(folder_ / "out");
       ExpectDone("render " + line);
-      EXPECT_TRUE(std::filesystem::exists(folder_ / "out/a.png")) << line;
-      EXPECT_TRUE(std::filesystem::exists(folder_ / "out/b.png")) << line;
+      EXPECT_TRUE(Exists("out/a.png")) << line;
+      EXPECT_TRUE(Exists("out/b.png")) << line;
     }
   }
 }
@@ -97,8 +97,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
   for (const std::string& line : {std::string("info"), render}) {
     const Outcome outcome = RunProgram(line, "TILEGRAD_THREADS=many ");
     EXPECT_EQ(outcome.exit_code, 2);
-    EXPECT_NE(outcome.output.find("TILEGRAD_THREADS: \"many\" must be"), std::string::npos)
-        << outcome.output;
+    ExpectIn(outcome.output, "TILEGRAD_THREADS: \"many\" must be");
   }
   ExpectRefused("help", 0, "Usage: tilegrad");
   ExpectRefused("version", 0, ".");
@@ -109,7 +108,7 @@ TEST_F(OptionWords, OfOtherCommandsLeaveTheirFilesAlone) {
   ExpectDone("tradeoff --size 8 --repetitions 1 --out " + In("t") +
              " --deltas 1e-2 --errors 0 1e-3 " + In("b.glb"));
   const std::string csv = ReadText(folder_ / "t/tradeoff.csv").value();
-  EXPECT_NE(csv.find("\nb,12,"), std::string::npos) << csv;
+  ExpectIn(csv, "\nb,12,");
   const std::string fit =
       "fit --out " + In("f") + " --lighting lambert --optimize positions,light ";
   for (const std::string option : {"--light-direction 0 -1 .5 ", "--rate positions=1 light=2 ",
@@ -121,18 +120,17 @@ TEST_F(OptionWords, OfOtherCommandsLeaveTheirFilesAlone) {
 TEST_F(OptionWords, TheLimitOfMemoryIsAnOptionOfEveryReader) {
   ImageU8 image(512, 512, 3);
   ASSERT_TRUE(io::SavePng(folder_ / "t.png", image).ok());
-  Write("t.mtl", std::string("newmtl m\nmap_Kd t.png\n"));
-  Write("t.obj", std::string("mtllib t.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
-                             "f 1/1 2/1 3/1\n"));
+  Write("t.mtl", "newmtl m\nmap_Kd t.png\n");
+  Write("t.obj",
+        "mtllib t.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
+        "f 1/1 2/1 3/1\n");
   const std::string render = "render " + In("t.obj") + " --size 8 --force --out " + In("p.png");
   ExpectRefused(render + " --read-limit 500K", 1, "--read-limit");
   ExpectDone(render + " --read-limit 20M");
-  const Outcome stronger = RunProgram(render + " --read-limit 20M", "TILEGRAD_READ_LIMIT=1K ");
-  EXPECT_EQ(stronger.exit_code, 0) << stronger.output;
+  ExpectDone(render + " --read-limit 20M", "TILEGRAD_READ_LIMIT=1K ");
   EXPECT_EQ(RunProgram(render, "TILEGRAD_READ_LIMIT=1K ").exit_code, 1);
   ExpectRefused(render + " --read-limit much", 2, "is not a size");
-  EXPECT_NE(RunProgram(render, "TILEGRAD_READ_LIMIT=much ").output.find("is not a size"),
-            std::string::npos);
+  ExpectIn(RunProgram(render, "TILEGRAD_READ_LIMIT=much ").output, "is not a size");
   for (const char* command : {"dataset", "dataset-view", "eval", "fit", "predict", "render",
                               "report", "tradeoff", "train", "views"}) {
     ExpectRefused(std::string(command) + " --help", 0, "--read-limit");

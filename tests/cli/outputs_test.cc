@@ -15,9 +15,10 @@ class Outputs : public ProgramTest {
   void SetUp() override {
     // fuze.obj, its material and its texture, all of one stem.
     ASSERT_TRUE(io::SavePng(folder_ / "fuze.png", ImageU8(2, 2, 3)).ok());
-    Write("fuze.mtl", std::string("newmtl m\nmap_Kd fuze.png\n"));
-    Write("fuze.obj", std::string("mtllib fuze.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
-                                  "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
+    Write("fuze.mtl", "newmtl m\nmap_Kd fuze.png\n");
+    Write("fuze.obj",
+          "mtllib fuze.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+          "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
   }
   // In the folder, as RunProgram starts the program where the test is.
   Outcome Run(const std::string& arguments) const {
@@ -32,7 +33,7 @@ class Outputs : public ProgramTest {
     const std::string before = ReadText(folder_ / file).value();
     const Outcome outcome = Run(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments << "\n" << outcome.output;
-    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+    ExpectIn(outcome.output, part);
     EXPECT_EQ(ReadText(folder_ / file).value(), before) << arguments;
   }
 };
@@ -55,10 +56,10 @@ TEST_F(Outputs, PicturesAreReplacedByForceAlone) {
     ExpectDone("render fuze.obj --size 8 --force --out " + name);
     EXPECT_NE(ReadText(folder_ / name).value(), "mine");
   }
-  Write("turn/fuze_0001.png", std::string("mine"));
+  Write("turn/fuze_0001.png", "mine");
   ExpectKept("turn/fuze_0001.png", "render fuze.obj --size 8 --turntable 2 --out turn", "--force");
   EXPECT_FALSE(Exists("turn/fuze_0000.png"));  // before the first is rendered
-  Write("b_depth.png", std::string("mine"));
+  Write("b_depth.png", "mine");
   ExpectKept("b_depth.png", "render fuze.obj --size 8 --outputs color,depth --out b.png",
              "--force");
 }
@@ -85,7 +86,7 @@ TEST_F(Outputs, CamerasAreNotReplaced) {
              "render fuze.obj --size 8 --force --out a.png --cameras transforms.json "
              "--write-cameras transforms.json",
              "is an input of this command");
-  Write("sparse/images.txt", std::string("# mine\n"));
+  Write("sparse/images.txt", "# mine\n");
   ExpectKept("sparse/images.txt", "render fuze.obj --size 8 --out b.png --write-cameras sparse",
              "--force");
   EXPECT_FALSE(Exists("sparse/cameras.txt"));
@@ -94,12 +95,12 @@ TEST_F(Outputs, CamerasAreNotReplaced) {
 
 TEST_F(Outputs, ViewsFillAFolderOfTheirOwn) {
   const std::string views = "views fuze.obj --views 2 --held-out 0 --size 8 --out ";
-  Write("photos/me.jpg", std::string("mine"));
+  Write("photos/me.jpg", "mine");
   ExpectKept("photos/me.jpg", views + "photos", "--force");
   EXPECT_FALSE(Exists("photos/truth.glb"));
   ExpectDone(views + "photos --force");
   EXPECT_TRUE(Exists("photos/me.jpg"));
-  Write("photos/images/001.png", std::string("retouched"));
+  Write("photos/images/001.png", "retouched");
   ExpectKept("photos/images/001.png", views + "photos", "--force");
   ExpectDone(views + "photos --force");
   EXPECT_NE(ReadText(folder_ / "photos/images/001.png").value(), "retouched");
@@ -109,7 +110,7 @@ TEST_F(Outputs, ViewsFillAFolderOfTheirOwn) {
 TEST_F(Outputs, FitsStartAnewOrGoOn) {
   ExpectDone("views fuze.obj --views 2 --held-out 0 --size 8 --out v");
   const std::string fit = "fit v --template-level 1 --texture-size 8 --steps ";
-  Write("f/me.jpg", std::string("mine"));
+  Write("f/me.jpg", "mine");
   ExpectKept("f/me.jpg", fit + "2 --out f", "--force");
   ExpectDone(fit + "2 --out f --force");
   EXPECT_TRUE(Exists("f/me.jpg"));
@@ -122,14 +123,13 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
   EXPECT_TRUE(Exists("f/checkpoints/step_00000001.safetensors"));
   EXPECT_FALSE(Exists("f/checkpoints/step_00000002.safetensors"));
   EXPECT_FALSE(Exists("f/timelapse/00000002.png"));
-  Write("f/report.html", std::string("of the run"));
+  Write("f/report.html", "of the run");
   ExpectDone(fit + "3 --out f --resume");
   EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "of the run");
   EXPECT_TRUE(Exists("f/me.jpg"));
   const Outcome resumed = Run(fit + "1 --out nowhere --resume");
   EXPECT_EQ(resumed.exit_code, 3) << resumed.output;
-  EXPECT_NE(resumed.output.find("nowhere: no checkpoint to resume"), std::string::npos)
-      << resumed.output;
+  ExpectIn(resumed.output, "nowhere: no checkpoint to resume");
   EXPECT_FALSE(Exists("nowhere"));
   const std::string from_itself = fit + "3 --out f --mesh f/mesh.glb";
   ExpectKept("f/mesh.glb", from_itself + " --force", "is an input of this command");
@@ -138,31 +138,28 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
 
 TEST_F(Outputs, DatasetsAndRuns) {
   const std::string dataset = "dataset --source procedural --per-class 1 --views 1 --size ";
-  Write("d/thesis.txt", std::string("mine"));
+  Write("d/thesis.txt", "mine");
   ExpectKept("d/thesis.txt", dataset + "8 --out d", "--force");
   ExpectDone(dataset + "8 --out d --force");
   ExpectDone(dataset + "8 --out d");  // it goes on in its own
   ExpectKept("d/dataset.json", dataset + "9 --out d", "with other settings");
   ExpectDone(dataset + "9 --out d --force");
   EXPECT_TRUE(Exists("d/thesis.txt"));
-  Write("view.png", std::string("mine"));
+  Write("view.png", "mine");
   const std::string view = "dataset-view --split train --data d";
   ExpectKept("view.png", view, "--force");
   ExpectDone(view + " --force");
-  Write("r/notes.txt", std::string("mine"));
+  Write("r/notes.txt", "mine");
   ExpectKept("r/notes.txt", "train --config " TILEGRAD_CONFIGS "/quick.toml --data d --out r",
              "--force");
 }
 
 TEST_F(Outputs, RunsStartAnewOrGoOn) {
-  ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 2 --out d");
-  const std::string train = "train --config " TILEGRAD_CONFIGS
-                            "/quick.toml --data d --out r --set schedule.batch=2 --set "
-                            "network.channels=2 --set network.code=8 --set network.hidden1=8 --set "
-                            "network.hidden2=8 --set network.template_level=1 --steps ";
+  MakeData(In("d"));
+  const std::string train = TrainTiny("d", "r") + " --steps ";
   ExpectDone(train + "2");
   ExpectDone("eval --run r --views-per-model 1");
-  Write("r/notes.txt", std::string("mine"));
+  Write("r/notes.txt", "mine");
   ExpectKept("r/config.toml", train + "1", "already holds a run");
   // What is wrong is said while the run is still there.
   const Outcome wrong = Run(train + "1 --force --data nowhere");
@@ -175,14 +172,11 @@ TEST_F(Outputs, RunsStartAnewOrGoOn) {
 }
 
 TEST_F(Outputs, PredictionsScoresAndReports) {
-  ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 2 --out d");
-  ExpectDone("train --config " TILEGRAD_CONFIGS
-             "/quick.toml --data d --out r --set schedule.steps=1 --set schedule.batch=2 --set "
-             "network.channels=2 --set network.code=8 --set network.hidden1=8 --set "
-             "network.hidden2=8 --set network.template_level=1");
+  MakeData(In("d"));
+  MakeRun(In("d"), In("r"));
   ExpectDone("dataset-view --data d --split train --out p/x.png");
   const std::string predict = "predict --run r --refine 0 --out p ";
-  Write("p/x_predicted.glb", std::string("mine"));
+  Write("p/x_predicted.glb", "mine");
   ExpectKept("p/x_predicted.glb", predict + "p/x.png", "--force");
   EXPECT_FALSE(Exists("p/x_turntable.png"));
   ExpectDone(predict + "p/x.png --force");
@@ -208,7 +202,7 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
 }
 
 TEST_F(Outputs, PagesAndStudies) {
-  Write("tradeoff/tradeoff.csv", std::string("mine"));
+  Write("tradeoff/tradeoff.csv", "mine");
   ExpectKept("tradeoff/tradeoff.csv", "tradeoff fuze.obj --size 8 --repetitions 1", "--force");
   EXPECT_FALSE(Exists("tradeoff/tradeoff.md"));
 }

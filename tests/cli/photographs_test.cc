@@ -27,7 +27,7 @@ TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
     ExpectDone(std::string("train --config ") + config + " --data " + In(source) + " --out " + run +
                kSmall);
     const std::string table = ExpectDone("eval --run " + run);
-    EXPECT_NE(table.find("PCK@0.1"), std::string::npos) << table;
+    ExpectIn(table, "PCK@0.1");
     ExpectDone("report --run " + run);
     ExpectDone("predict --refine 20 --run " + run + " --out " + In("out_" + std::string(source)) +
                " " + In("cutout.png"));

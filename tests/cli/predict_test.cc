@@ -17,17 +17,12 @@ class Predict : public ProgramTest {
  protected:
   void SetUp() override {
     ExpectDone("dataset --source procedural --per-class 6 --size 16 --views 4 --out " + In("d"));
-    ExpectDone("train --config " TILEGRAD_CONFIGS "/quick.toml --data " + In("d") + " --out " +
-               In("r") +
-               " --set schedule.steps=1 --set schedule.batch=2 --set network.channels=2 --set "
-               "network.code=8 --set network.hidden1=8 --set network.hidden2=8 --set "
-               "network.template_level=1");
+    MakeRun(In("d"), In("r"));
     ExpectDone("dataset-view --data " + In("d") + " --split train --out " + In("known.png"));
-    // Red and white stripes.
-    ImageU8 stripes(64, 64, 4);
+    ImageU8 stripes(64, 64, 4);  // red and white
     for (int y = 4; y < 60; y += 9) {
       for (int x = 4; x < 60; ++x) {
-        for (int c = 0; c < 4; ++c) stripes.at(x, y)[c] = 255;
+        std::fill_n(stripes.at(x, y), 4, std::uint8_t{255});
         if (y % 2 == 0) stripes.at(x, y)[1] = stripes.at(x, y)[2] = 0;
       }
     }
@@ -44,14 +39,11 @@ class Predict : public ProgramTest {
 };
 
 TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
-  EXPECT_EQ(Said("known.png").find("unlike"), std::string::npos);
+  ExpectNotIn(Said("known.png"), "unlike");
   const std::string said = Said("text.png");
-  for (const char* part :
-       {"text.png: unlike the ", " training images; expect a poor mesh (nearest: ", ", at 0.",
-        "; usual: 0."})
-    EXPECT_NE(said.find(part), std::string::npos) << said;
-  EXPECT_NE(Said("text.png", "r/checkpoints/step_00000001.safetensors").find("unlike"),
-            std::string::npos);
+  ExpectIn(said, "text.png: unlike the ",
+           " training images; expect a poor mesh (nearest: ", ", at 0.", "; usual: 0.");
+  ExpectIn(Said("text.png", "r/checkpoints/step_00000002.safetensors"), "unlike");
   // It needs no dataset.
   std::filesystem::rename(folder_ / "d", folder_ / "gone");
   const auto first_line = [](const std::string& text) { return text.substr(0, text.find('\n')); };
@@ -75,25 +67,21 @@ TEST_F(Predict, TakesPlainBackgroundsAway) {
   ASSERT_TRUE(io::SavePng(folder_ / "noise.png", noise).ok());
   const auto result = JsonOf(Said("wall.png --json"));
   EXPECT_EQ(result[0]["mesh"], In("out/wall_predicted.glb"));
-  const Outcome refused =
-      RunProgram("predict --run " + In("r") + " --out " + In("out") + " " + In("noise.png"));
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.output.find("the object is not cut out, and the background is not plain"),
-            std::string::npos)
-      << refused.output;
+  ExpectRefused("predict --run " + In("r") + " --out " + In("out") + " " + In("noise.png"), 2,
+                "the object is not cut out, and the background is not plain");
 }
 
 TEST_F(Predict, DoesItsWorkWithoutTheTrainingPictures) {
-  Write("r/thumbnails.npz", std::string("broken"));
+  Write("r/thumbnails.npz", "broken");
   const std::string said = Said("text.png");
-  EXPECT_NE(said.find("skipped: " + In("r/thumbnails.npz")), std::string::npos) << said;
+  ExpectIn(said, "skipped: " + In("r/thumbnails.npz"));
   std::filesystem::remove(folder_ / "r/thumbnails.npz");
-  EXPECT_EQ(Said("text.png").find("warning"), std::string::npos);
+  ExpectNotIn(Said("text.png"), "warning");
 }
 
 TEST_F(Predict, TheAnimationIsTheSameAgain) {
   const std::string said = Said("known.png");
-  EXPECT_NE(said.find("known_turntable.webp"), std::string::npos) << said;
+  ExpectIn(said, "known_turntable.webp");
   const Bytes first = ReadFile(folder_ / "out/known_turntable.webp").value();
   ASSERT_GT(first.size(), 1000u);
   EXPECT_EQ(std::string(first.begin(), first.begin() + 4), "RIFF");
@@ -163,17 +151,11 @@ TEST_F(Predict, WritesTheLightAndMovesIt) {
   const Bytes relit = ReadFile(folder_ / "out/known_relit.webp").value();
   EXPECT_EQ(std::string(relit.begin(), relit.begin() + 4), "RIFF");
   // Refined colours would hold the picture's light.
-  const Outcome refined = RunProgram("predict --refine 5 --force --run " + In("lit") + " --out " +
-                                     In("out") + " " + In("known.png"));
-  EXPECT_NE(refined.exit_code, 0);
-  EXPECT_NE(refined.output.find("use --refine 0"), std::string::npos) << refined.output;
+  const std::string rest = " --force --out " + In("out") + " " + In("known.png");
+  ExpectError("predict --refine 5 --run " + In("lit") + rest, "use --refine 0");
   // A run without light says so, before it draws anything.
-  const Outcome plain = RunProgram("predict --refine 0 --relight --force --run " + In("r") +
-                                   " --out " + In("out") + " " + In("known.png"));
-  EXPECT_NE(plain.exit_code, 0);
-  EXPECT_NE(plain.output.find("predicts no light; train one with --config texture_quick"),
-            std::string::npos)
-      << plain.output;
+  ExpectError("predict --refine 0 --relight --run " + In("r") + rest,
+              "predicts no light; train one with --config texture_quick");
 }
 
 }  // namespace tilegrad::predict_test

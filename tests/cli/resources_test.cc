@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program with too few file handles or too little memory, and stopped by signals: models are as
-// sound as they were.
+// The program with too few file handles, threads or too little memory, and stopped by signals:
+// models are as sound as they were.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <fstream>
 #include <thread>
 
@@ -15,6 +16,7 @@
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
+#include "support/process.h"
 #include "support/run_program.h"
 
 namespace tilegrad::resources_test {
@@ -41,8 +43,8 @@ class Resources : public ProgramTest {
   bool Make(const std::string& limit) {
     const Path out = folder_ / "out";
     const std::string arguments =
-        "dataset --source folder --workers 2 --size 16 --views 2 --input " +
-        (folder_ / "in").string() + " --out " + out.string();
+        "dataset --source folder --workers 2 --size 16 --views 2 --input " + In("in") + " --out " +
+        out.string();
     const Outcome outcome = RunProgram(arguments, limit + "; exec ");
     if (outcome.exit_code == 0) {
       EXPECT_NE(outcome.output.find("4 models"), std::string::npos) << limit << outcome.output;
@@ -107,16 +109,12 @@ class Signals : public ProgramTest {
       stl += "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 " + std::to_string(i) +
              "\nvertex 0 1 0\nendloop\nendfacet\n";
     }
-    const std::string file = Write("large.stl", stl + "endsolid x\n").string(),
-                      out = (folder_ / "out.png").string();
+    const std::string file = Write("large.stl", stl + "endsolid x\n").string();
     const std::size_t bytes = stl.size();
     std::string().swap(stl);  // a child has its parent's memory at first
-    const pid_t child = ::fork();
-    if (child == 0) {
-      ::execl(TILEGRAD_PROGRAM, TILEGRAD_PROGRAM, "render", file.c_str(), "--out", out.c_str(),
-              "--size", "4096", nullptr);
-      ::_exit(127);
-    }
+    const pid_t child =
+        StartProcess({TILEGRAD_PROGRAM, "render", file, "--out", In("out.png"), "--size", "4096"},
+                     folder_ / "said.txt");
     // Until it has the file. Sanitizers' own memory is large from the start on.
     while (ResidentBytes(child) < bytes || !Catches(child, signal)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -124,10 +122,9 @@ class Signals : public ProgramTest {
     }
     const auto start = std::chrono::steady_clock::now();
     ::kill(child, signal);
-    int status = 0;
-    EXPECT_EQ(::waitpid(child, &status, 0), child);
+    const int code = EndProcess(child);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), seconds.count()};
+    return {code, seconds.count()};
   }
 };
 
@@ -137,6 +134,49 @@ TEST_F(Signals, StopAReaderAtOnceWithTheirOwnCode) {
     EXPECT_EQ(got, code);
     EXPECT_LT(seconds, 2);
   }
+}
+
+// With support/few_threads.c as the system.
+class FewThreads : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (kSanitizer) GTEST_SKIP() << "LD_PRELOAD comes before the sanitizer";
+    Write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n");
+  }
+  void TearDown() override { unsetenv("LD_PRELOAD"); }
+
+  Outcome RunWith(int granted, const std::string& arguments) {
+    setenv("TILEGRAD_TEST_THREADS", std::to_string(granted).c_str(), 1);
+    setenv("LD_PRELOAD", TILEGRAD_FEW_THREADS, 1);
+    const Outcome outcome = RunProgram(arguments);
+    unsetenv("LD_PRELOAD");
+    return outcome;
+  }
+  // `command` with --workers 4 and no, one, two, all of the three threads: what it prints or, if it
+  // is named, the file that it writes is the same.
+  void ExpectSame(const std::string& command, const std::string& file = "") {
+    std::string all;
+    for (const int granted : {100, 0, 1, 2}) {
+      if (!file.empty())
+        std::filesystem::remove_all(folder_ / *std::filesystem::path(file).begin());
+      const Outcome outcome = RunWith(granted, command + " --workers 4");
+      EXPECT_EQ(outcome.exit_code, 0) << granted << ": " << outcome.output;
+      const std::string warning = "warning: the system refuses as many threads";
+      const auto at = outcome.output.find(warning);
+      EXPECT_EQ(at != std::string::npos, granted < 3) << granted << ": " << outcome.output;
+      EXPECT_EQ(outcome.output.rfind(warning), at) << "twice: " << outcome.output;
+      const std::string got = file.empty() ? "" : ReadText(folder_ / file).value();
+      if (granted == 100) all = got;
+      EXPECT_EQ(got, all) << granted;
+    }
+  }
+};
+
+TEST_F(FewThreads, MakeTheSameFiles) {
+  ExpectSame("render " + In("a.obj") + " --size 256 --out " + In("a.png"), "a.png");
+  ExpectSame("dataset --source procedural --per-class 1 --size 16 --views 2 --out " + In("data"),
+             "data/dataset.json");
+  ExpectSame("selftest --only 'same bits'");  // which makes workers of up to 7 itself
 }
 
 }  // namespace tilegrad::resources_test

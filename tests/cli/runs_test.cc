@@ -16,10 +16,9 @@ class Runs : public ProgramTest {
  protected:
   // Under --json, what it says.
   Json Done(const std::string& arguments) const {
-    const Outcome outcome = RunProgram(arguments + " --json");
-    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    const auto begin = outcome.output.find('{');
-    return begin == std::string::npos ? Json() : Json::parse(outcome.output.substr(begin));
+    const std::string outcome = ExpectDone(arguments + " --json");
+    const auto begin = outcome.find('{');
+    return begin == std::string::npos ? Json() : Json::parse(outcome.substr(begin));
   }
   Bytes Checkpoint(const std::string& run, const std::string& step) const {
     return ReadFile(folder_ / run / "checkpoints" / ("step_" + step + ".safetensors")).value();
@@ -28,9 +27,10 @@ class Runs : public ProgramTest {
     return "train --config " + In("tiny.toml") + " --data " + In("data") + " --out " + In(run);
   }
   void SetUp() override {
-    Write("tiny.toml", std::string("name = \"tiny\"\n[network]\nchannels = 4\ncode = 8\n"
-                                   "hidden1 = 8\nhidden2 = 8\ntemplate_level = 1\n[schedule]\n"
-                                   "batch = 2\nsteps = 3\ncheckpoint_every = 1\n"));
+    Write("tiny.toml",
+          "name = \"tiny\"\n[network]\nchannels = 4\ncode = 8\n"
+          "hidden1 = 8\nhidden2 = 8\ntemplate_level = 1\n[schedule]\n"
+          "batch = 2\nsteps = 3\ncheckpoint_every = 1\n");
   }
   void MakeData() const {
     Done("dataset --source procedural --per-class 3 --size 32 --views 2 --out " + In("data"));
@@ -50,8 +50,7 @@ TEST_F(Runs, GoOnFromTheirFolderAlone) {
   const Bytes a = Checkpoint("run", "00000003"), b = Checkpoint("whole", "00000003");
   EXPECT_TRUE(std::equal(a.end() - 1000, a.end(), b.end() - 1000));
   const Outcome said = RunProgram("train --resume " + In("run") + " --steps 4");
-  EXPECT_NE(said.output.find("tensorboard --logdir " + In("run")), std::string::npos)
-      << said.output;
+  ExpectIn(said.output, "tensorboard --logdir " + In("run"));
 }
 
 TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
@@ -62,7 +61,7 @@ TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
   const auto at = said.output.find(line);
   ASSERT_NE(at, std::string::npos) << said.output;
   EXPECT_EQ(said.output.find("sample sheet", at + 1), std::string::npos) << said.output;
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "run/samples/step_00000010.png"));
+  EXPECT_TRUE(Exists("run/samples/step_00000010.png"));
   const Outcome quiet = RunProgram(Start("quiet") + " --quiet");
   EXPECT_EQ(quiet.output.find("sample sheet"), std::string::npos) << quiet.output;
 }
@@ -92,7 +91,7 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train --resume", 2, "--config is required");
   ExpectRefused("train --config quick --data none --out " + In("c") + " --live=9000", 2,
                 "train: --live takes no value");
-  Write("run/config.toml", std::string("name = \"a\"\n"));
+  Write("run/config.toml", "name = \"a\"\n");
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
 
@@ -100,11 +99,10 @@ TEST_F(Runs, OfFitsGoOnWithoutAnyOption) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
   Done("views " + In("a.glb") + " --views 5 --held-out 0 --size 32 --out " + In("views"));
   const std::string in_folder = "cd " + folder_.string() + " && ";
-  const Outcome begun = RunProgram(
+  ExpectDone(
       "fit views --steps 4 --smoothing 3 --light-direction 1 0 0 --lighting lambert --rate "
       "positions=0.01,texture=0.02 --start sphere --hold-out 3 --out fit",
       in_folder);
-  ASSERT_EQ(begun.exit_code, 0) << begun.output;
   const std::string go_on = "fit --resume --out " + In("fit");
   const Json more = Done(go_on + " --steps 6");  // and from another folder
   EXPECT_EQ(more["steps"], 6);
@@ -168,12 +166,10 @@ TEST_F(Runs, HaveALivePage) {
   ExpectRefused(Start("run") + " --live", 3, "data");
   EXPECT_FALSE(PathExists(page));
   MakeData();
-  const Outcome done = RunProgram(Start("run") + " --live");
-  EXPECT_EQ(done.exit_code, 0) << done.output;
-  EXPECT_NE(done.output.find("live page: file://" + page.string()), std::string::npos);
+  ExpectIn(ExpectDone(Start("run") + " --live"), "live page: file://" + page.string());
   const std::string state = ReadText(script).value();
-  EXPECT_NE(state.find("\"finished\":true"), std::string::npos) << state;
-  EXPECT_TRUE(IsFile(folder_ / "run/live/mesh_00000003.js"));  // predicted
+  ExpectIn(state, "\"finished\":true");
+  EXPECT_TRUE(Exists("run/live/mesh_00000003.js"));  // predicted
   ExpectRefused(Start("run") + " --live", 2, "already holds a run");
   EXPECT_EQ(ReadText(script).value(), state);
   Done(Start("run") + " --force");
@@ -185,12 +181,12 @@ TEST_F(Runs, HaveALivePage) {
 }
 
 TEST_F(Runs, AreTheOnlyFoldersToLookAt) {
-  Write("photos/a.png", std::string("x"));
+  Write("photos/a.png", "x");
   for (const char* command : {"live ", "timelapse "}) {
     ExpectRefused(command + In("nope"), 3, "nope does not exist");
     ExpectRefused(command + In("photos"), 3, "photos: not the folder of a training or a fit");
   }
-  EXPECT_FALSE(PathExists(folder_ / "photos/live.html"));
+  EXPECT_FALSE(Exists("photos/live.html"));
 }
 
 }  // namespace tilegrad::runs_test

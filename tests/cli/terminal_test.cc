@@ -77,8 +77,7 @@ TEST_F(TerminalTest, CtrlCEndsAFitSoonAndSaysHowItGoesOn) {
     ASSERT_TRUE(fit.AwaitText(option.empty() ? "fitting" : "looking for cameras")) << fit.said();
     EXPECT_LT(fit.Interrupt(), kSoon);
     EXPECT_EQ(fit.Finish(), 130);
-    EXPECT_NE(fit.said().find("resume with: tilegrad fit --resume --out " + out), std::string::npos)
-        << fit.said();
+    ExpectIn(fit.said(), "resume with: tilegrad fit --resume --out " + out);
   }
   TerminalProgram again("fit --resume --out " + In("f0"), 200);
   ASSERT_TRUE(again.AwaitText("fitting")) << again.said();

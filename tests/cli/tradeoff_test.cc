@@ -13,14 +13,13 @@ namespace tilegrad::tradeoff_test {
 
 class TradeoffCommand : public ProgramTest {
  protected:
-  Outcome Run(const std::string& arguments) {
-    return RunProgram("tradeoff --out " + (folder_ / "out").string() + " " + arguments);
+  void SetUp() override {
+    Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
   }
-  std::string Out(const std::string& name) {
-    const auto text = ReadText(folder_ / "out" / name);
-    EXPECT_TRUE(text.ok()) << text.status().message();
-    return text.ok() ? *text : "";
+  std::string Tradeoff(const std::string& arguments) const {
+    return "tradeoff --out " + In("out") + " " + arguments;
   }
+  std::string Out(const std::string& name) { return Ok(ReadText(folder_ / "out" / name)).value(); }
 };
 
 std::vector<std::vector<std::string>> Cells(const std::string& csv) {
@@ -35,10 +34,8 @@ std::vector<std::vector<std::string>> Cells(const std::string& csv) {
 }
 
 TEST_F(TradeoffCommand, MeasuresAMeshFileAndWritesTableCsvAndPicture) {
-  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
-  const Outcome outcome = Run((folder_ / "tent.obj").string() +
-                              " --size 24 --errors 0,1e-2 --deltas 1e-3,1e-2 --repetitions 1");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ExpectDone(
+      Tradeoff(In("tent.obj") + " --size 24 --errors 0,1e-2 --deltas 1e-3,1e-2 --repetitions 1"));
   const auto rows = Cells(Out("tradeoff.csv"));
   ASSERT_EQ(rows.size(), 7u);
   EXPECT_EQ(rows[3][4], "the paper's rule");
@@ -53,22 +50,26 @@ TEST_F(TradeoffCommand, MeasuresAMeshFileAndWritesTableCsvAndPicture) {
     const double bound = std::stod(rows[i][4]), largest = std::stod(rows[i][8]);
     EXPECT_LE(largest, bound + 1e-5) << i;  // and rounding: docs/numerics.md
   }
-  EXPECT_NE(Out("tradeoff.md").find("tent, 2 faces"), std::string::npos);
+  ExpectIn(Out("tradeoff.md"), "tent, 2 faces");
   const std::string picture = Out("tradeoff.svg");
   EXPECT_EQ(picture.rfind("<svg", 0), 0u);
   EXPECT_GT(std::count(picture.begin(), picture.end(), '\n'), 10);
 }
 
-// The end of the line: a training for each error, scored on models that it did not see.
+// The end of the line: a training for each error, scored on models that it did not see. They pass
+// over a broken checkpoint aloud, as `tilegrad train` does, and go on from the one before.
 TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
-  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
-  const std::string data = (folder_ / "data").string();
+  auto config = Ok(ReadText(TILEGRAD_SOURCE_DIR "/configs/quick.toml"));
+  const std::string every = "checkpoint_every = ";
+  ASSERT_NE(config->find(every), std::string::npos);
+  Write("often.toml", config->replace(config->find(every), every.size() + 3, every + "1"));
+  const std::string data = In("data");
   ExpectDone("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
-  const Outcome outcome = Run(
-      (folder_ / "tent.obj").string() +
-      " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " + data +
-      " --training-errors 1e-3,1e-2 --steps 2 --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string study =
+      Tradeoff(In("tent.obj") + " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --force");
+  const std::string trainings =
+      " --training " + data + " --training-errors 1e-3,1e-2 --steps 2 --config " + In("often.toml");
+  ExpectDone(study + trainings);
   const auto rows = Cells(Out("training.csv"));
   ASSERT_EQ(rows.size(), 3u);
   EXPECT_EQ(rows[0][3], "mean_iou");
@@ -79,49 +80,20 @@ TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
     EXPECT_EQ(rows[i][1], "2");
     EXPECT_GT(std::stod(rows[i][3]), 0);
   }
-  EXPECT_NE(Out("tradeoff.md").find("### Training"), std::string::npos);
-  // Without trainings, the table of these is told from what is new.
-  const Outcome again = Run((folder_ / "tent.obj").string() +
-                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --force");
-  ASSERT_EQ(again.exit_code, 0) << again.output;
-  EXPECT_NE(again.output.find("training.csv is from an earlier call"), std::string::npos);
-}
-
-// They pass over a broken checkpoint aloud, as `tilegrad train` does, and go on from the one
-// before.
-TEST_F(TradeoffCommand, TrainingsWarnOfBrokenCheckpoints) {
-  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
-  auto config = ReadText(TILEGRAD_SOURCE_DIR "/configs/quick.toml");
-  ASSERT_TRUE(config.ok());
-  const std::string every = "checkpoint_every = ";
-  ASSERT_NE(config->find(every), std::string::npos);
-  Write("often.toml", config->replace(config->find(every), every.size() + 3, every + "1"));
-  const std::string data = (folder_ / "data").string();
-  ExpectDone("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
-  const std::string study = (folder_ / "tent.obj").string() +
-                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " +
-                            data + " --training-errors 1e-2 --steps 2 --config " +
-                            (folder_ / "often.toml").string();
-  const Outcome first = Run(study);
-  ASSERT_EQ(first.exit_code, 0) << first.output;
-  const std::string scores = Out("training.csv");
+  ExpectIn(Out("tradeoff.md"), "### Training");
   std::filesystem::resize_file(folder_ / "out/training_0.01/checkpoints/step_00000002.safetensors",
                                1000);
-  const Outcome again = Run(study + " --force");
-  ASSERT_EQ(again.exit_code, 0) << again.output;
-  EXPECT_NE(again.output.find("step_00000002.safetensors"), std::string::npos) << again.output;
-  // But for the seconds, the same.
-  const auto before = Cells(scores), after = Cells(Out("training.csv"));
-  for (const std::size_t column : {0u, 1u, 3u, 4u}) EXPECT_EQ(before[1][column], after[1][column]);
+  ExpectIn(ExpectDone(study + trainings), "step_00000002.safetensors");
+  const auto after = Cells(Out("training.csv"));  // but for the seconds, the same
+  for (const std::size_t column : {0u, 1u, 3u, 4u}) EXPECT_EQ(rows[2][column], after[2][column]);
+  // Without trainings, the table of these is told from what is new.
+  ExpectIn(ExpectDone(study), "training.csv is from an earlier call");
 }
 
 TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
   const auto refused = [&](const std::string& arguments, const std::string& part) {
-    const Outcome outcome = Run(arguments);
-    EXPECT_GT(outcome.exit_code, 0) << arguments;
-    EXPECT_LT(outcome.exit_code, 126) << arguments;
-    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "out")) << arguments;
+    ExpectError(Tradeoff(arguments), part);
+    EXPECT_FALSE(Exists("out")) << arguments;
   };
   refused("nowhere.obj", "nowhere.obj");
   refused("--errors 2", "--errors");
@@ -134,15 +106,9 @@ TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
   refused("--size 16", "mesh");
   // At once: of this command the measurements alone take hours.
   const std::string hours = "--repetitions 1000 --training ";
-  refused(hours + (folder_ / "nowhere").string(), "nowhere");
+  refused(hours + In("nowhere"), "nowhere");
   Write("flat.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
-  refused((folder_ / "flat.obj").string(), "flat.obj");
-}
-
-TEST_F(TradeoffCommand, HelpSaysUnits) {
-  const Outcome outcome = RunProgram("tradeoff --help");
-  EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_NE(outcome.output.find("delta"), std::string::npos);
+  refused(In("flat.obj"), "flat.obj");
 }
 
 }  // namespace tilegrad::tradeoff_test

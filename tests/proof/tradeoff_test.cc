@@ -5,6 +5,7 @@
 
 #include "scene/camera.h"
 #include "scene/shapes.h"
+#include "support/expect.h"
 
 namespace tilegrad::tradeoff_test {
 
@@ -30,8 +31,7 @@ const StopFlag kGo{false};
 
 TEST(Tradeoff, ErrorsStayBelowWhatIsReportedAndWhatIsAsked) {
   SphereJob sphere;
-  const auto result = MeasureTradeoff(sphere.job, {}, kGo);
-  ASSERT_TRUE(result.ok()) << result.status().message();
+  const auto result = Ok(MeasureTradeoff(sphere.job, {}, kGo));
   ASSERT_EQ(result->rows.size(), 4u);
   EXPECT_EQ(result->rows[3].rule, AlphaRule::kPaper);
   EXPECT_GT(result->rows[3].largest, 1e-3);  // it leaves out what is farther than its box
@@ -55,8 +55,7 @@ TEST(Tradeoff, ErrorsStayBelowWhatIsReportedAndWhatIsAsked) {
 TEST(Tradeoff, EvenlySpreadRowsStandForTheWholeImage) {
   SphereJob sphere;
   sphere.job.truth_pairs = 8 * 32 * 320;
-  const auto result = MeasureTradeoff(sphere.job, {}, kGo);
-  ASSERT_TRUE(result.ok());
+  const auto result = Ok(MeasureTradeoff(sphere.job, {}, kGo));
   EXPECT_EQ(result->truth_rows, 8);
   EXPECT_LT(result->rows[0].gradient_error, 1e-4);
 }
@@ -73,8 +72,7 @@ TEST(Tradeoff, RefusesWhatHasNoAnswer) {
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
   sphere.job.scene.camera = OrbitCamera({30.0, 32, 32}, 30, 20, -50);  // far behind the camera
   const auto nothing = MeasureTradeoff(sphere.job, {}, kGo);
-  EXPECT_NE(nothing.status().message().find("no gradient"), std::string::npos)
-      << nothing.status().message();
+  ExpectIn(nothing.status().message(), "no gradient");
 }
 
 }  // namespace tilegrad::tradeoff_test
