@@ -20,15 +20,6 @@ def pixel(camera, point):
     return np.array([camera.cx + camera.fx * p[0] / -p[2], camera.cy - camera.fy * p[1] / -p[2]])
 
 
-def random_cameras(count):
-    numbers = np.random.default_rng(7)
-    rotation = np.linalg.qr(numbers.normal(size=(count, 3, 3)))[0]
-    rotation *= np.sign(np.linalg.det(rotation))[:, None, None]
-    focal = numbers.uniform(200, 700, (2, count))
-    centre = numbers.uniform(200, 300, (2, count))
-    return Camera(rotation, numbers.normal(size=(count, 3)), *focal, *centre)
-
-
 class Conventions(unittest.TestCase):
     def expect(self, camera):
         np.testing.assert_allclose(pixel(camera, POINT), (245, 202.5), rtol=0, atol=1e-4)
@@ -72,10 +63,6 @@ class Conventions(unittest.TestCase):
         near = Camera.look_at((0, 0, 1 + 1e-9), (0, 0, 1), **SIZE)  # one point to float
         np.testing.assert_array_equal(near.rotation, np.eye(3))
 
-    def test_resize(self):
-        half = EXPECTED.resize(640, 480, 320, 240)
-        np.testing.assert_allclose(pixel(half, POINT), (122.5, 101.25), atol=1e-9)
-
 
 class Batches(unittest.TestCase):
     def test_leading_axes_are_broadcast(self):
@@ -100,7 +87,7 @@ class Batches(unittest.TestCase):
         self.assertEqual(EXPECTED.translation.tolist(), [-1, 0, -4])
 
     def test_views_write_through(self):
-        cameras = random_cameras(3)
+        cameras = Camera(translation=np.zeros((3, 3)), fx=[1, 2, 3])
         cameras.translation[1] += 1
         cameras.fx[2] = 9
         self.assertEqual(cameras.numbers[2, 12], 9)

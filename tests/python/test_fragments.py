@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tilegrad.fragments and tilegrad.compat.pytorch3d: PyTorch3D's lists of faces, against its rules
-written down once more in NumPy, and against the renderer."""
+"""tilegrad.fragments and tilegrad.compat.pytorch3d: PyTorch3D's lists of faces, against numbers by
+hand and against the renderer."""
 
 import unittest
 import warnings
@@ -13,54 +13,6 @@ from tilegrad import fragments
 
 if torch:
     from tilegrad.compat import pytorch3d
-
-
-def boundary_distance(corners, point):
-    """Squared, to the nearest of three segments."""
-    distances = []
-    for k in range(3):
-        a, edge = corners[k, :2], corners[(k + 1) % 3, :2] - corners[k, :2]
-        along = np.clip((point - a) @ edge / (edge @ edge), 0, 1)
-        distances.append(np.sum((point - a - along * edge)**2))
-    return min(distances)
-
-
-def weights_at(corners, point, perspective, clip):
-    """Barycentrics, those that are given out, and whether the point is inside."""
-    lifted = np.column_stack([corners[:, :2], np.ones(3)])
-    weights = np.linalg.solve(lifted.T, np.append(point, 1))
-    if perspective:
-        weights = weights / corners[:, 2]
-        weights = weights / max(weights.sum(), 1e-8)
-    inside = (weights > 0).all()
-    if clip:
-        weights = np.maximum(weights, 0)
-        weights = weights / max(weights.sum(), 1e-5)
-    return weights, inside
-
-
-def naive(faces, first, height, width, layers, blur, perspective, clip):
-    """For one image: every face for every pixel."""
-    shape = (height, width, layers)
-    out = fragments.Fragments(np.full(shape, -1), np.full(shape, -1.), np.full((*shape, 3), -1.),
-                              np.full(shape, -1.))
-    shorter = min(height, width)
-    for i in range(height):
-        for j in range(width):
-            point = np.array([width - 2 * j - 1, height - 2 * i - 1]) / shorter
-            found = []
-            for f, corners in enumerate(faces):
-                if corners[:, 2].min() < 1e-8:
-                    continue
-                weights, inside = weights_at(corners, point, perspective, clip)
-                distance, z = boundary_distance(corners, point), weights @ corners[:, 2]
-                if z >= 0 and (inside or distance < blur):
-                    found.append((z, first + f, weights, -distance if inside else distance))
-            for k, (z, f, weights, distance) in enumerate(sorted(found, key=lambda e: e[:2])):
-                if k < layers:
-                    out.pix_to_face[i, j, k], out.zbuf[i, j, k] = f, z
-                    out.bary_coords[i, j, k], out.dists[i, j, k] = weights, distance
-    return out
 
 
 def random_faces(count=20, seed=0, dtype=np.float64):
@@ -174,22 +126,43 @@ class Meshes:
         return torch.arange(self.images) * (len(self.corners) // self.images)
 
 
+def triangle():
+    return torch.tensor([[[0.5, -0.5, 1], [-0.5, -0.5, 2], [0, 0.5, 4]]]).double()
+
+
 @needs_torch
 class RasterizeMeshes(unittest.TestCase):
-    def test_is_the_naive_one(self):
-        corners = random_faces(24)
-        for size in ((9, 14), (14, 9)):
-            for blur, perspective, clip in ((0, True, False), (0.03, True, True),
-                                            (0.03, False, False), (0.03, False, True)):
-                got = pytorch3d.rasterize_meshes(
-                    Meshes(torch.from_numpy(corners), 2), size, blur, 5,
-                    perspective_correct=perspective, clip_barycentric_coords=clip)
-                for n in range(2):
-                    expected = naive(corners[12 * n:12 * n + 12], 12 * n, *size, 5, blur,
-                                     perspective, clip)
-                    np.testing.assert_array_equal(got[0][n], expected.pix_to_face)
-                    for a, b in zip(got[1:], expected[1:]):
-                        np.testing.assert_allclose(a[n], b, rtol=1e-5, atol=1e-6)
+    def test_numbers_by_hand(self):
+        """What each option changes, at one pixel under a triangle of sides 1; all else of it is
+        tests/compat/pytorch3d/'s."""
+        corners = triangle()
+
+        def pixel(height=1, width=1, **options):
+            got = pytorch3d.rasterize_meshes(Meshes(corners), (height, width), faces_per_pixel=2,
+                                             **options)
+            self.assertEqual(got[0][0, 0, 0].tolist(), [0, -1])
+            for missing in got[1:]:
+                self.assertTrue((missing[0, 0, 0, 1] == -1).all())
+            return [float(got[1][0, 0, 0, 0]), *got[2][0, 0, 0, 0].tolist(),
+                    float(got[3][0, 0, 0, 0])]
+
+        near = -0.05  # the squared distance to a side, inside
+        np.testing.assert_allclose(pixel(), [2.75, 0.25, 0.25, 0.5, near], rtol=1e-6)
+        np.testing.assert_allclose(pixel(perspective_correct=True), [2, 0.5, 0.25, 0.25, near],
+                                   rtol=1e-6)
+        corners[..., 1] -= 0.75  # the pixel is as far above
+        outside = {"blur_radius": 0.07}
+        np.testing.assert_allclose(pixel(**outside), [4.625, -0.125, -0.125, 1.25, 0.0625],
+                                   rtol=1e-6)
+        np.testing.assert_allclose(pixel(clip_barycentric_coords=True, **outside),
+                                   [4, 0, 0, 1, 0.0625], rtol=1e-6, atol=1e-9)
+
+    def test_images_have_rows_columns_and_faces_of_their_own(self):
+        meshes = Meshes(torch.cat([triangle(), triangle() + torch.tensor([2., 0, 0])]), 2)
+        ids = pytorch3d.rasterize_meshes(meshes, (1, 3), faces_per_pixel=1)[0]
+        self.assertEqual(ids[..., 0].tolist(), [[[-1, 0, -1]], [[1, -1, -1]]])
+        ids = pytorch3d.rasterize_meshes(meshes, (3, 1), faces_per_pixel=1)[0]
+        self.assertEqual(ids[..., 0].tolist(), [[[-1], [0], [-1]], [[-1]] * 3])
 
     def test_gradcheck(self):
         corners = torch.from_numpy(random_faces(8, seed=2)).requires_grad_()

@@ -267,29 +267,21 @@ class Graphs(unittest.TestCase):
         self.assertTrue(torch.equal(functional.jacobian(loss, start),
                                     self.gradient(loss(self.positions))))
 
-    def test_mesh_from_a_file(self):
+    def test_meshes_of_files(self):
+        """With textures, and without: scene_arguments has None for what a mesh lacks."""
         from file_samples import textured_mesh
-        mesh = textured_mesh()
-        positions = torch.tensor(mesh.positions, requires_grad=True)
-        images = tg.render(positions, mesh.faces, Camera(translation=(0, 0, -3), fx=12, fy=12,
-                                                         cx=8, cy=8),
-                           width=16, height=16, delta=1e-2, **mesh.scene_arguments())
-        self.assertGreater(float(images.color[0, 2].max()), 0.9)
-        images.alpha.sum().backward()
-        self.assertGreater(float(positions.grad.abs().max()), 0)
-
-    def test_mesh_of_a_file_without_textures(self):
-        """scene_arguments has None for what the mesh lacks."""
         from tilegrad import files
         positions, faces = tilegrad.icosphere(1, 0.5)
-        mesh = files.Mesh(positions, faces, colors=positions + 0.5)
-        self.assertIsNone(mesh.scene_arguments()["textures"])
-        positions = torch.tensor(positions, requires_grad=True)
-        images = tg.render(positions, mesh.faces, Camera(translation=(0, 0, -2), fx=12, fy=12,
-                                                         cx=8, cy=8),
-                           width=16, height=16, delta=1e-2, **mesh.scene_arguments())
-        images.alpha.sum().backward()
-        self.assertGreater(float(positions.grad.abs().max()), 0)
+        for mesh, distance in ((textured_mesh(), 3),
+                               (files.Mesh(positions, faces, colors=positions + 0.5), 2)):
+            positions = torch.tensor(mesh.positions, requires_grad=True)
+            view = Camera(translation=(0, 0, -distance), fx=12, fy=12, cx=8, cy=8)
+            images = tg.render(positions, mesh.faces, view, width=16, height=16, delta=1e-2,
+                               **mesh.scene_arguments())
+            if mesh.textures:
+                self.assertGreater(float(images.color[0, 2].max()), 0.9)
+            images.alpha.sum().backward()
+            self.assertGreater(float(positions.grad.abs().max()), 0)
 
 
 @needs_torch
