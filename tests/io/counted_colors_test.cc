@@ -3,7 +3,6 @@
 // materials, in each format. And what no reader may do with others.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 

@@ -3,7 +3,6 @@
 // is left out.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "io/image_file.h"

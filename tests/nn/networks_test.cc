@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <map>
-#include <memory>
 
 #include "nn/game.h"
 #include "nn/gradient_check.h"

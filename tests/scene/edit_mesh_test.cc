@@ -7,7 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
-#include <map>
 #include <numbers>
 
 #include "base/rng.h"

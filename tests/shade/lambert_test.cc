@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "shade/lambert_ref.h"
 
 namespace tilegrad::shade::lambert_test {

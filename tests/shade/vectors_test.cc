@@ -3,7 +3,6 @@
 // lookups, spherical harmonics, Phong and Lambert.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <numbers>
 
 #include "shade/combine_ref.h"

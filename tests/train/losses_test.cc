@@ -3,8 +3,6 @@
 // numbers where they are at hand.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "gradient_check.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "base/rng.h"
 #include "nn/gradient_check.h"
 #include "nn/nn.h"

@@ -5,10 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <string>
 
 #include "raster/soft_mask/checks.h"

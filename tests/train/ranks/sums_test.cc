@@ -2,8 +2,6 @@
 // Sums over portions have the same bits, whoever holds the portions.
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "thread_ranks.h"
