@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/alpha/paper.h"
+// Alpha by the truncated rule of the paper's implementations (AlphaRule::kPaper,
+// raster/soft_mask/paper_ref.h): for comparisons, so scalar code. Alpha is 1 in the foreground.
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "raster/bin.h"
 #include "raster/project_ref.h"
+#include "render/alpha/paper_bin.h"
+#include "render/alpha/stage.h"
 #include "render/pipeline/frame_layout.h"
 
 namespace tilegrad {
@@ -38,7 +45,31 @@ void AddCamera(const Camera& b, Camera* a) {
   a->cy += b.cy;
 }
 
-}  // namespace
+// Sums its gradients by itself, tile after tile of the image.
+class PaperAlpha final : public AlphaStage {
+ public:
+  AlphaNeeds needs() const override { return {.bounded = false, .own_sums = true}; }
+  const char* name() const override { return "the paper's truncated rule"; }
+  void Begin(const RenderOptions& options, std::size_t images) override;
+  void Prepare(std::size_t n, const ImageScratch& image) override;
+  double Forward(const AlphaBin& bin, const AlphaImages& out) override;
+  void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) override;
+  void AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& image,
+                  PipelineGradients* d_scene) const override;
+
+ private:
+  // The faces that take part, in their order, and the gradients of those near the tiles of a bin.
+  struct Image {
+    std::vector<std::int32_t> ids;  // of the mesh
+    std::vector<raster::NdcFace<float>> faces;
+    std::vector<std::vector<NearFacesT<float>>> bins;
+  };
+
+  PaperRegion RegionOf(const AlphaBin& bin, std::span<const std::int32_t> face_ids) const;
+
+  const RenderOptions* options_ = nullptr;
+  std::vector<Image> images_;
+};
 
 void PaperAlpha::Begin(const RenderOptions& options, std::size_t images) {
   options_ = &options;
@@ -101,5 +132,9 @@ void PaperAlpha::AddToScene(const PipelineScene& scene, std::size_t n, const Ima
   }
   if (d_scene->camera) AddCamera(d_camera, &d_scene->d_camera);
 }
+
+}  // namespace
+
+std::unique_ptr<AlphaStage> MakePaperAlpha() { return std::make_unique<PaperAlpha>(); }
 
 }  // namespace tilegrad

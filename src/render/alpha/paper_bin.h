@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rule of raster/soft_mask/paper_ref.h, tile by tile: only faces near a tile are looked at, in
 // their order, so the result is that of all of them. Scalar; T: float, double. It serves the
-// renderer (paper.h) and faces that come projected (compat/kaolin/projected_soft_mask.h).
+// renderer (paper.cc) and faces that come projected (compat/kaolin/projected_soft_mask.h).
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,19 @@
 #include "raster/bin.h"
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask/paper_ref.h"
+#include "tilegrad/options.h"
 
 namespace tilegrad {
+
+// 1 / delta, but no more than float can multiply by: the kernel is as sharp as pixels are long
+// before, and infinity times the distance 0 is no number.
+inline double InverseDelta(double delta) { return std::min(1 / delta, 1e30); }
+
+inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
+  return {.inverse_delta = InverseDelta(options.delta),
+          .box = options.paper_box,
+          .max_faces = options.paper_faces};
+}
 
 // Pixels to NDC.
 template <class T>

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "raster/soft_mask/setup.h"
@@ -74,5 +75,9 @@ class AlphaStage {
   // What was evaluated in this call.
   virtual raster::SoftWork work() const { return {}; }
 };
+
+// The rules: AlphaRule::kAllFaces, with scratch for each of so many workers, and kPaper.
+std::unique_ptr<AlphaStage> MakeAllFacesAlpha(std::size_t workers);
+std::unique_ptr<AlphaStage> MakePaperAlpha();
 
 }  // namespace tilegrad

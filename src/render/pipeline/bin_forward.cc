@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/bin_forward.h"
-
 #include <algorithm>
 #include <cstddef>
 #include <limits>
@@ -9,6 +7,7 @@
 #include "base/prefetch.h"
 #include "raster/conventions.h"
 #include "render/pipeline/frame_layout.h"
+#include "render/pipeline/stages.h"
 
 namespace tilegrad {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/merge_gradients.h"
-
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
@@ -8,6 +6,7 @@
 #include "raster/project.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/quick_checks.h"
+#include "render/pipeline/stages.h"
 
 namespace tilegrad {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/part_backward.h"
-
 #include <algorithm>
 #include <cstddef>
 
@@ -9,6 +7,7 @@
 #include "raster/visibility_ref.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/quick_checks.h"
+#include "render/pipeline/stages.h"
 
 namespace tilegrad {
 namespace {

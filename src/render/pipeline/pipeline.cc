@@ -6,17 +6,13 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "base/clocks.h"
-#include "render/alpha/rules.h"
-#include "render/pipeline/bin_forward.h"
 #include "render/pipeline/frame_layout.h"
-#include "render/pipeline/merge_gradients.h"
-#include "render/pipeline/part_backward.h"
-#include "render/pipeline/pixel_stage.h"
-#include "render/pipeline/prepare.h"
+#include "render/pipeline/stages.h"
 #include "render/pipeline/validate.h"
 
 namespace tilegrad {
@@ -66,7 +62,8 @@ Status FindError(const BackwardCall& call) {
 struct Pipeline::Impl {
   explicit Impl(const Workers& w)
       : workers(&w),
-        alpha_rules(static_cast<std::size_t>(w.count())),
+        all_faces(MakeAllFacesAlpha(static_cast<std::size_t>(w.count()))),
+        paper(MakePaperAlpha()),
         worker_scratch(static_cast<std::size_t>(w.count())) {
     for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
   }
@@ -105,13 +102,16 @@ struct Pipeline::Impl {
     sound = topologies.Update(scenes, *workers);
     return sound;
   }
+  AlphaStage* RuleOf(AlphaRule rule) const {
+    return rule == AlphaRule::kPaper ? paper.get() : all_faces.get();
+  }
   void Require(bool holds) {
     if (!holds) sound = false;
   }
 
   const Workers* workers;
   std::atomic<bool> sound = true;  // false: some task met a number that is an error
-  AlphaRules alpha_rules;
+  std::unique_ptr<AlphaStage> all_faces, paper;
   AlphaStage* alpha = nullptr;  // of the last call; null: no alpha
   Topologies topologies;
   std::vector<ImageScratch> images;
@@ -311,7 +311,7 @@ Status Pipeline::Render(std::span<const PipelineScene> scenes, const RenderOptio
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  AlphaStage* const alpha = request.alpha ? impl_->alpha_rules.Of(options.alpha_rule) : nullptr;
+  AlphaStage* const alpha = request.alpha ? impl_->RuleOf(options.alpha_rule) : nullptr;
   const bool transmittance = alpha != nullptr && alpha->needs().transmittance;
   frame->transmittance.resize(transmittance ? frame->alpha.size() : 0);
   return impl_->Render({scenes, options, {true, alpha, false}, frame, stage});
@@ -322,8 +322,7 @@ Status Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOpt
                           std::span<PipelineGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
-  AlphaStage* const alpha =
-      d_frame.alpha.empty() ? nullptr : impl_->alpha_rules.Of(options.alpha_rule);
+  AlphaStage* const alpha = d_frame.alpha.empty() ? nullptr : impl_->RuleOf(options.alpha_rule);
   return impl_->Backward({scenes,
                           {options, frame, d_frame, stage, alpha},
                           {false, alpha, true},

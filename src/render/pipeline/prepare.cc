@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/prepare.h"
-
 #include <algorithm>
 #include <cstring>
 
 #include "raster/project.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/quick_checks.h"
+#include "render/pipeline/stages.h"
 
 namespace tilegrad {
 namespace {

@@ -5,8 +5,9 @@
 
 #include "base/clocks.h"
 #include "raster/conventions.h"
-#include "render/pipeline/part_backward.h"
+#include "raster/conventions.h"
 #include "render/pipeline/quick_checks.h"
+#include "render/pipeline/stages.h"
 #include "render/shading/uv_level.h"
 
 namespace tilegrad {

@@ -2,8 +2,6 @@
 // AlphaRule::kPaper through the Renderer: the reference in double, and that it is what it says it
 // is (cut off, and dependent on the order of the faces). Golden numbers:
 // raster/soft_mask/paper_test.cc.
-#include "render/alpha/paper.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

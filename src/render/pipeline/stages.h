@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stages that a Pipeline composes (pipeline.cc): an image is prepared, scene -> screen -> bins;
+// its bins are drawn, interpolated and given their alpha; on the way back its bands of rows and its
+// bins are taken to faces, and their sums to the scene. A stage knows one image, or a part of one.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "render/alpha/stage.h"
+#include "render/pipeline/image_scratch.h"
+#include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
+#include "render/pipeline/work.h"
+
+namespace tilegrad {
+
+struct PrepareRequest {
+  bool drawn_bins = true;       // visibility will run
+  AlphaStage* alpha = nullptr;  // alpha or its gradient will run, by this rule
+  bool reuse = false;           // what was prepared last, if it was for the same scene and options
+};
+
+struct SceneToPrepare {
+  std::size_t n;  // of the batch
+  const PipelineScene& scene;
+  const Topology& topology;  // of its faces
+};
+
+// Returns false, and prepares nothing, if a number of the scene is not finite or out of range.
+bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
+                  const PrepareRequest& request, const Workers& workers, ImageScratch* image,
+                  RenderStats* stats);
+
+// The attributes that a stage needs again on the way back; null: none. `image` is prepared.
+void PrepareRecomputed(const PixelStage* stage, const PipelineScene& scene, std::size_t n,
+                       ImageScratch* image);
+
+// What the bins of an image have in common.
+struct BinInput {
+  const PipelineScene& scene;
+  const RenderOptions& options;
+  const ImageScratch& image;
+  PixelStage* stage;  // null: attributes are images themselves
+  AlphaStage* alpha;  // null: not wanted
+};
+
+// Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
+// task.bin and task.rect are those of raster::BinGrid.
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker,
+                 PipelineFrame* frame);
+
+// The bands of an image: whole rows, so that faces are cut seldom; short enough to share one large
+// image among workers. They depend on the size of the image only.
+struct BandGrid {
+  int width, height, rows;  // pixels; a band has `rows` rows, the last may have fewer
+
+  BandGrid(int w, int h) : width(w), height(h), rows(std::clamp(kBandPixels / w, 16, 64)) {}
+  std::size_t count() const { return static_cast<std::size_t>((height + rows - 1) / rows); }
+
+ private:
+  static constexpr int kBandPixels = 1 << 15;
+};
+
+// What a task of the backward pass reads.
+struct BackwardInput {
+  const RenderOptions& options;
+  const PipelineFrame& frame;
+  const PipelineCotangents& d_frame;
+  PixelStage* stage;  // null: cotangents of attributes are images themselves
+  AlphaStage* alpha;  // null: alpha has no gradient
+};
+
+// One band of one image of the batch.
+struct BandTask {
+  std::size_t image, band;
+};
+
+// Gradients of the faces seen in a band, through their attributes. Returns false, and does nothing
+// else, if a number of the frame or its gradients in the band is not finite or out of range.
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
+                        BandGradients* out);
+
+// Gradients of faces through the alpha of a bin, with a rule.
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
+                       WorkerScratch* worker, BinGradients* out);
+
+// Merging makes sums in the order of bands, bins and their faces, whoever computed them.
+
+// The gradients of an image, one span per kind of part; empty where that part of the image has no
+// gradient.
+struct ImageGradients {
+  std::span<const BandGradients> bands;
+  std::span<const BinGradients> bins;
+  raster::BackwardRequest request;  // what the bands were asked for
+};
+
+// Overwrites d_vertices [V][4], d_x, d_y, d_inverse_depth, 0 of the vertices of the screen mesh,
+// with what the bands and bins that are given add up to. Nothing but the image is shared with
+// others.
+void SumGeometry(const ImageScratch& image, const ImageGradients& gradients,
+                 AlignedVector<float>* d_vertices);
+
+// From such sums of all bands and bins: overwrites d_scene's positions and d_camera, where they are
+// wanted. Returns whether all that it has written is finite.
+bool MergeGeometry(const PipelineScene& scene, const RenderOptions& options,
+                   const ImageScratch& image, const ImageGradients& gradients,
+                   std::span<const float> d_vertices, WorkerScratch* worker,
+                   PipelineGradients* d_scene);
+
+// Whether what was written of positions and the camera is finite.
+bool IsFiniteGeometry(const PipelineGradients& d_scene);
+
+// Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
+// MergeGeometry, since attributes at the cut depend on geometry.
+bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
+                     WorkerScratch* worker, PipelineGradients* d_scene);
+
+}  // namespace tilegrad
