@@ -19,11 +19,10 @@ using SeenKinds = std::map<std::string, int>;
 void CheckComplexStep(const SceneRecipe& recipe, std::uint64_t seed, SeenKinds* seen) {
   test::Trial trial(recipe, seed);
   if (!trial.seen) return;
-  const RenderOptions options = test::TrialOptions();
-  const Outputs request = test::EveryImage();
-  const SlopeProblem problem{trial.scene, options, request, trial.ids, trial.d_frame};
+  const SlopeProblem problem{trial.scene, trial.options, trial.images, trial.ids, trial.d_frame};
   auto scene = OwnedCast<double>(trial.scene);
-  OwnedScene<double> gradients = OwnedRefBackward<double>(scene, options, trial.d_frame, trial.ids);
+  OwnedScene<double> gradients =
+      OwnedRefBackward<double>(scene, trial.options, trial.d_frame, trial.ids);
 
   std::map<std::string, std::vector<double>> values;  // of the gradient
   ForEachNumber(gradients, [&](const char* name, double& d) { values[name].push_back(d); });

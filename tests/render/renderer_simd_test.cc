@@ -23,13 +23,12 @@ struct Rendered {
 
 Rendered RenderBoth(Trial& trial) {
   Rendered out;
-  const RenderOptions options = test::TrialOptions();
   const Workers workers(2);
-  const Status status = RenderOwned(trial.scene, options, test::EveryImage(),
+  const Status status = RenderOwned(trial.scene, trial.options, trial.images,
                                     trial.d_frame.Cast<float>(), workers, &out.got);
   EXPECT_TRUE(status.ok()) << status.message();
   auto scene64 = OwnedCast<double>(trial.scene);
-  out.truth = RenderOwnedRef<double>(scene64, options, test::EveryImage(), trial.d_frame,
+  out.truth = RenderOwnedRef<double>(scene64, trial.options, trial.images, trial.d_frame,
                                      out.got.frame.face_ids);
   return out;
 }
@@ -83,9 +82,12 @@ struct Tally {
   std::map<std::string, int> seen;  // scenes in which a number of the kind is not 0
 };
 
-// A weight errs by 16 eps W + 1e-5 (renderer_test.cc), a gradient by eight times that, relative to
-// its largest entry: 3e-4 here. Shading multiplies an error at most by the shininess (12) or the
-// texels of a side (6), but of one factor among several: three times are allowed.
+// Screen coordinates are sums and products of a handful of floats of the size of the image, W: they
+// err by about 4 eps W pixels, which moves a weight of a face of a quarter of a pixel in height by
+// 16 eps W; 1e-5 more is for the few operations on weights. A gradient has one weight and one
+// 1/height more and errs by eight times that, relative to its largest entry: 3e-4 here. Shading
+// multiplies an error at most by the shininess (12) or the texels of a side (6), but of one factor
+// among several: three times are allowed.
 constexpr double kTolerance = 1e-3;
 
 void Check(const SceneRecipe& recipe, std::uint64_t seed, Tally* tally) {

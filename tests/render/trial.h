@@ -44,8 +44,11 @@ inline Outputs EveryImage() {
   return request;
 }
 
+// One in four interpolates on the screen, where depth has no gradient.
 struct Trial {
   OwnedScene<float> scene;
+  RenderOptions options = TrialOptions();
+  Outputs images = EveryImage();
   std::vector<std::int32_t> ids;
   OwnedCotangents<double> d_frame;
   bool seen = false;
@@ -55,6 +58,11 @@ struct Trial {
     scene = RandomScene(recipe, kTrialWidth, kTrialHeight, &rng);
     ids = FaceIdsRef<float>(scene.mesh.View(), TrialOptions(), {0, kTrialHeight});
     d_frame = OwnedCotangents<double>(kTrialPixels, 2, &rng);
+    if (seed % 4 == 0) {
+      options.interpolation = Interpolation::kScreenLinear;
+      images.depth = false;
+      d_frame.depth.clear();
+    }
     if (scene.uvs.empty()) std::fill(d_frame.uv.begin(), d_frame.uv.end(), 0.0);
     for (const std::int32_t id : ids) seen |= id >= 0;
   }
