@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward and backward of whole batches beside two references in the same process: the plain
-// program with boxes (culled.h) and the naive one (pipeline_ref.h), on synthetic scenes and on real
+// program with boxes (culled.h) and the naive one (reference.h), on synthetic scenes and on real
 // furniture; and how time grows. `bench_report` makes tables and curves of the JSON.
 //
 // Names: scene/direction/what/who, who being a number of workers, `1-default` (one worker, the

@@ -8,7 +8,7 @@
 
 #include "raster/work_count.h"
 #include "render/pipeline/pipeline.h"
-#include "render/pipeline/pipeline_ref.h"
+#include "render/reference.h"
 
 namespace tilegrad::bench {
 namespace {
@@ -126,24 +126,38 @@ void CulledBackwardRun(benchmark::State& state, const RunSpec& spec) {
   for (auto _ : state) culled.Backward(PartsOf(spec));
 }
 
+Scene FirstScene(const BenchBatch& batch) {
+  const PipelineScene& first = batch.scenes[0];
+  return {.positions = first.positions,
+          .faces = first.faces,
+          .camera = first.camera,
+          .attributes = {first.attributes, first.rate},
+          .channels = first.channels};
+}
+
 void NaiveForward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
-  PipelineFrame frame;
+  const Scene scene = FirstScene(batch);
+  const Outputs request{.color = false, .alpha = spec.alpha, .attributes = spec.color};
+  FrameImages frame;
   for (auto _ : state) {
-    const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
-    RenderRefWithFaces<float>(batch.scenes[0], batch.options, RequestOf(spec), ids, rows, &frame);
+    const auto ids = FaceIdsRef(scene, batch.options, rows);
+    ReferenceRender(scene, batch.options, request, ids, &frame, rows);
   }
 }
 
 void NaiveBackward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
-  const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
-  const PipelineCotangents d_frame = CotangentsOf(spec, batch);
+  const Scene scene = FirstScene(batch);
+  const auto ids = FaceIdsRef(scene, batch.options, rows);
+  const PipelineCotangents d_images = CotangentsOf(spec, batch);
+  const FrameGradients d_frame{.alpha = d_images.alpha, .attributes = d_images.attributes};
+  SceneGradients d_scene{.positions = batch.d_positions[0]};
+  d_scene.attributes = batch.d_colors[0];
   for (auto _ : state) {
-    RenderRefBackward<float>(batch.scenes[0], batch.options, ids, d_frame, rows,
-                             &batch.d_scenes[0]);
+    ReferenceRenderBackward(scene, batch.options, ids, d_frame, d_scene, rows);
   }
 }
 

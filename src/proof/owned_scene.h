@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "render/engine.h"
-#include "render/pipeline/records.h"
 #include "render/reference.h"
+#include "render/renderer.h"
+#include "render/scene_fields.h"
 #include "scene/camera.h"
 #include "tilegrad/renderer.h"
 
@@ -29,7 +29,13 @@ struct OwnedMesh {
   Rate rate = Rate::kVertex;
   CameraT<T> camera;
 
-  PipelineSceneT<T> View() const { return {positions, faces, attributes, channels, rate, camera}; }
+  SceneT<T> View() const {
+    return {.positions = positions,
+            .faces = faces,
+            .camera = camera,
+            .attributes = {attributes, rate},
+            .channels = channels};
+  }
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t face_count() const { return faces.size() / 3; }
 };
@@ -71,21 +77,18 @@ struct OwnedScene {
     for (const auto& t : textures) {
       texture_views.push_back({t.texels, t.width, t.height, t.wrap, t.filter});
     }
-    return {.positions = mesh.positions,
-            .faces = mesh.faces,
-            .camera = mesh.camera,
-            .colors = {colors, colors_rate},
-            .uvs = {uvs, uvs_rate},
-            .normals = {normals, normals_rate},
-            .textures = texture_views,
-            .surfaces = surfaces,
-            .face_surfaces = face_surfaces,
-            .shading = shading,
-            .lights = lights,
-            .light_directions = light_directions,
-            .sh = sh,
-            .attributes = {mesh.attributes, mesh.rate},
-            .channels = mesh.channels};
+    SceneT<T> out = mesh.View();
+    out.colors = {colors, colors_rate};
+    out.uvs = {uvs, uvs_rate};
+    out.normals = {normals, normals_rate};
+    out.textures = texture_views;
+    out.surfaces = surfaces;
+    out.face_surfaces = face_surfaces;
+    out.shading = shading;
+    out.lights = lights;
+    out.light_directions = light_directions;
+    out.sh = sh;
+    return out;
   }
 };
 
@@ -210,7 +213,7 @@ struct OwnedCotangents {
 };
 
 // The images of an owned scene and the gradients of the sum of images times cotangents, by the
-// Engine and by the reference.
+// Renderer and by the reference.
 
 template <class T>
 struct OwnedRendering {
@@ -218,15 +221,36 @@ struct OwnedRendering {
   OwnedScene<T> d;  // gradients
 };
 
+// A copy of images.
+template <class T>
+FrameImagesT<T> OwnedImages(const ImagesT<T>& images) {
+  FrameImagesT<T> out;
+  out.images = images.count;
+  out.height = images.height;
+  out.width = images.width;
+  out.channels = images.channels;
+  out.face_ids.assign(images.face_ids.begin(), images.face_ids.end());
+  ForEachOutput(
+      images.channels,
+      [](const char*, int, AlignedVector<T>& to, std::span<const T> from) {
+        to.assign(from.begin(), from.end());
+      },
+      out, images);
+  out.alpha_error_bound = images.alpha_error_bound;
+  return out;
+}
+
 inline Status RenderOwned(OwnedScene<float>& scene, const RenderOptions& options,
                           const Outputs& request, const OwnedCotangents<float>& d_frame,
                           const Workers& workers, OwnedRendering<float>* out) {
-  Engine engine(workers);
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
   const Scene view = scene.View();
-  TILEGRAD_TRY(engine.Render({&view, 1}, options, request, &out->frame));
+  TILEGRAD_TRY(renderer.Render({&view, 1}, options, request, &frame));
+  out->frame = OwnedImages(frame.images());
   OwnedGradients<float> gradients(scene);
   const SceneGradients d_scene = gradients.View();
-  TILEGRAD_TRY(engine.Backward({&view, 1}, options, out->frame, d_frame.View(), {&d_scene, 1}));
+  TILEGRAD_TRY(renderer.Backward(frame, d_frame.View(), {&d_scene, 1}));
   out->d = gradients.d;
   return {};
 }

@@ -6,11 +6,13 @@
 #include <ctime>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "base/error.h"
 #include "base/rng.h"
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/pipeline_ref.h"
+#include "render/mesh_ref.h"
+#include "render/renderer.h"
+#include "scene/camera.h"
 
 namespace tilegrad {
 namespace {
@@ -52,7 +54,7 @@ std::vector<int> SpreadRows(const TradeoffJob& job, std::size_t faces) {
 class Measurement {
  public:
   Measurement(const TradeoffJob& job, const ProgressSink& progress, const StopFlag& stop)
-      : job_(job), progress_(progress), stop_(stop), renderer_(one_) {
+      : job_(job), progress_(progress), stop_(stop) {
     for (const double error : job.errors) settings_.push_back(WithError(error));
     if (job.paper_rule) {
       settings_.push_back(job.options);
@@ -100,19 +102,19 @@ class Measurement {
     return renderer_.Render({&job_.scene, 1}, setting, {.color = false, .attributes = false},
                             &frame_);
   }
-  // d_positions_ <- the gradient of L with upstream gradients `d_alpha`.
-  Status Backward(const RenderOptions& setting, const std::vector<float>& d_alpha) {
-    PipelineGradients d_scene{d_positions_, {}, false, {}};
-    return renderer_.Backward({&job_.scene, 1}, setting, frame_, {{}, d_alpha}, {&d_scene, 1});
+  // d_positions_ <- the gradient of L with upstream gradients `d_alpha`, of what was rendered last.
+  Status Backward(const std::vector<float>& d_alpha) {
+    const SceneGradients d_scene{.positions = d_positions_};
+    return renderer_.Backward(frame_, {.alpha = d_alpha}, {&d_scene, 1});
   }
 
   const TradeoffJob& job_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
   const Workers one_{1};
-  Pipeline renderer_;
+  Renderer renderer_ = RendererOn(one_);
   std::vector<RenderOptions> settings_;
-  PipelineFrame frame_;
+  Frame frame_;
   std::vector<std::int32_t> ids_;
   std::vector<float> d_alpha_, d_alpha_truth_;  // [H,W]; the second only where there is a truth
   std::vector<float> d_positions_;
@@ -124,7 +126,8 @@ class Measurement {
 Status Measurement::FindIds() {
   TILEGRAD_TRY(Step("ids", 0, 1));
   TILEGRAD_TRY(Forward(WithError(0.1)));
-  ids_.assign(frame_.face_ids.begin(), frame_.face_ids.end());
+  const auto ids = frame_.images().face_ids;
+  ids_.assign(ids.begin(), ids.end());
   Rng rng(1, 0);
   d_alpha_.resize(pixels());
   d_alpha_truth_.assign(pixels(), 0.0f);
@@ -142,39 +145,34 @@ Status Measurement::FindIds() {
 
 Status Measurement::FindTruth() {
   const std::vector<double> positions(job_.scene.positions.begin(), job_.scene.positions.end());
-  PipelineSceneT<double> scene;
+  SceneT<double> scene;
   scene.positions = positions;
   scene.faces = job_.scene.faces;
   scene.camera = CameraCast<double>(job_.scene.camera);
   PreparedScene<double> prepared;
-  PrepareRef(scene, job_.options, &prepared);
-  PreparedGradients<double> gradients(scene, prepared);
-  PipelineFrameT<double> frame;
-  SizeFrame(1, 0, job_.options, {.color = false, .attributes = false}, &frame);
-  const std::vector<double> d_alpha(d_alpha_truth_.begin(), d_alpha_truth_.end());
+  PrepareRef(scene, {}, job_.options, &prepared);
+  PreparedGradients<double> gradients(prepared);
+  truth_.alpha.assign(pixels(), 1.0);
   std::size_t done = 0;
-  const auto for_row = [&](int row, const auto& visit) {
+  const auto for_background = [&](int row, const auto& visit) {
     const double started = CpuMilliseconds();
     for (int j = 0; j < job_.options.width; ++j) {
       const auto pixel = static_cast<std::size_t>(row * job_.options.width + j);
-      visit(j, raster::PieceAt(prepared.mesh, ids_[pixel], j, row));
+      if (ids_[pixel] < 0) visit(pixel, j + 0.5, row + 0.5);
     }
     return CpuMilliseconds() - started;
   };
   for (const int row : truth_.rows) {
     TILEGRAD_TRY(Step("truth in float64", done++, truth_.rows.size()));
-    truth_.forward_ms += for_row(row, [&](int j, std::int32_t face) {
-      ShadePixelRef(scene, prepared, job_.options, j, row, face, &frame);
+    truth_.forward_ms += for_background(row, [&](std::size_t pixel, double x, double y) {
+      truth_.alpha[pixel] = BackgroundAlphaRef(prepared, job_.options, x, y);
     });
-    truth_.backward_ms += for_row(row, [&](int j, std::int32_t face) {
-      ShadePixelRefBackward<double>(prepared, job_.options, j, row, face, {{}, d_alpha},
-                                    &gradients);
+    truth_.backward_ms += for_background(row, [&](std::size_t pixel, double x, double y) {
+      const auto d_alpha = static_cast<double>(d_alpha_truth_[pixel]);
+      BackgroundAlphaRefBackward(prepared, job_.options, x, y, d_alpha, &gradients);
     });
   }
-  truth_.alpha.assign(frame.alpha.begin(), frame.alpha.end());
-  truth_.d_positions.resize(positions.size());
-  PipelineGradientsT<double> d_scene{truth_.d_positions, {}, false, {}};
-  PrepareRefBackward(scene, job_.options, prepared, gradients, &d_scene);
+  truth_.d_positions = PrepareRefBackward(job_.options, prepared, gradients).positions;
   if (Dot(truth_.d_positions, truth_.d_positions) == 0) {
     return InvalidArgument("alpha of this scene has no gradient: nothing is near its background");
   }
@@ -189,20 +187,21 @@ Status Measurement::AddAccuracy(const RenderOptions& setting) {
                             ? std::numeric_limits<double>::infinity()
                             : setting.max_alpha_error;
   TILEGRAD_TRY(Forward(setting));
-  row.reported = frame_.alpha_error_bound;
+  row.reported = frame_.images().alpha_error_bound;
+  const std::span<const float> alpha = frame_.images().alpha;
   std::size_t background = 0;
   for (const int y : truth_.rows) {
     for (int x = 0; x < job_.options.width; ++x) {
       const auto pixel = static_cast<std::size_t>(y * job_.options.width + x);
       if (ids_[pixel] >= 0) continue;
-      const double off = std::abs(static_cast<double>(frame_.alpha[pixel]) - truth_.alpha[pixel]);
+      const double off = std::abs(static_cast<double>(alpha[pixel]) - truth_.alpha[pixel]);
       row.largest = std::max(row.largest, off);
       row.mean += off;
       ++background;
     }
   }
   row.mean /= static_cast<double>(std::max<std::size_t>(background, 1));
-  TILEGRAD_TRY(Backward(setting, d_alpha_truth_));
+  TILEGRAD_TRY(Backward(d_alpha_truth_));
   const std::vector<double> d(d_positions_.begin(), d_positions_.end());
   std::vector<double> off = d;
   for (std::size_t i = 0; i < d.size(); ++i) off[i] -= truth_.d_positions[i];
@@ -230,7 +229,7 @@ Status Measurement::Time() {
       const double started = CpuMilliseconds();
       TILEGRAD_TRY(Forward(settings_[i]));
       const double between = CpuMilliseconds();
-      TILEGRAD_TRY(Backward(settings_[i], d_alpha_));
+      TILEGRAD_TRY(Backward(d_alpha_));
       forward[i].push_back(between - started);
       backward[i].push_back(CpuMilliseconds() - between);
     }

@@ -11,7 +11,7 @@
 #include "base/file.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "render/pipeline/pipeline.h"
+#include "tilegrad/renderer.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
@@ -20,7 +20,7 @@ namespace tilegrad {
 // renderer in float64 over all faces.
 
 struct TradeoffJob {
-  PipelineScene scene;         // its positions, faces and camera; attributes are not looked at
+  Scene scene;                 // positions, faces and camera
   RenderOptions options;       // max_alpha_error is replaced
   std::vector<double> errors;  // values of max_alpha_error to try, each in [0, 1]
   bool paper_rule = true;      // also try AlphaRule::kPaper, last
@@ -35,7 +35,7 @@ struct TradeoffRow {
   AlphaRule rule = AlphaRule::kAllFaces;
   double max_alpha_error = 0;              // infinite with AlphaRule::kPaper
   double forward_ms = 0, backward_ms = 0;  // median CPU time of the whole image, one thread
-  double reported = 0;                     // PipelineFrame::alpha_error_bound
+  double reported = 0;                     // Images::alpha_error_bound
   double largest = 0, mean = 0;            // |alpha - truth|
   double gradient_angle = 0;  // degrees, between dL/d(positions) and its truth; L a random sum
   double gradient_error = 0;  // |difference| / |truth|

@@ -1,24 +1,145 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive renderer: pipeline_ref.h with every attribute at every corner, and pixel_ref.h at every
-// pixel: the truth of tests, with T = double or std::complex<double>. Inputs are not checked.
+// The naive renderer: every face for every pixel, every stream at every corner, and pixel_ref.h at
+// every pixel; scalar. It is the truth that tests hold the Renderer to, with T = double or
+// std::complex<double> (complex step), what RendererT<double> is made of, and the yardstick of the
+// benchmarks with T = float. One scene at a time; inputs are not checked.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "raster/conventions.h"
+#include "raster/visibility_ref.h"
 #include "render/frame_images.h"
-#include "render/pipeline/pipeline_ref.h"
+#include "render/mesh_ref.h"
 #include "render/shading/direction_scale.h"
 #include "render/shading/pixel_ref.h"
 #include "render/shading/plan.h"
-#include "render/shading/scene_ref.h"
 #include "render/shading/uv_level.h"
 #include "shade/mesh_normals_ref.h"
 
 namespace tilegrad {
+
+// Rows of an image; those beyond its last are none.
+struct RowRange {
+  int begin, end;
+};
+inline constexpr RowRange kAllRows{0, std::numeric_limits<int>::max()};
+
+// Ids of the scene's faces [H,W] seen in some rows; -1 elsewhere.
+template <class T>
+std::vector<std::int32_t> FaceIdsRef(const SceneT<T>& scene, const RenderOptions& options,
+                                     RowRange rows = kAllRows) {
+  PreparedScene<T> prepared;
+  PrepareRef(scene, {}, options, &prepared);
+  std::vector<std::int32_t> ids(static_cast<std::size_t>(options.width) * options.height,
+                                raster::kNoFace);
+  raster::VisibilityRef<T>(prepared.mesh, rows.begin, std::min(rows.end, options.height), ids);
+  for (std::int32_t& id : ids) {
+    if (id >= 0) id = prepared.mesh.source_face[static_cast<std::size_t>(id)];
+  }
+  return ids;
+}
+
+// A scene ready for its pixels: its streams side by side at the corners of its faces, normals
+// derived, lights with unit directions.
+template <class T>
+struct RefScene {
+  const SceneT<T>* scene;
+  VaryingSet set;                             // of `packed`, at corners
+  std::vector<shade::UnitVector<T>> normals;  // derived: [V] or [F]
+  std::vector<T> packed;                      // [F,3,C]
+  PreparedScene<T> prepared;                  // with them
+  std::vector<shade::PyramidRef<T>> pyramids;
+  ShadeUniforms<T> uniforms;
+  std::vector<T> inverse_lengths;  // of the lights' directions
+};
+
+// Rows of a stream that the corner `i` of the faces has: the scene's arrays, or their gradients.
+template <class T>
+std::size_t StreamRow(const SceneT<T>& scene, Rate rate, std::size_t i) {
+  return rate == Rate::kCorner ? i : static_cast<std::size_t>(scene.faces[i]);
+}
+
+template <class T>
+std::size_t RefNormalRow(const SceneT<T>& scene, std::size_t corner) {
+  return scene.shading.normals == Normals::kFlat ? corner / 3
+                                                 : static_cast<std::size_t>(scene.faces[corner]);
+}
+
+template <class T>
+void PackRef(RefScene<T>* s) {
+  const SceneT<T>& scene = *s->scene;
+  s->set.rate = Rate::kCorner;
+  s->set.user_channels = scene.channels;
+  ForEachStream(scene, {}, [&](const SceneStream<T>& stream) {
+    s->set[stream.what] = !stream.values.empty();
+  });
+  s->set[Varying::kNormal] = s->set[Varying::kPosition] = s->set[Varying::kUser] = true;
+  const auto channels = static_cast<std::size_t>(s->set.channels());
+  s->packed.assign(scene.faces.size() * channels, T(0));
+  ForEachStream(scene, {}, [&](const SceneStream<T>& stream) {
+    if (stream.what == Varying::kNormal && scene.shading.normals != Normals::kGiven) return;
+    const auto width = static_cast<std::size_t>(s->set.width(stream.what));
+    const T scale = T(StreamScale(scene, stream.what));
+    for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+      for (std::size_t c = 0; c < width && !stream.values.empty(); ++c) {
+        s->packed[i * channels + static_cast<std::size_t>(s->set.first(stream.what)) + c] =
+            scale * stream.values[StreamRow(scene, stream.rate, i) * width + c];
+      }
+    }
+  });
+  if (scene.shading.normals == Normals::kGiven) return;
+  const auto first = static_cast<std::size_t>(s->set.first(Varying::kNormal));
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const auto& unit = s->normals[RefNormalRow(scene, i)].unit;
+    std::copy(unit.begin(), unit.end(),
+              s->packed.begin() + static_cast<std::ptrdiff_t>(i * channels + first));
+  }
+}
+
+template <class T>
+void SetUniformsRef(RefScene<T>* s) {
+  const SceneT<T>& scene = *s->scene;
+  ShadeUniforms<T>& u = s->uniforms;
+  u.surfaces.assign(scene.surfaces.begin(), scene.surfaces.end());
+  if (u.surfaces.empty()) u.surfaces.resize(1);
+  if (scene.surfaces.empty()) u.surfaces[0].texture = scene.textures.empty() ? -1 : 0;
+  for (const auto& light : scene.lights) {
+    const auto unit = shade::NormalizeScaledRef(light.direction);
+    u.lights.push_back({unit.unit, light.intensity});
+    s->inverse_lengths.push_back(unit.inverse_length);
+  }
+  if (scene.shading.lighting == Lighting::kSphericalHarmonics) {
+    u.sh = shade::ShPolynomialOf<T>(scene.sh);
+  }
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      u.eye[c] -= scene.camera.rotation[3 * r + c] * scene.camera.translation[r];
+    }
+  }
+  for (const auto& texture : scene.textures) s->pyramids.emplace_back(shade::ViewOf(texture));
+}
+
+template <class T>
+void PrepareRefScene(const SceneT<T>& scene, const RenderOptions& options, RefScene<T>* s) {
+  s->scene = &scene;
+  const shade::TriangleMeshT<T> mesh{scene.positions, scene.faces};
+  if (scene.shading.normals == Normals::kSmooth) {
+    s->normals.resize(scene.positions.size() / 3);
+    shade::SmoothNormalsRef<T>(mesh, s->normals);
+  } else if (scene.shading.normals == Normals::kFlat) {
+    s->normals.resize(scene.faces.size() / 3);
+    shade::FlatNormalsRef<T>(mesh, s->normals);
+  }
+  PackRef(s);
+  SetUniformsRef(s);
+  PrepareRef(scene, {s->packed, s->set.channels(), Rate::kCorner}, options, &s->prepared);
+}
 
 // A foreground pixel: where it is, and what is interpolated there.
 template <class T>
@@ -87,17 +208,27 @@ ShadePixel<T> ShadePixelOf(const RefScene<T>& s, const RenderOptions& options,
   return p;
 }
 
+// Calls visit(index, column, row, id of the scene's face) for each pixel of some rows.
+template <class Visit>
+void ForEachRowPixel(const RenderOptions& options, std::span<const std::int32_t> face_ids,
+                     RowRange rows, const Visit& visit) {
+  for (int i = rows.begin; i < std::min(rows.end, options.height); ++i) {
+    for (int j = 0; j < options.width; ++j) {
+      const auto index = static_cast<std::size_t>(i) * static_cast<std::size_t>(options.width) +
+                         static_cast<std::size_t>(j);
+      visit(index, j, i, face_ids[index]);
+    }
+  }
+}
+
 // Calls visit(pixel) for each foreground pixel.
 template <class T, class Visit>
 void ForEachPixelRef(const RefScene<T>& s, const RenderOptions& options,
-                     std::span<const std::int32_t> face_ids, const Visit& visit) {
-  for (int i = 0; i < options.height; ++i) {
-    for (int j = 0; j < options.width; ++j) {
-      const std::int32_t id = face_ids[static_cast<std::size_t>(i * options.width + j)];
-      const std::int32_t face = raster::PieceAt(s.prepared.mesh, id, j, i);
-      if (face != raster::kNoFace) visit(InterpolatePixelRef(s, options, j, i, face));
-    }
-  }
+                     std::span<const std::int32_t> face_ids, RowRange rows, const Visit& visit) {
+  ForEachRowPixel(options, face_ids, rows, [&](std::size_t, int j, int i, std::int32_t id) {
+    const std::int32_t face = raster::PieceAt(s.prepared.mesh, id, j, i);
+    if (face != raster::kNoFace) visit(InterpolatePixelRef(s, options, j, i, face));
+  });
 }
 
 template <class T>
@@ -105,6 +236,7 @@ void ShadePixelIntoFrame(const RefScene<T>& s, const RenderOptions& options, con
                          FrameImagesT<T>* frame) {
   const ShadePixel<T> p = ShadePixelOf(s, options, at);
   const PixelValues<T> v = PixelShaderRef<T>(s.scene->shading, s.uniforms, s.pyramids).Forward(p);
+  const raster::ScreenMeshT<T>& mesh = s.prepared.mesh;
   const std::size_t plane = frame->face_ids.size();
   const auto write = [&](AlignedVector<T>& image, std::span<const T> values) {
     for (std::size_t c = 0; c < values.size() && !image.empty(); ++c) {
@@ -116,16 +248,19 @@ void ShadePixelIntoFrame(const RefScene<T>& s, const RenderOptions& options, con
   write(frame->uv, p.uv);
   const auto user = static_cast<std::size_t>(s.set.first(Varying::kUser));
   write(frame->attributes, std::span<const T>(at.values).subspan(user));
-  if (!frame->depth.empty()) {
-    frame->depth[at.index] =
-        T(1) / raster::MakeDepthPlane(s.prepared.mesh, at.face).At(at.px, at.py);
-  }
+  T source[3];
+  raster::SourceWeights<T>(mesh, s.scene->faces, at.face, at.weights.w, source);
+  write(frame->barycentrics, std::span<const T>(source).subspan(1));
+  if (frame->depth.empty()) return;
+  frame->depth[at.index] = T(1) / raster::MakeDepthPlane(mesh, at.face).At(at.px, at.py);
 }
 
-// All images that `request` asks for, with visibility given as ids of the scene's faces [H,W].
+// All images that `request` asks for, with visibility given as ids of the scene's faces [H,W]; of
+// some rows, while the others are background of alpha 0.
 template <class T>
 void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const Outputs& request,
-                     std::span<const std::int32_t> face_ids, FrameImagesT<T>* frame) {
+                     std::span<const std::int32_t> face_ids, FrameImagesT<T>* frame,
+                     RowRange rows = kAllRows) {
   RefScene<T> s;
   PrepareRefScene(scene, options, &s);
   SizeFrame(1, scene.channels, options, request, frame);
@@ -134,15 +269,17 @@ void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const
   frame->color.assign(request.color ? 3 * plane : 0, T(0));
   frame->normals.assign(request.normals ? 3 * plane : 0, T(0));
   frame->uv.assign(request.uv ? 2 * plane : 0, T(0));
-  std::fill(frame->attributes.begin(), frame->attributes.end(), T(0));
-  std::fill(frame->depth.begin(), frame->depth.end(), T(std::numeric_limits<double>::infinity()));
-  ForEachPixelRef(s, options, face_ids,
-                  [&](const RefPixel<T>& at) { ShadePixelIntoFrame(s, options, at, frame); });
-  for (std::size_t k = 0; k < plane && !frame->alpha.empty(); ++k) {
-    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
-    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
-    frame->alpha[k] = face_ids[k] >= 0 ? T(1) : BackgroundAlphaRef(s.prepared, options, px, py);
+  for (auto* image : {&frame->attributes, &frame->alpha, &frame->barycentrics}) {
+    std::fill(image->begin(), image->end(), T(0));
   }
+  std::fill(frame->depth.begin(), frame->depth.end(), T(std::numeric_limits<double>::infinity()));
+  ForEachPixelRef(s, options, face_ids, rows,
+                  [&](const RefPixel<T>& at) { ShadePixelIntoFrame(s, options, at, frame); });
+  if (!request.alpha) return;
+  ForEachRowPixel(options, face_ids, rows, [&](std::size_t index, int j, int i, std::int32_t id) {
+    const T px = T(j) + T(0.5), py = T(i) + T(0.5);
+    frame->alpha[index] = id >= 0 ? T(1) : BackgroundAlphaRef(s.prepared, options, px, py);
+  });
 }
 
 // Gradients of a scene before they are brought back to its arrays.
@@ -153,7 +290,7 @@ struct RefGradients {
   shade::Vec3<T> depth_axis = {};
   T depth_shift = T(0);
 
-  explicit RefGradients(const RefScene<T>& s) : prepared(s.view, s.prepared) {
+  explicit RefGradients(const RefScene<T>& s) : prepared(s.prepared) {
     uniforms.surfaces.resize(s.uniforms.surfaces.size());
     for (auto& surface : uniforms.surfaces) {
       surface.base_color = surface.ambient = surface.diffuse = surface.specular = {};
@@ -278,28 +415,26 @@ void UniformsBackRef(const RefScene<T>& s, const RefGradients<T>& d,
   d_camera->translation[2] += d.depth_shift;
 }
 
-// As RendererT::Backward, for one image.
+// As RendererT::Backward, for one image, or some rows of one.
 template <class T>
 void ReferenceRenderBackward(const SceneT<T>& scene, const RenderOptions& options,
                              std::span<const std::int32_t> face_ids,
-                             const FrameGradientsT<T>& d_frame, const SceneGradientsT<T>& d_scene) {
+                             const FrameGradientsT<T>& d_frame, const SceneGradientsT<T>& d_scene,
+                             RowRange rows = kAllRows) {
   RefScene<T> s;
   PrepareRefScene(scene, options, &s);
   RefGradients<T> d(s);
-  ForEachPixelRef(s, options, face_ids,
+  ForEachPixelRef(s, options, face_ids, rows,
                   [&](const RefPixel<T>& at) { ShadePixelBackward(s, options, d_frame, at, &d); });
-  for (std::size_t k = 0; k < face_ids.size() && !d_frame.alpha.empty(); ++k) {
-    if (face_ids[k] >= 0) continue;
-    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
-    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
-    BackgroundAlphaRefBackward(s.prepared, options, px, py, d_frame.alpha[k], &d.prepared);
-  }
-  std::vector<T> d_positions(scene.positions.size(), T(0)), d_packed(s.packed.size(), T(0));
-  PipelineGradientsT<T> d_view{d_positions, d_packed, true, {}};
-  PrepareRefBackward(s.view, options, s.prepared, d.prepared, &d_view);
-  if (d_scene.camera != nullptr) *d_scene.camera = d_view.d_camera;
-  UnpackRef<T>(s, d_packed, d_positions, d_scene);
-  std::copy_n(d_positions.begin(), d_scene.positions.size(), d_scene.positions.begin());
+  ForEachRowPixel(options, face_ids, rows, [&](std::size_t index, int j, int i, std::int32_t id) {
+    if (id >= 0 || d_frame.alpha.empty()) return;
+    const T px = T(j) + T(0.5), py = T(i) + T(0.5);
+    BackgroundAlphaRefBackward(s.prepared, options, px, py, d_frame.alpha[index], &d.prepared);
+  });
+  MeshGradients<T> mesh = PrepareRefBackward(options, s.prepared, d.prepared);
+  if (d_scene.camera != nullptr) *d_scene.camera = mesh.camera;
+  UnpackRef<T>(s, mesh.attributes, mesh.positions, d_scene);
+  std::copy_n(mesh.positions.begin(), d_scene.positions.size(), d_scene.positions.begin());
   UniformsBackRef(s, d, d_scene);
 }
 

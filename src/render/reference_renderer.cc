@@ -33,15 +33,7 @@ Status ValidateInput(std::span<const SceneD> scenes, const RenderOptions& option
 
 FrameD RenderImage(const SceneD& scene, const RenderOptions& options, const Outputs& outputs) {
   FrameD frame;
-  const RowRange rows{0, options.height};
-  const PipelineSceneT<double> mesh = PipelineSceneOf(scene);
-  const auto ids = FaceIdsRef<double>(mesh, options, rows);
-  ReferenceRender<double>(scene, options, outputs, ids, &frame);
-  if (!outputs.barycentrics) return frame;
-  PipelineFrameT<double> geometry;
-  RenderRefWithFaces<double>(mesh, options, {.alpha = false, .barycentrics = true}, ids, rows,
-                             &geometry);
-  frame.barycentrics.swap(geometry.barycentrics);
+  ReferenceRender<double>(scene, options, outputs, FaceIdsRef(scene, options), &frame);
   return frame;
 }
 

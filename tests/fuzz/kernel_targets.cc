@@ -58,7 +58,7 @@ void Raster(Input input) {
   const auto targets = RunnableTargets();
   const TargetScope scope(targets[in.Below(static_cast<std::uint32_t>(targets.size()))]);
   Require(scope.status().ok(), "a target can be chosen");
-  Pipeline renderer(one);
+  Renderer renderer = RendererOn(one);
   const std::uint64_t number = in.Take<std::uint16_t>();
   const test::ExtremeScene scene = SceneOf(&in);
   test::CheckCounts counts;

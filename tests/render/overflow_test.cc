@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/simd_target.h"
-#include "render/engine.h"
+#include "render/renderer.h"
 #include "render/trial.h"
 #include "render/validate.h"
 #include "scene/camera.h"
@@ -52,8 +52,8 @@ class Overflow : public testing::Test {
   }
 
   const Workers workers_ = Workers(1);
-  Engine renderer_ = Engine(workers_);
-  FrameImages frame_;
+  Renderer renderer_ = RendererOn(workers_);
+  Frame frame_;
 };
 
 TEST_F(Overflow, LargeNumbersWhoseProductIsAFloatAreDrawn) {
@@ -63,8 +63,8 @@ TEST_F(Overflow, LargeNumbersWhoseProductIsAFloatAreDrawn) {
   ASSERT_TRUE(status.ok()) << status.message();
   int seen = 0;
   for (std::size_t i = 0; i < test::kTrialPixels; ++i) {
-    if (frame_.face_ids[i] < 0) continue;
-    EXPECT_NEAR(frame_.color[i], 0x1p120f, 0x1p120f * 1e-6f);
+    if (frame_.images().face_ids[i] < 0) continue;
+    EXPECT_NEAR(frame_.images().color[i], 0x1p120f, 0x1p120f * 1e-6f);
     ++seen;
   }
   EXPECT_GT(seen, 20);

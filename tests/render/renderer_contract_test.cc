@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What engine.h does: only what is asked for, which it can explain.
+// What the renderer does: only what is asked for, which it can explain.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 #include <string>
 
-#include "render/engine.h"
+#include "render/renderer.h"
 #include "render/trial.h"
 
 namespace tilegrad::renderer_contract_test {
@@ -49,26 +49,26 @@ Outputs Request(bool color, bool alpha) {
   return {.color = color, .alpha = alpha, .attributes = false};
 }
 
-std::int64_t Foreground(const PipelineFrame& frame) {
+std::int64_t Foreground(const Frame& frame) {
   std::int64_t seen = 0;
-  for (const std::int32_t id : frame.face_ids) seen += id >= 0;
+  for (const std::int32_t id : frame.images().face_ids) seen += id >= 0;
   return seen;
 }
 
 // A renderer with one scene.
 struct Session {
   Workers workers{2};
-  Engine renderer{workers};
+  Renderer renderer = RendererOn(workers);
   OwnedScene<float> scene;
   Scene view;
   RenderOptions options = Options();
-  FrameImages frame;
+  Frame frame;
 
   explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
   PlanReport Render(const Outputs& request) {
     const Status status = renderer.Render({&view, 1}, options, request, &frame);
     EXPECT_TRUE(status.ok()) << status.message();
-    return renderer.Explain();
+    return Explain(renderer);
   }
   // With the cotangents and gradients that are left after `choose`.
   PlanReport Backward(const std::function<void(FrameGradients&, SceneGradients&)>& choose) {
@@ -81,9 +81,9 @@ struct Session {
     SceneGradients d_scene;
     chosen = &every_gradient;
     choose(d_frame, d_scene);
-    const Status status = renderer.Backward({&view, 1}, options, frame, d_frame, {&d_scene, 1});
+    const Status status = renderer.Backward(frame, d_frame, {&d_scene, 1});
     EXPECT_TRUE(status.ok()) << status.message();
-    return renderer.Explain();
+    return Explain(renderer);
   }
   const SceneGradients* chosen = nullptr;  // all gradients there are, to choose from
 };
@@ -97,7 +97,7 @@ TEST(ShadedPlan, SilhouetteTouchesNoAttribute) {
   }
   EXPECT_EQ(report.count("visibility"), 6);
   EXPECT_EQ(report.count("alpha"), 6);
-  EXPECT_TRUE(session.frame.color.empty());
+  EXPECT_TRUE(session.frame.images().color.empty());
 }
 
 TEST(ShadedPlan, ColoursAloneAreInterpolatedAndNothingElse) {
@@ -109,7 +109,7 @@ TEST(ShadedPlan, ColoursAloneAreInterpolatedAndNothingElse) {
     EXPECT_EQ(report.count(stage), 0) << stage;
   }
   EXPECT_EQ(report.count("interpolate"), 6);
-  EXPECT_EQ(session.frame.color.size(), 3 * kPixels);
+  EXPECT_EQ(session.frame.images().color.size(), 3 * kPixels);
 }
 
 TEST(ShadedPlan, UnlitSceneComputesNoNormal) {

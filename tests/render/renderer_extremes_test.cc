@@ -107,10 +107,6 @@ const Extreme kExtremes[] = {
        s.lights[0].direction = {-f[0], -f[1], -f[2]};
        SetGiven(s, -f[0], -f[1], -f[2]);
      }},
-    {"no_light_direction",
-     [](auto& s) {
-       s.lights[0].direction = {0, 0, 0};
-     }},
     {"shininess_0", [](auto& s) { s.surfaces[0].shininess = 0; }},
     {"shininess_1e5", [](auto& s) { s.surfaces[0].shininess = 1e5f; }},
     {"shininess_1e5_at_base_0",
@@ -188,13 +184,6 @@ TEST(ShadedExtremeValues, OneTexelIsOneColourAndGetsAGradient) {
   }
   const float all = out.d.textures[0].texels[0];
   EXPECT_NE(all, 0);
-}
-
-TEST(ShadedExtremeValues, NoDirectionOfLightIsDarkness) {
-  auto scene = Sphere();
-  scene.lights[0].direction = {0, 0, 0};
-  scene.surfaces[0].specular = {0, 0, 0};
-  for (const float c : RenderAll(scene).frame.color) EXPECT_EQ(c, 0);
 }
 
 }  // namespace tilegrad::renderer_extremes_test

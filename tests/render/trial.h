@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "render/pipeline/pipeline_ref.h"
 #include "render/random_scenes.h"
+#include "render/reference.h"
 
 namespace tilegrad::test {
 
@@ -56,7 +56,7 @@ struct Trial {
   Trial(const SceneRecipe& recipe, std::uint64_t seed) {
     Rng rng(seed, 77);
     scene = RandomScene(recipe, kTrialWidth, kTrialHeight, &rng);
-    ids = FaceIdsRef<float>(scene.mesh.View(), TrialOptions(), {0, kTrialHeight});
+    ids = FaceIdsRef(scene.mesh.View(), TrialOptions());
     d_frame = OwnedCotangents<double>(kTrialPixels, 2, &rng);
     if (seed % 4 == 0) {
       options.interpolation = Interpolation::kScreenLinear;

@@ -7,8 +7,8 @@
 
 #include "proof/selftest/check.h"
 #include "proof/selftest/sphere_scene.h"
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/pipeline_ref.h"
+#include "render/reference.h"
+#include "render/renderer.h"
 
 namespace tilegrad::selftest {
 namespace {
@@ -50,9 +50,10 @@ struct BoundScene {
 
 Result<std::vector<double>> TrueAlpha(const BoundScene& scene) {
   const auto mesh = MeshCast<double>(scene.mesh);
-  const Outputs request{.attributes = false};
-  PipelineFrameT<double> frame;
-  RenderRef<double>(mesh.View(), scene.options, request, &frame);
+  const SceneT<double> view = mesh.View();
+  FrameImagesT<double> frame;
+  ReferenceRender<double>(view, scene.options, {.color = false, .attributes = false},
+                          FaceIdsRef(view, scene.options), &frame);
   const auto between = std::count_if(frame.alpha.begin(), frame.alpha.end(),
                                      [](double a) { return a > 0.01 && a < 0.99; });
   if (between < 20) return InternalError("{} pixels have an alpha between 0 and 1", between);
@@ -62,18 +63,21 @@ Result<std::vector<double>> TrueAlpha(const BoundScene& scene) {
 // What is dropped lowers alpha, so that above it there is only rounding.
 Status CheckBound(const CheckContext& context, const BoundScene& scene, double rounding,
                   const std::vector<double>& want, Gauge* gauge) {
-  Pipeline renderer(context.workers);
-  PipelineFrame frame;
-  const PipelineScene views[] = {scene.mesh.View()};
-  TILEGRAD_TRY(renderer.Render(views, scene.options, {.attributes = false}, &frame));
-  std::vector<double> spent = {frame.alpha_error_bound};
-  context.Take("alpha", frame.alpha);
+  Frame frame;
+  const Scene view = scene.mesh.View();
+  TILEGRAD_TRY(
+      RendererOn(context.workers)
+          .Render({&view, 1}, scene.options, {.color = false, .attributes = false}, &frame));
+  const std::span<const float> rendered = frame.images().alpha;
+  std::vector<float> alpha(rendered.begin(), rendered.end());
+  std::vector<double> spent = {frame.images().alpha_error_bound};
+  context.Take("alpha", alpha);
   context.Take("alpha_error_bound", spent);
   if (!(spent[0] <= scene.options.max_alpha_error + 1e-28)) {  // n 2^-126 if none is allowed
     return InternalError("alpha_error_bound is {:.3g}", spent[0]);
   }
-  return gauge->ExpectEach("alpha", frame.alpha, want, [&](std::size_t i) {
-    return static_cast<double>(frame.alpha[i]) > want[i] ? rounding : spent[0] + rounding;
+  return gauge->ExpectEach("alpha", alpha, want, [&](std::size_t i) {
+    return static_cast<double>(alpha[i]) > want[i] ? rounding : spent[0] + rounding;
   });
 }
 

@@ -92,8 +92,7 @@ Status CheckSphere(const CheckContext& context, const SphereShape& shape, Gauge*
   both.want = RenderOwnedRef<double>(scene64, options, ImagesWithGradients(), d_frame,
                                      both.got.frame.face_ids);
   TILEGRAD_TRY(ExpectReference(context, shape.lighting, &both, gauge));
-  return ExpectFaceIds(both.got.frame.face_ids,
-                       FaceIdsRef<double>(scene64.mesh.View(), options, {0, shape.height}));
+  return ExpectFaceIds(both.got.frame.face_ids, FaceIdsRef(scene64.mesh.View(), options));
 }
 
 Result<Finding> EngineIsTheReference(const CheckContext& context) {
@@ -118,7 +117,7 @@ Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) 
   const RenderOptions options = SphereOptions(shape);
   const auto scene = MakeSphere(shape);
   auto scene64 = OwnedCast<double>(scene);
-  const auto ids = FaceIdsRef<double>(scene64.mesh.View(), options, {0, shape.height});
+  const auto ids = FaceIdsRef(scene64.mesh.View(), options);
   Rng rng(3, 21);
   const OwnedCotangents<double> d_frame(ids.size(), 0, &rng);
   auto d = OwnedRefBackward<double>(scene64, options, d_frame, ids);

@@ -86,9 +86,11 @@ Result<FrameImagesT<T>> RenderTriangle(const Workers& workers) {
   FrameImagesT<T> frame;
   if constexpr (std::is_same_v<T, float>) {
     const Scene view = scene.View();
-    TILEGRAD_TRY(Engine(workers).Render({&view, 1}, options, request, &frame));
+    Frame rendered;
+    TILEGRAD_TRY(RendererOn(workers).Render({&view, 1}, options, request, &rendered));
+    frame = OwnedImages(rendered.images());
   } else {
-    const auto ids = FaceIdsRef<T>(scene.mesh.View(), options, {0, kSize});
+    const auto ids = FaceIdsRef(scene.mesh.View(), options);
     ReferenceRender<T>(scene.View(), options, request, ids, &frame);
   }
   return frame;

@@ -12,6 +12,10 @@
 namespace tilegrad {
 
 template <class T>
+raster::FaceSource<T> FaceSourceOf(const SceneT<T>& scene, const RenderOptions& options) {
+  return {scene.positions, scene.faces, &scene.camera, options.culling == FaceCulling::kBack};
+}
+template <class T>
 raster::FaceSource<T> FaceSourceOf(const PipelineSceneT<T>& scene, const RenderOptions& options) {
   return {scene.positions, scene.faces, &scene.camera, options.culling == FaceCulling::kBack};
 }

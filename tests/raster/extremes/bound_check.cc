@@ -67,14 +67,14 @@ void Permute(Rng* rng, std::vector<std::int32_t>* faces) {
 
 class BoundCheck {
  public:
-  BoundCheck(const BoundSceneNumber& scene, Pipeline* renderer)
+  BoundCheck(const BoundSceneNumber& scene, Renderer* renderer)
       : rng_(scene.number, 5), scene_(MakeBoundScene(scene)), renderer_(renderer) {}
 
   double delta() const { return scene_.options.delta; }
 
   BoundSummary Run() {
     const RenderOptions& o = scene_.options;
-    const PipelineScene view = scene_.scene.View();
+    const Scene view = scene_.scene.View();
     raster::ScreenMeshBuffers mesh;
     raster::Project(FaceSourceOf(view, o), o.width, o.height, &mesh);
     const SoftScene soft = SoftSceneOf(mesh, o);
@@ -90,22 +90,24 @@ class BoundCheck {
   }
 
  private:
-  void Draw(PipelineFrame* frame) {
-    const PipelineScene views[] = {scene_.scene.View()};
-    const Status status = renderer_->Render(views, scene_.options, {.attributes = false}, frame);
+  void Draw(Frame* frame) {
+    const Scene view = scene_.scene.View();
+    const Outputs outputs{.color = false, .attributes = false};
+    const Status status = renderer_->Render({&view, 1}, scene_.options, outputs, frame);
     if (!status.ok()) out_.failed = status.message();
     const double e = scene_.options.max_alpha_error;
     // exp(-87) per face is what E = 0 means ("Budget").
     const double allowed = e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(out_.faces);
-    out_.spent_over = std::max(out_.spent_over, frame->alpha_error_bound - allowed);
+    out_.spent_over = std::max(out_.spent_over, frame->images().alpha_error_bound - allowed);
   }
   // Background pixels, neither empty nor opaque if there are such: two, or more of fewer faces.
   std::vector<std::size_t> SomeBackground() {
     std::vector<std::size_t> all, between, out;
-    for (std::size_t i = 0; i < first_.face_ids.size(); ++i) {
-      if (first_.face_ids[i] >= 0) continue;
+    const Images& images = first_.images();
+    for (std::size_t i = 0; i < images.face_ids.size(); ++i) {
+      if (images.face_ids[i] >= 0) continue;
       all.push_back(i);
-      if (first_.alpha[i] > 1e-6f && first_.alpha[i] < 1 - 1e-6f) between.push_back(i);
+      if (images.alpha[i] > 1e-6f && images.alpha[i] < 1 - 1e-6f) between.push_back(i);
     }
     if (!between.empty()) all = between;
     constexpr std::size_t kPairs = 20000;
@@ -119,31 +121,32 @@ class BoundCheck {
     const double e = scene_.options.max_alpha_error;
     ++out_.pixels;
     out_.between += truth.alpha > 1e-6 && truth.alpha < 1 - 1e-6;
-    for (const PipelineFrame* frame : {&first_, &permuted_}) {
-      const double error = std::abs(static_cast<double>(frame->alpha[i]) - truth.alpha);
+    const Images &first = first_.images(), &permuted = permuted_.images();
+    for (const Images* images : {&first, &permuted}) {
+      const double error = std::abs(static_cast<double>(images->alpha[i]) - truth.alpha);
       const double beyond = error - truth.rounding;
       out_.over_budget = std::max(out_.over_budget, beyond - e - 1e-37);
-      out_.over_spent = std::max(out_.over_spent, beyond - frame->alpha_error_bound);
+      out_.over_spent = std::max(out_.over_spent, beyond - images->alpha_error_bound);
       if (e > 0) out_.share = std::max(out_.share, beyond / e);
-      const double allowed = frame->alpha_error_bound + truth.rounding;
+      const double allowed = images->alpha_error_bound + truth.rounding;
       if (allowed > 0) out_.of_reported = std::max(out_.of_reported, error / allowed);
     }
     const double moved =
-        std::abs(static_cast<double>(first_.alpha[i]) - static_cast<double>(permuted_.alpha[i]));
-    out_.order = std::max(out_.order, moved - first_.alpha_error_bound -
-                                          permuted_.alpha_error_bound - 2 * truth.rounding);
+        std::abs(static_cast<double>(first.alpha[i]) - static_cast<double>(permuted.alpha[i]));
+    out_.order = std::max(out_.order, moved - first.alpha_error_bound - permuted.alpha_error_bound -
+                                          2 * truth.rounding);
   }
 
   Rng rng_;
   BoundScene scene_;
-  Pipeline* renderer_;
-  PipelineFrame first_, permuted_;
+  Renderer* renderer_;
+  Frame first_, permuted_;
   BoundSummary out_;
 };
 
 }  // namespace
 
-BoundSummary CheckBoundScene(const BoundSceneNumber& scene, Pipeline* renderer, double* delta) {
+BoundSummary CheckBoundScene(const BoundSceneNumber& scene, Renderer* renderer, double* delta) {
   BoundCheck check(scene, renderer);
   if (delta != nullptr) *delta = check.delta();
   return check.Run();

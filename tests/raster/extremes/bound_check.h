@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <string>
 
-#include "render/pipeline/pipeline.h"
+#include "tilegrad/renderer.h"
 
 namespace tilegrad::test {
 
@@ -50,7 +50,7 @@ struct BoundSceneNumber {
 
 // Draws the scene twice, faces permuted the second time, and compares some of its pixels. `delta`,
 // if given, is set to the scene's.
-BoundSummary CheckBoundScene(const BoundSceneNumber& scene, Pipeline* renderer,
+BoundSummary CheckBoundScene(const BoundSceneNumber& scene, Renderer* renderer,
                              double* delta = nullptr);
 
 }  // namespace tilegrad::test

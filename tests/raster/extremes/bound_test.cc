@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,11 +16,11 @@ namespace tilegrad::test::bound_test {
 
 void CheckBound(std::uint64_t first, std::size_t count) {
   const Workers workers, one(1);
-  std::vector<std::unique_ptr<Pipeline>> renderers;
-  for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Pipeline>(one));
+  std::vector<Renderer> renderers;
+  for (int w = 0; w < workers.count(); ++w) renderers.push_back(RendererOn(one));
   std::vector<BoundSummary> scenes(count);
   workers.For(count, [&](std::size_t n, std::size_t w) {
-    scenes[n] = CheckBoundScene({first + n}, renderers[w].get());
+    scenes[n] = CheckBoundScene({first + n}, &renderers[w]);
   });
   BoundSummary all;
   for (std::size_t n = 0; n < count; ++n) {

@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <iterator>
 #include <limits>
-#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -30,14 +29,14 @@ struct SceneRange {
 CheckCounts CheckScenes(const SceneRange& range) {
   const Workers workers, one(1);
   const auto count = static_cast<std::size_t>(workers.count());
-  std::vector<std::unique_ptr<Pipeline>> renderers;
-  for (std::size_t w = 0; w < count; ++w) renderers.push_back(std::make_unique<Pipeline>(one));
+  std::vector<Renderer> renderers;
+  for (std::size_t w = 0; w < count; ++w) renderers.push_back(RendererOn(one));
   std::vector<CheckCounts> counts(count);
   std::vector<std::string> failures(range.count);
   workers.For(range.count, [&](std::size_t n, std::size_t w) {
     const std::uint64_t number = range.first + n;
     const ExtremeScene scene = MakeExtremeScene(number, range.most_faces);
-    const std::string wrong = CheckExtremeScene(scene, number, renderers[w].get(), &counts[w]);
+    const std::string wrong = CheckExtremeScene(scene, number, &renderers[w], &counts[w]);
     if (!wrong.empty()) {
       failures[n] = std::string(scene.kind) + ", scene " + std::to_string(number) + ": " + wrong;
     }
@@ -77,7 +76,7 @@ TEST(ExtremesLong, HundredThousandScenes) { CheckOnTargets(1000000, 35000, 50000
 
 void CheckHeap(std::size_t faces) {
   const Workers one(1);
-  Pipeline renderer(one);
+  Renderer renderer = RendererOn(one);
   CheckCounts counts;
   EXPECT_EQ(CheckExtremeScene(MakeHeap(1, faces), 1, &renderer, &counts), "");
   EXPECT_GT(counts.compared, 0u);
@@ -99,17 +98,20 @@ TEST(ExtremesLong, FaceIdsBeyondWhatFloatsCount) {
   RenderOptions options;
   options.width = options.height = 8;
   const Workers workers;
-  Pipeline renderer(workers);
-  PipelineFrame frame;
-  const PipelineScene views[] = {scene.View()};
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), id);
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
+  const Scene view = scene.View();
+  ASSERT_TRUE(renderer.Render({&view, 1}, options, {.color = false}, &frame).ok());
+  const auto ids = frame.images().face_ids;
+  const auto covered = std::count(ids.begin(), ids.end(), id);
   EXPECT_GT(covered, 10);
-  EXPECT_EQ(covered + std::count(frame.face_ids.begin(), frame.face_ids.end(), -1), 64);
+  EXPECT_EQ(covered + std::count(ids.begin(), ids.end(), -1), 64);
   const std::vector<float> d_attributes(64, 1.0f), d_alpha(64, 1.0f);
   std::vector<float> d_positions(scene.positions.size()), d_rows(scene.vertex_count());
-  PipelineGradients d[] = {{d_positions, d_rows, false, {}}};
-  ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d).ok());
+  SceneGradients d{.positions = d_positions};
+  d.attributes = d_rows;
+  ASSERT_TRUE(
+      renderer.Backward(frame, {.alpha = d_alpha, .attributes = d_attributes}, {&d, 1}).ok());
   EXPECT_EQ(d_rows[0], 0);
   EXPECT_NEAR(d_rows[1] + d_rows[2] + d_rows[3], static_cast<double>(covered), 1e-4);
 }
@@ -127,14 +129,16 @@ class NonFinite : public testing::TestWithParam<float> {
   }
   std::string Run() {
     const Workers one(1);
-    Pipeline renderer(one);
-    PipelineFrame frame;
-    const PipelineScene views[] = {e_.scene.View()};
-    Status status = renderer.Render(views, e_.options, {}, &frame);
+    Renderer renderer = RendererOn(one);
+    Frame frame;
+    const Scene view = e_.scene.View();
+    Status status = renderer.Render({&view, 1}, e_.options, {.color = false}, &frame);
     if (!status.ok()) return status.message();
     std::vector<float> d_positions(e_.scene.positions.size());
-    PipelineGradients d[] = {{d_positions, {}, true, {}}};
-    return renderer.Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, d).message();
+    Camera d_camera;
+    const SceneGradients d{.positions = d_positions, .camera = &d_camera};
+    return renderer.Backward(frame, {.alpha = d_alpha_, .attributes = d_attributes_}, {&d, 1})
+        .message();
   }
   // Spoils one number after the other.
   void ExpectNamed(const std::string& array, std::span<float> values) {

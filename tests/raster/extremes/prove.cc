@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,7 +35,7 @@ std::string Decades(double value, const char* name) {
 }
 
 // One in five is of the extremes; of the others one in 200 is large.
-void CheckAlpha(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+void CheckAlpha(std::uint64_t number, Renderer* renderer, ProofTally* tally) {
   double delta = 1;
   const double decades = number % 200 == 1 ? 4 : 1.3;
   const BoundSummary found = CheckBoundScene({number, decades}, renderer, &delta);
@@ -51,7 +50,7 @@ void CheckAlpha(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
       found.failed));
 }
 
-void CheckExtremes(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+void CheckExtremes(std::uint64_t number, Renderer* renderer, ProofTally* tally) {
   CheckCounts counts;
   const ExtremeScene scene = MakeExtremeScene(number, kHeapFaces);
   const std::string wrong = CheckExtremeScene(scene, number, renderer, &counts);
@@ -64,19 +63,18 @@ void CheckExtremes(std::uint64_t number, Pipeline* renderer, ProofTally* tally) 
       fmt::format("scene {} ({}) on {}: {}", number, scene.kind, ActiveTarget(), wrong));
 }
 
-void CheckScene(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+void CheckScene(std::uint64_t number, Renderer* renderer, ProofTally* tally) {
   number % 5 == 0 ? CheckExtremes(number, renderer, tally) : CheckAlpha(number, renderer, tally);
 }
 
 // Chunks take the machine's targets in turn.
-Status CheckChunk(const Workers& workers, const std::vector<std::unique_ptr<Pipeline>>& renderers,
-                  ProofTally* tally) {
+Status CheckChunk(const Workers& workers, std::vector<Renderer>& renderers, ProofTally* tally) {
   const std::vector<std::string> targets = RunnableTargets();
   const TargetScope scope(targets[tally->next / kChunk % targets.size()]);
   if (!scope.status().ok()) return scope.status();
   std::vector<ProofTally> scenes(kChunk);
   workers.For(kChunk, [&](std::size_t n, std::size_t w) {
-    CheckScene(kFirst + tally->next + n, renderers[w].get(), &scenes[n]);
+    CheckScene(kFirst + tally->next + n, &renderers[w], &scenes[n]);
   });
   for (const ProofTally& scene : scenes) tally->Add(scene);
   tally->next += kChunk;
@@ -96,7 +94,7 @@ int End(const ProofTally& tally) {
 
 int RunOne(std::uint64_t number) {
   const Workers one(1);
-  Pipeline renderer(one);
+  Renderer renderer = RendererOn(one);
   ProofTally tally;
   for (const std::string& target : RunnableTargets()) {
     const TargetScope scope(target);
@@ -110,8 +108,8 @@ int Run(const Arguments& arguments) {
   if (!read.ok()) return Fail(read.status());
   ProofTally tally = *std::move(read);
   const Workers workers(arguments.threads), one(1);
-  std::vector<std::unique_ptr<Pipeline>> renderers;
-  for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Pipeline>(one));
+  std::vector<Renderer> renderers;
+  for (int w = 0; w < workers.count(); ++w) renderers.push_back(RendererOn(one));
   const auto start = std::chrono::steady_clock::now();
   const std::chrono::duration<double> most(arguments.seconds);
   while (std::chrono::steady_clock::now() - start < most) {

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "raster/soft_mask/test_util.h"
-#include "render/pipeline/pipeline.h"
+#include "tilegrad/options.h"
 
 namespace tilegrad::test {
 

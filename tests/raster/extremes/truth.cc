@@ -10,9 +10,10 @@
 
 #include "raster/extremes/bounded.h"
 #include "raster/extremes/soft_scene.h"
+#include "raster/conventions.h"
 #include "raster/project.h"
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/pipeline_ref.h"
+#include "raster/visibility_ref.h"
+#include "render/mesh_ref.h"
 
 namespace tilegrad::test {
 namespace {
@@ -105,17 +106,32 @@ struct PixelAdjoints {
   double weight[3] = {}, mean = 0;
 };
 
+struct Gradients {
+  std::vector<float> positions, attributes;
+  Camera camera;
+
+  explicit Gradients(const TestScene<float>& scene)
+      : positions(scene.positions.size()), attributes(scene.attributes.size()) {}
+  SceneGradients View() {
+    SceneGradients d{.positions = positions, .camera = &camera};
+    d.attributes = attributes;
+    return d;
+  }
+};
+
 class Truth {
  public:
   Truth(const ExtremeScene& e, std::uint64_t number)
-      : e_(e), rng_(number, 99), scene_(MeshCast<Bounded>(e.scene)) {
-    const PipelineScene view = e.scene.View();
+      : e_(e), rng_(number, 99), scene_(MeshCast<Bounded>(e.scene)), view_(scene_.View()) {
+    const Scene view = e.scene.View();
     raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
     mesh_ = buffers_.View();
     soft_ = SoftSceneOf(buffers_, e.options);
     prepared_.buffers = MeshCast<Bounded>(buffers_);
     prepared_.mesh = prepared_.buffers.View();
-    PrepareAttributes();
+    prepared_.scene = &view_;
+    prepared_.given = {scene_.attributes, scene_.channels, scene_.rate};
+    ClipAttributesRef(&prepared_);
     pixels_ = PixelsToCheck(e, &rng_);
     d_attributes_.resize(e.pixels() * Channels());
     d_alpha_.resize(e.pixels());
@@ -128,35 +144,27 @@ class Truth {
   }
 
   void CheckProjection(Comparison* comparison);
-  void CheckForward(const PipelineFrame& frame, Comparison* comparison);
-  void CheckBackward(const PipelineFrame& frame, Pipeline* renderer, Comparison* comparison,
+  void CheckForward(const Images& frame, Comparison* comparison);
+  void CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
                      CheckCounts* counts);
 
  private:
   std::size_t Channels() const { return static_cast<std::size_t>(e_.scene.channels); }
-  void PrepareAttributes() {
-    prepared_.attributes = {scene_.attributes, scene_.channels, scene_.rate};
-    if (!mesh_.was_clipped()) return;
-    prepared_.clipped_attributes.resize(raster::AttributeRows(prepared_.mesh, scene_.rate) *
-                                        Channels());
-    raster::ClipAttributes<Bounded>(prepared_.mesh, scene_.faces, prepared_.attributes,
-                                    prepared_.clipped_attributes);
-    prepared_.attributes.values = prepared_.clipped_attributes;
-  }
   PixelTruth At(std::size_t pixel, std::int32_t id) const;
-  void CheckFaceIds(const PipelineFrame& frame, Comparison* comparison) const;
-  void CheckForeground(const PipelineFrame& frame, std::size_t pixel, Comparison* comparison) const;
+  void CheckFaceIds(const Images& frame, Comparison* comparison) const;
+  void CheckForeground(const Images& frame, std::size_t pixel, Comparison* comparison) const;
   bool SameVerticesVisible() const;
   PixelAdjoints AdjointSizes(const PixelTruth& at, const std::vector<Bounded>& d_out) const;
-  void Mask(const PipelineFrame& frame, const SoftTruth& soft);
-  void AddInterpolated(const PipelineFrame& frame, PreparedGradients<Bounded>* d) const;
+  void Mask(const Images& frame, const SoftTruth& soft);
+  void AddInterpolated(const Images& frame, PreparedGradients<Bounded>* d) const;
   void AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const;
-  void CompareGradients(const PipelineFrame& frame, const SoftTruth& soft, const Status& status,
-                        const PipelineGradients& got, Comparison* comparison, CheckCounts* counts);
+  void CompareGradients(const Images& frame, const SoftTruth& soft, const Status& status,
+                        const Gradients& got, Comparison* comparison, CheckCounts* counts);
 
   const ExtremeScene& e_;
   Rng rng_;
   TestScene<Bounded> scene_;
+  SceneT<Bounded> view_;  // of it
   raster::ScreenMeshBuffers buffers_;
   raster::ScreenMesh mesh_;
   PreparedScene<Bounded> prepared_;
@@ -167,8 +175,7 @@ class Truth {
 
 void Truth::CheckProjection(Comparison* comparison) {
   raster::ScreenMeshBuffersT<Bounded> truth;
-  const auto view = scene_.View();
-  raster::ProjectVerticesRef(FaceSourceOf(view, e_.options), &truth);
+  raster::ProjectVerticesRef(FaceSourceOf(view_, e_.options), &truth);
   for (std::size_t v = 0; v < truth.x.size(); ++v) {
     if (!std::isfinite(mesh_.depth[v]) || !std::isfinite(mesh_.x[v]) ||
         !std::isfinite(mesh_.y[v])) {
@@ -243,7 +250,7 @@ PixelTruth Truth::At(std::size_t pixel, std::int32_t id) const {
   return out;
 }
 
-void Truth::CheckFaceIds(const PipelineFrame& frame, Comparison* comparison) const {
+void Truth::CheckFaceIds(const Images& frame, Comparison* comparison) const {
   std::vector<std::int32_t> ids(e_.pixels(), raster::kNoFace);
   raster::VisibilityRef<float>(mesh_, 0, e_.options.height, ids);
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -253,8 +260,7 @@ void Truth::CheckFaceIds(const PipelineFrame& frame, Comparison* comparison) con
   }
 }
 
-void Truth::CheckForeground(const PipelineFrame& frame, std::size_t pixel,
-                            Comparison* comparison) const {
+void Truth::CheckForeground(const Images& frame, std::size_t pixel, Comparison* comparison) const {
   const PixelTruth at = this->At(pixel, frame.face_ids[pixel]);
   const auto check = [&](const char* array, std::size_t index, float got, const Bounded& expected) {
     if (at.decided) return comparison->Check(array, index, got, expected);
@@ -285,7 +291,7 @@ void Truth::CheckForeground(const PipelineFrame& frame, std::size_t pixel,
   check("inverse depth", pixel, static_cast<float>(1 / d), {kept, z.error + 2 * kBits * kept});
 }
 
-void Truth::CheckForward(const PipelineFrame& frame, Comparison* comparison) {
+void Truth::CheckForward(const Images& frame, Comparison* comparison) {
   CheckFaceIds(frame, comparison);
   soft_.face_ids.assign(frame.face_ids.begin(), frame.face_ids.end());
   const SoftTruth soft(soft_);
@@ -321,7 +327,7 @@ bool Truth::SameVerticesVisible() const {
 }
 
 // Takes the gradient away from pixels where it does not exist, or depends on rounding.
-void Truth::Mask(const PipelineFrame& frame, const SoftTruth& soft) {
+void Truth::Mask(const Images& frame, const SoftTruth& soft) {
   for (const std::size_t i : pixels_) {
     if (frame.face_ids[i] < 0) {
       if (!soft.Resolved(i) || soft.Ambiguous(i, true)) d_alpha_[i] = 0;
@@ -365,7 +371,7 @@ void AllowLateDifferences(const raster::ScreenMesh& mesh, const PixelTruth& at, 
   }
 }
 
-void Truth::AddInterpolated(const PipelineFrame& frame, PreparedGradients<Bounded>* d) const {
+void Truth::AddInterpolated(const Images& frame, PreparedGradients<Bounded>* d) const {
   std::vector<Bounded> d_out(Channels());
   for (const std::size_t i : pixels_) {
     if (frame.face_ids[i] < 0) continue;
@@ -396,36 +402,23 @@ void Truth::AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const 
   }
 }
 
-struct GradientStorage {
-  std::vector<float> positions, attributes;
-  PipelineGradients d;
-
-  explicit GradientStorage(const TestScene<float>& scene)
-      : positions(scene.positions.size()),
-        attributes(scene.attributes.size()),
-        d{positions, attributes, true, {}} {}
-};
-
 bool NamesWhatOverflows(const Status& status) {
   const std::string& m = status.message();
   const auto at = m.find("the gradient overflows: d_scene.");
   return at != std::string::npos && m.find('[', at) != std::string::npos;
 }
 
-void Truth::CompareGradients(const PipelineFrame& frame, const SoftTruth& soft,
-                             const Status& status, const PipelineGradients& got,
-                             Comparison* comparison, CheckCounts* counts) {
-  PreparedGradients<Bounded> d(scene_.View(), prepared_);
+void Truth::CompareGradients(const Images& frame, const SoftTruth& soft, const Status& status,
+                             const Gradients& got, Comparison* comparison, CheckCounts* counts) {
+  PreparedGradients<Bounded> d(prepared_);
   AddInterpolated(frame, &d);
   AddSoft(soft, &d);
-  std::vector<Bounded> positions(scene_.positions.size()), attributes(scene_.attributes.size());
-  PipelineGradientsT<Bounded> expected{positions, attributes, true, {}};
-  PrepareRefBackward(scene_.View(), e_.options, prepared_, d, &expected);
-  const CameraT<Bounded>& c = expected.d_camera;
+  const MeshGradients<Bounded> expected = PrepareRefBackward(e_.options, prepared_, d);
+  const CameraT<Bounded>& c = expected.camera;
   const Bounded lens[] = {c.fx, c.fy, c.cx, c.cy};
   bool fits = true;
   for (const auto& array :
-       {std::span<const Bounded>(positions), std::span<const Bounded>(attributes),
+       {std::span<const Bounded>(expected.positions), std::span<const Bounded>(expected.attributes),
         std::span<const Bounded>(c.rotation), std::span<const Bounded>(c.translation),
         std::span<const Bounded>(lens)}) {
     for (const Bounded& x : array) fits &= std::isfinite(x.error);
@@ -441,28 +434,28 @@ void Truth::CompareGradients(const PipelineFrame& frame, const SoftTruth& soft,
       comparison->Check(array, i, actual[i], truth[i]);
     }
   };
-  check("d_positions", got.positions, positions);
-  check("d_attributes", got.attributes, attributes);
-  check("d_rotation", got.d_camera.rotation, c.rotation);
-  check("d_translation", got.d_camera.translation, c.translation);
-  const float got_lens[] = {got.d_camera.fx, got.d_camera.fy, got.d_camera.cx, got.d_camera.cy};
+  check("d_positions", got.positions, expected.positions);
+  check("d_attributes", got.attributes, expected.attributes);
+  check("d_rotation", got.camera.rotation, c.rotation);
+  check("d_translation", got.camera.translation, c.translation);
+  const float got_lens[] = {got.camera.fx, got.camera.fy, got.camera.cx, got.camera.cy};
   check("d_{fx, fy, cx, cy}", got_lens, lens);
 }
 
-void Truth::CheckBackward(const PipelineFrame& frame, Pipeline* renderer, Comparison* comparison,
+void Truth::CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
                           CheckCounts* counts) {
-  const PipelineScene views[] = {e_.scene.View()};
-  GradientStorage storage(e_.scene);
+  Gradients got(e_.scene);
+  const SceneGradients d = got.View();
   const auto run = [&] {
-    return renderer->Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, {&storage.d, 1});
+    return renderer->Backward(frame, {.alpha = d_alpha_, .attributes = d_attributes_}, {&d, 1});
   };
   const Status all = run();
   comparison->Require(all.ok() || NamesWhatOverflows(all), "unclear error: " + all.message());
   if (!SameVerticesVisible()) return;
   const SoftTruth soft(soft_);
-  Mask(frame, soft);
+  Mask(frame.images(), soft);
   const Status masked = run();
-  CompareGradients(frame, soft, masked, storage.d, comparison, counts);
+  CompareGradients(frame.images(), soft, masked, got, comparison, counts);
 }
 
 }  // namespace
@@ -476,17 +469,17 @@ void CheckCounts::Add(const CheckCounts& other) {
   worst = std::max(worst, other.worst);
 }
 
-std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Pipeline* renderer,
+std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Renderer* renderer,
                               CheckCounts* counts) {
-  PipelineFrame frame;
-  const PipelineScene views[] = {scene.scene.View()};
-  const Status status =
-      renderer->Render(views, scene.options, {.depth = true, .barycentrics = true}, &frame);
+  Frame frame;
+  const Scene view = scene.scene.View();
+  const Outputs outputs{.color = false, .depth = true, .barycentrics = true};
+  const Status status = renderer->Render({&view, 1}, scene.options, outputs, &frame);
   if (!status.ok()) return "Render: " + status.message();
   Comparison comparison(counts);
   Truth truth(scene, number);
   truth.CheckProjection(&comparison);
-  truth.CheckForward(frame, &comparison);
+  truth.CheckForward(frame.images(), &comparison);
   truth.CheckBackward(frame, renderer, &comparison, counts);
   return comparison.failure();
 }

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "raster/extremes/scenes.h"
-#include "render/pipeline/pipeline.h"
+#include "render/renderer.h"
 
 namespace tilegrad::test {
 
@@ -29,7 +29,7 @@ struct CheckCounts {
 };
 
 // What is wrong, or an empty string. `number` seeds the gradients and the choice of pixels.
-std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Pipeline* renderer,
+std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Renderer* renderer,
                               CheckCounts* counts);
 
 }  // namespace tilegrad::test

@@ -4,16 +4,19 @@
 // raster/soft_mask/paper_test.cc.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/pipeline_ref.h"
 #include "render/pipeline/test_scenes.h"
+#include "render/reference.h"
+#include "tilegrad/renderer.h"
 
 namespace tilegrad::paper_test {
 
 using test::TestScene;
+
+constexpr Outputs kImages{.color = false};
 
 RenderOptions PaperOptions() {
   RenderOptions options;
@@ -26,20 +29,29 @@ RenderOptions PaperOptions() {
   return options;
 }
 
+// One scene, rendered.
+struct Drawn {
+  TestScene<float> mesh;
+  Frame frame;
+
+  Drawn(TestScene<float> scene, const RenderOptions& options) : mesh(std::move(scene)) {
+    const Scene view = mesh.View();
+    const Status status = Renderer({.threads = 2}).Render({&view, 1}, options, kImages, &frame);
+    EXPECT_TRUE(status.ok()) << status.message();
+  }
+  std::span<const float> alpha() const { return frame.images().alpha; }
+};
+
 struct Gradients {
   std::vector<float> positions;
   Camera camera;
 };
 
-Gradients BackwardOf(const TestScene<float>& scene, const RenderOptions& options,
-                     const PipelineFrame& frame, std::span<const float> d_alpha, int worker_count) {
-  const Workers workers(worker_count);
-  Pipeline renderer(workers);
-  const PipelineScene views[] = {scene.View()};
-  Gradients out{std::vector<float>(scene.positions.size()), {}};
-  PipelineGradients d[] = {{out.positions, {}, true, {}}};
-  EXPECT_TRUE(renderer.Backward(views, options, frame, {{}, d_alpha}, d).ok());
-  out.camera = d[0].d_camera;
+Gradients BackwardOf(const Drawn& drawn, const FrameGradients& d_frame, int threads) {
+  Gradients out{std::vector<float>(drawn.mesh.positions.size()), {}};
+  const SceneGradients d{.positions = out.positions, .camera = &out.camera};
+  const Status status = Renderer({.threads = threads}).Backward(drawn.frame, d_frame, {&d, 1});
+  EXPECT_TRUE(status.ok()) << status.message();
   return out;
 }
 
@@ -47,43 +59,40 @@ Gradients BackwardOf(const TestScene<float>& scene, const RenderOptions& options
 // double disagree about that in few pixels, which are counted.
 void CheckAgainstReference(const RenderOptions& options, std::size_t most_different) {
   Rng rng(4);
-  const auto scene = test::TriangleSoup(40, 0.15, options.width, options.height, &rng);
-  const auto truth_scene = MeshCast<double>(scene);
-  const Workers workers(2);
-  Pipeline renderer(workers);
-  const PipelineScene views[] = {scene.View()};
-  PipelineFrame frame;
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  EXPECT_TRUE(std::isinf(frame.alpha_error_bound));
-  PipelineFrameT<double> truth;
-  RenderRefWithFaces<double>(truth_scene.View(), options, {}, frame.face_ids, {0, options.height},
-                             &truth);
-  std::vector<float> d_alpha(frame.alpha.size());
+  const Drawn drawn(test::TriangleSoup(40, 0.15, options.width, options.height, &rng), options);
+  const auto alpha = drawn.alpha();
+  EXPECT_TRUE(std::isinf(drawn.frame.images().alpha_error_bound));
+  const auto wide = MeshCast<double>(drawn.mesh);
+  const SceneT<double> truth_scene = wide.View();
+  FrameImagesT<double> truth;
+  const auto ids = drawn.frame.images().face_ids;
+  ReferenceRender(truth_scene, options, kImages, ids, &truth);
+  std::vector<float> d_alpha(alpha.size());
   std::size_t different = 0, between = 0;
-  for (std::size_t i = 0; i < frame.alpha.size(); ++i) {
-    // kAlphaTolerance of renderer_test.cc, for a kernel of this width.
-    const bool same = std::abs(static_cast<double>(frame.alpha[i]) - truth.alpha[i]) < 1e-4;
+  for (std::size_t i = 0; i < alpha.size(); ++i) {
+    // Distances err by 8 eps in NDC, so exp(-z) by at most 0.86 * 8 eps / sqrt(delta) = 3e-5.
+    const bool same = std::abs(static_cast<double>(alpha[i]) - truth.alpha[i]) < 1e-4;
     different += !same;
-    between += frame.alpha[i] > 0 && frame.alpha[i] < 1;
+    between += alpha[i] > 0 && alpha[i] < 1;
     if (same) d_alpha[i] = static_cast<float>(rng.Uniform(-1, 1));
   }
   EXPECT_LE(different, most_different);
   EXPECT_GT(between, 100u);
   const std::vector<double> t_d_alpha(d_alpha.begin(), d_alpha.end());
-  std::vector<double> t_positions(scene.positions.size());
-  PipelineGradientsT<double> t{t_positions, {}, true, {}};
-  RenderRefBackward<double>(truth_scene.View(), options, frame.face_ids, {{}, t_d_alpha},
-                            {0, options.height}, &t);
-  const Gradients got = BackwardOf(scene, options, frame, d_alpha, 2);
+  std::vector<double> t_positions(drawn.mesh.positions.size());
+  CameraT<double> t_camera;
+  ReferenceRenderBackward<double>(truth_scene, options, ids, {.alpha = t_d_alpha},
+                                  {.positions = t_positions, .camera = &t_camera});
+  const Gradients got = BackwardOf(drawn, {.alpha = d_alpha}, 2);
   double largest = 0;
   for (const double d : t_positions) largest = std::max(largest, std::abs(d));
   EXPECT_GT(largest, 0);
   for (std::size_t i = 0; i < t_positions.size(); ++i) {
     EXPECT_NEAR(got.positions[i], t_positions[i], 1e-3 * largest);
   }
-  EXPECT_NEAR(got.camera.fx / t.d_camera.fx, 1, 1e-2);
-  for (const int count : {1, 3}) {
-    EXPECT_EQ(BackwardOf(scene, options, frame, d_alpha, count).positions, got.positions);
+  EXPECT_NEAR(got.camera.fx / t_camera.fx, 1, 1e-2);
+  for (const int threads : {1, 3}) {
+    EXPECT_EQ(BackwardOf(drawn, {.alpha = d_alpha}, threads).positions, got.positions);
   }
 }
 
@@ -101,20 +110,13 @@ TEST(PaperAlpha, RendererIsTheReferenceOnLargeImages) {
 TEST(PaperAlpha, AddsToTheGradientOfAttributes) {
   const RenderOptions options = PaperOptions();
   Rng rng(5);
-  const auto scene = test::BumpySphere(4, 6, options.width, options.height, &rng);
-  const Workers workers(1);
-  Pipeline renderer(workers);
-  const PipelineScene views[] = {scene.View()};
-  PipelineFrame frame;
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  const std::vector<float> d_alpha(frame.alpha.size(), 1.0f),
+  const Drawn drawn(test::BumpySphere(4, 6, options.width, options.height, &rng), options);
+  const std::vector<float> d_alpha(drawn.alpha().size(), 1.0f),
       d_attributes(3 * d_alpha.size(), 0.5f);
-  std::vector<float> both(scene.positions.size()), one(both.size());
-  PipelineGradients d_both[] = {{both, {}, false, {}}}, d_one[] = {{one, {}, false, {}}};
-  ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d_both).ok());
-  ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, {}}, d_one).ok());
-  const Gradients alpha = BackwardOf(scene, options, frame, d_alpha, 1);
-  for (std::size_t i = 0; i < both.size(); ++i) EXPECT_EQ(both[i], one[i] + alpha.positions[i]);
+  const auto both = BackwardOf(drawn, {.alpha = d_alpha, .attributes = d_attributes}, 1).positions;
+  const auto one = BackwardOf(drawn, {.attributes = d_attributes}, 1).positions;
+  const auto alpha = BackwardOf(drawn, {.alpha = d_alpha}, 1).positions;
+  for (std::size_t i = 0; i < both.size(); ++i) EXPECT_EQ(both[i], one[i] + alpha[i]);
 }
 
 TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
@@ -122,21 +124,13 @@ TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
   options.paper_box = 0.2;
   options.paper_faces = 1;
   Rng rng(6);
-  auto scene = test::TriangleSoup(30, 0.1, options.width, options.height, &rng);
-  const Workers workers(1);
-  Pipeline renderer(workers);
-  PipelineFrame frame;
-  const auto alpha = [&] {
-    const PipelineScene views[] = {scene.View()};
-    EXPECT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-    return frame.alpha;
-  };
-  const auto forward = alpha();
-  std::reverse(scene.faces.begin(), scene.faces.end());
-  const auto backward = alpha();
+  const auto scene = test::TriangleSoup(30, 0.1, options.width, options.height, &rng);
+  auto reversed = scene;
+  std::reverse(reversed.faces.begin(), reversed.faces.end());
+  const Drawn forward(scene, options), backward(reversed, options);
   double most = 0;
-  for (std::size_t i = 0; i < forward.size(); ++i) {
-    most = std::max(most, std::abs(static_cast<double>(forward[i] - backward[i])));
+  for (std::size_t i = 0; i < forward.alpha().size(); ++i) {
+    most = std::max(most, std::abs(static_cast<double>(forward.alpha()[i] - backward.alpha()[i])));
   }
   EXPECT_GT(most, 0.1);
 }
@@ -144,19 +138,16 @@ TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
 TEST(PaperAlpha, BadOptionsAndGradientsAreErrors) {
   RenderOptions options = PaperOptions();
   Rng rng(7);
-  const auto scene = test::TriangleSoup(3, 0.2, options.width, options.height, &rng);
-  const Workers workers(1);
-  Pipeline renderer(workers);
-  const PipelineScene views[] = {scene.View()};
-  PipelineFrame frame;
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  std::vector<float> d_alpha(frame.alpha.size()), d_positions(scene.positions.size());
+  Drawn drawn(test::TriangleSoup(3, 0.2, options.width, options.height, &rng), options);
+  std::vector<float> d_alpha(drawn.alpha().size()), d_positions(drawn.mesh.positions.size());
   d_alpha[3] = std::numeric_limits<float>::quiet_NaN();
-  PipelineGradients d[] = {{d_positions, {}, false, {}}};
-  EXPECT_EQ(renderer.Backward(views, options, frame, {{}, d_alpha}, d).message(),
+  const SceneGradients d{.positions = d_positions};
+  Renderer renderer;
+  EXPECT_EQ(renderer.Backward(drawn.frame, {.alpha = d_alpha}, {&d, 1}).message(),
             "d_frame.alpha[3] is nan");
   options.paper_box = -1;
-  EXPECT_EQ(renderer.Render(views, options, {}, &frame).message(),
+  const Scene view = drawn.mesh.View();
+  EXPECT_EQ(renderer.Render({&view, 1}, options, {}, &drawn.frame).message(),
             "options.paper_box is -1, must be finite and >= 0");
 }
 

@@ -8,14 +8,14 @@
 #include <utility>
 #include <vector>
 
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/test_batch.h"
+#include "render/pipeline/test_scenes.h"
+#include "render/renderer.h"
 
 namespace tilegrad::topologies_test {
 
-using test::kHeight;
-using test::kWidth;
 using test::TestScene;
+
+constexpr int kWidth = 40, kHeight = 36;
 
 // Scenes with their own positions and attributes, and the arrays of faces that they point to.
 struct Pool {
@@ -35,24 +35,30 @@ struct Pool {
     faces_of = {0, 0, 1, 2, 3, 3};
     for (const std::size_t n : {0, 2, 3, 4}) faces.push_back(scenes[n].faces);
   }
-  PipelineScene View(std::size_t n) const {
-    PipelineScene view = scenes[n].View();
+  Scene View(std::size_t n) const {
+    Scene view = scenes[n].View();
     view.faces = faces[faces_of[n]];
     return view;
   }
-  std::vector<PipelineScene> Views(const std::vector<std::size_t>& which) const {
-    std::vector<PipelineScene> out;
+  std::vector<Scene> Views(const std::vector<std::size_t>& which) const {
+    std::vector<Scene> out;
     for (const std::size_t n : which) out.push_back(View(n));
     return out;
   }
 };
+
+bool Update(Topologies* topologies, const std::vector<Scene>& scenes, const Workers& workers) {
+  std::vector<PipelineScene> views;
+  for (const Scene& scene : scenes) views.push_back(PipelineSceneOf(scene));
+  return topologies->Update(views, workers);
+}
 
 TEST(Topologies, ScenesOfOneArrayShareOne) {
   const Pool pool;
   const Workers workers(2);
   Topologies topologies;
   const auto views = pool.Views({0, 1, 2, 3});
-  ASSERT_TRUE(topologies.Update(views, workers));
+  ASSERT_TRUE(Update(&topologies, views, workers));
   EXPECT_EQ(&topologies.of(0), &topologies.of(1));
   EXPECT_NE(&topologies.of(1), &topologies.of(2));
   for (std::size_t n = 0; n < views.size(); ++n) {
@@ -72,37 +78,39 @@ TEST(Topologies, KnowWhenFacesHaveChanged) {
   const Workers workers(1);
   Topologies topologies;
   auto views = pool.Views({0, 3});
-  ASSERT_TRUE(topologies.Update(views, workers));
+  ASSERT_TRUE(Update(&topologies, views, workers));
   const TopologyId sphere = topologies.of(0).id, soup = topologies.of(1).id;
-  ASSERT_TRUE(topologies.Update(views, workers));
+  ASSERT_TRUE(Update(&topologies, views, workers));
   EXPECT_EQ(topologies.of(0).id, sphere);
   std::swap(pool.faces[0][0], pool.faces[0][1]);  // where the view points to
-  ASSERT_TRUE(topologies.Update(views, workers));
+  ASSERT_TRUE(Update(&topologies, views, workers));
   EXPECT_NE(topologies.of(0).id, sphere);
   EXPECT_EQ(topologies.of(1).id, soup);
   views[1].positions = views[1].positions.subspan(0, views[1].positions.size() - 3);
-  EXPECT_FALSE(topologies.Update(views, workers));  // the last vertex is used, and is not there
-  ASSERT_TRUE(topologies.Update(pool.Views({0, 3}), workers));
+  EXPECT_FALSE(Update(&topologies, views, workers));  // the last vertex is used, and is not there
+  ASSERT_TRUE(Update(&topologies, pool.Views({0, 3}), workers));
   EXPECT_NE(topologies.of(1).id, soup);
 }
 
+RenderOptions Options() { return {.width = kWidth, .height = kHeight, .delta = 1e-3}; }
+
 // Everything that a scene's image and gradients are, as bytes.
-std::string Bytes(Pipeline* renderer, const std::vector<PipelineScene>& views) {
-  const RenderOptions options = test::Options();
-  PipelineFrame frame;
-  EXPECT_TRUE(renderer->Render(views, options, {}, &frame).ok());
+std::string Bytes(Renderer* renderer, const std::vector<Scene>& views) {
+  Frame frame;
+  EXPECT_TRUE(renderer->Render(views, Options(), {.color = false}, &frame).ok());
+  const Images& images = frame.images();
   std::vector<std::vector<float>> positions, attributes;
-  for (const PipelineScene& view : views) {
+  for (const Scene& view : views) {
     positions.emplace_back(view.positions.size());
-    attributes.emplace_back(view.attributes.size());
+    attributes.emplace_back(view.attributes.values.size());
   }
-  std::vector<PipelineGradients> d_scenes;
+  std::vector<SceneGradients> d_scenes(views.size());
   for (std::size_t n = 0; n < views.size(); ++n) {
-    d_scenes.push_back({positions[n], attributes[n], false, {}});
+    d_scenes[n].positions = positions[n];
+    d_scenes[n].attributes = attributes[n];
   }
   EXPECT_TRUE(
-      renderer
-          ->Backward(views, options, frame, {frame.attributes, frame.alpha}, std::span(d_scenes))
+      renderer->Backward(frame, {.alpha = images.alpha, .attributes = images.attributes}, d_scenes)
           .ok());
   std::string out;
   const std::size_t count = views.size();
@@ -111,9 +119,9 @@ std::string Bytes(Pipeline* renderer, const std::vector<PipelineScene>& views) {
     out.append(reinterpret_cast<const char*>(values.data()) + n * size, size);
   };
   for (std::size_t n = 0; n < count; ++n) {
-    add(frame.face_ids, n, count);
-    add(frame.attributes, n, count);
-    add(frame.alpha, n, count);
+    add(images.face_ids, n, count);
+    add(images.attributes, n, count);
+    add(images.alpha, n, count);
     add(positions[n], 0, 1);
     add(attributes[n], 0, 1);
   }
@@ -127,7 +135,7 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
   Rng rng(6, 1);
   for (const int count : {1, 3}) {
     const Workers workers(count);
-    Pipeline renderer(workers);
+    Renderer renderer = RendererOn(workers);
     for (int round = 0; round < 120; ++round) {
       std::vector<std::size_t> which(1 + rng.Below(6));
       for (std::size_t& n : which) n = rng.Below(pool.scenes.size());
@@ -138,7 +146,7 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
       }
       std::string one_by_one;
       for (const std::size_t n : which) {
-        Pipeline fresh(workers);
+        Renderer fresh = RendererOn(workers);
         one_by_one += Bytes(&fresh, {pool.View(n)});
       }
       ASSERT_TRUE(Bytes(&renderer, pool.Views(which)) == one_by_one)
@@ -150,11 +158,11 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
 TEST(Topologies, AnIndexOutOfRangeIsNamedAndForgotten) {
   Pool pool;
   const Workers workers(1);
-  Pipeline renderer(workers);
-  PipelineFrame frame;
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
   const std::string before = Bytes(&renderer, pool.Views({0, 1, 3}));
   const std::int32_t good = std::exchange(pool.faces[2][7], 1 << 20);
-  const Status status = renderer.Render(pool.Views({0, 1, 3}), test::Options(), {}, &frame);
+  const Status status = renderer.Render(pool.Views({0, 1, 3}), Options(), {}, &frame);
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.message().find("faces"), std::string::npos) << status.message();
   EXPECT_NE(status.message().find('7'), std::string::npos) << status.message();

@@ -9,9 +9,8 @@
 
 #include "base/rng.h"
 #include "raster/interpolate_ref.h"
-#include "render/engine.h"
-#include "render/pipeline/pipeline_ref.h"
 #include "render/reference.h"
+#include "tilegrad/renderer.h"
 
 namespace tilegrad::uv_level_test {
 
@@ -42,7 +41,7 @@ struct Wall {
   // What float holds.
   static T Number(double x) { return static_cast<T>(static_cast<float>(x)); }
 
-  PipelineSceneT<T> View() const { return {positions, faces, uvs, 2, Rate::kVertex, camera}; }
+  SceneT<T> View() const { return {.positions = positions, .faces = faces, .camera = camera}; }
 };
 
 // A screen mesh in double, number for number.
@@ -70,7 +69,8 @@ TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
   for (int trial = 0; trial < 300; ++trial) {
     const Wall<float> wall(4, 0.01, &rng);
     PreparedScene<float> scene;
-    PrepareRef(wall.View(), Options(), &scene);
+    const Scene view = wall.View();
+    PrepareRef(view, {wall.uvs, 2, Rate::kVertex}, Options(), &scene);
     raster::ScreenMeshBuffersT<double> buffers;
     Widen(scene.buffers, &buffers);
     const raster::ScreenMeshT<double> mesh = buffers.View();
@@ -100,11 +100,7 @@ TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
 
 template <class T>
 SceneT<T> TwoSided(const Wall<T>& wall) {
-  SceneT<T> scene;
-  const PipelineSceneT<T> mesh = wall.View();
-  scene.positions = mesh.positions;
-  scene.faces = mesh.faces;
-  scene.camera = mesh.camera;
+  SceneT<T> scene = wall.View();
   scene.shading.normals = Normals::kFlat;
   scene.shading.two_sided = true;
   return scene;
@@ -113,8 +109,7 @@ SceneT<T> TwoSided(const Wall<T>& wall) {
 // Cut at a hundred millionth of their size faces reach so far out of the image that the sign of
 // their area there is beyond float. A normal turned the wrong way would be off by 2.
 TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
-  const Workers workers(1);
-  Engine renderer(workers);
+  Renderer renderer{{.threads = 1}};
   Outputs request;
   request.color = request.alpha = false;
   request.normals = true;
@@ -124,16 +119,17 @@ TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
     const Wall<float> wall(100, 1e-6, &rng);
     const Wall<double> wide(100, 1e-6, &same);
     const Scene scene = TwoSided(wall);
-    FrameImages frame;
+    Frame frame;
     ASSERT_TRUE(renderer.Render({&scene, 1}, Options(), request, &frame).ok());
+    const Images& images = frame.images();
     FrameImagesT<double> truth;
-    ReferenceRender<double>(TwoSided(wide), Options(), request, frame.face_ids, &truth);
+    ReferenceRender(TwoSided(wide), Options(), request, images.face_ids, &truth);
     int off = 0;
-    for (std::size_t i = 0; i < frame.normals.size(); ++i) {
-      off += std::abs(static_cast<double>(frame.normals[i]) - truth.normals[i]) > 1e-3;
+    for (std::size_t i = 0; i < images.normals.size(); ++i) {
+      off += std::abs(static_cast<double>(images.normals[i]) - truth.normals[i]) > 1e-3;
     }
     EXPECT_EQ(off, 0) << "scene " << seed;
-    for (const std::int32_t id : frame.face_ids) pixels += id >= 0;
+    for (const std::int32_t id : images.face_ids) pixels += id >= 0;
   }
   EXPECT_GT(pixels, 50000);
 }
