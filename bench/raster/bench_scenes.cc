@@ -6,7 +6,6 @@
 
 #include "base/rng.h"
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::bench {
@@ -70,9 +69,14 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
     d_colors.emplace_back(colors.size());
   }
   for (std::size_t n = 0; n < positions.size(); ++n) {
-    scenes.push_back({positions[n], faces, colors, 3, Rate::kVertex, camera});
+    scenes.push_back({.positions = positions[n],
+                      .faces = faces,
+                      .camera = camera,
+                      .attributes = {colors, Rate::kVertex},
+                      .channels = 3});
     d_scenes.push_back({d_positions[n], d_colors[n], false, {}});
   }
+  for (const Scene& scene : scenes) views.push_back({&scene, {colors, 3, Rate::kVertex}});
   const std::size_t pixels = static_cast<std::size_t>(spec.images) *
                              static_cast<std::size_t>(spec.size) *
                              static_cast<std::size_t>(spec.size);
@@ -82,13 +86,18 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
   for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
 }
 
+void Draw(const BenchBatch& batch, const Outputs& outputs, Pipeline* renderer, FrameImages* frame) {
+  SizeFrame(batch.views.size(), 3, batch.options, outputs, frame);
+  renderer->Render(batch.views, batch.options, {.image = &frame->attributes}, frame);
+}
+
 CulledBatch::CulledBatch(const BenchBatch& batch)
     : faces(batch.faces), colors(batch.colors), d_alpha(batch.d_alpha) {
   const RenderOptions& o = batch.options;
   const std::size_t n = batch.scenes.size();
   const auto pixels = static_cast<std::size_t>(o.width) * static_cast<std::size_t>(o.height);
   frames.resize(n);
-  for (const PipelineScene& scene : batch.scenes) {
+  for (const Scene& scene : batch.scenes) {
     raster::ScreenMeshBuffers screen;
     raster::Project(FaceSourceOf(scene, o), o.width, o.height, &screen);
     std::vector<float>& xy = ndc.emplace_back();

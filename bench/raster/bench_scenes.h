@@ -34,11 +34,15 @@ struct BenchBatch {
   std::vector<std::int32_t> faces;
   std::vector<float> colors;
   std::vector<std::vector<float>> positions;  // per image
-  std::vector<PipelineScene> scenes;
+  std::vector<Scene> scenes;                  // whose attributes are the colors
+  std::vector<PipelineScene> views;
   std::vector<float> d_attributes, d_alpha;
   std::vector<std::vector<float>> d_positions, d_colors;
   std::vector<PipelineGradients> d_scenes;
 };
+
+// What Pipeline::Render does for a batch, into `frame`.
+void Draw(const BenchBatch& batch, const Outputs& outputs, Pipeline* renderer, FrameImages* frame);
 
 // The same batch for the yardstick, which starts on the screen.
 struct CulledBatch {

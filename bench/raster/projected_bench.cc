@@ -13,7 +13,6 @@
 #include "compat/pytorch3d/layered_raster.h"
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad::bench {
 namespace {
@@ -29,7 +28,7 @@ struct ProjectedBench {
   explicit ProjectedBench(const SceneSpec& spec) : batch(spec) {
     raster.size = mask.size = {spec.size, spec.size};
     mask.delta = batch.options.delta;
-    for (const PipelineScene& scene : batch.scenes) Append(scene, spec.size);
+    for (const Scene& scene : batch.scenes) Append(scene, spec.size);
     const std::size_t pixels = compat::PixelCount(raster.size) * batch.scenes.size();
     features.assign(z.size() * kChannels, T(0.5));
     d_features.resize(features.size());
@@ -65,7 +64,7 @@ struct ProjectedBench {
   bool failed = false;
 
  private:
-  void Append(const PipelineScene& scene, int size) {
+  void Append(const Scene& scene, int size) {
     raster::ScreenMeshBuffers buffers;
     raster::Project(FaceSourceOf(scene, batch.options), size, size, &buffers);
     const raster::ScreenMesh screen = buffers.View();

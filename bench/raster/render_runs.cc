@@ -13,10 +13,6 @@
 namespace tilegrad::bench {
 namespace {
 
-void Check(const Status& status, benchmark::State& state) {
-  if (!status.ok()) state.SkipWithError(status.message().c_str());
-}
-
 BenchBatch MakeBatch(const RunSpec& spec) {
   BenchBatch batch(spec.scene);
   batch.options.interpolation = spec.interpolation;
@@ -27,7 +23,9 @@ BenchBatch MakeBatch(const RunSpec& spec) {
 
 CulledParts PartsOf(const RunSpec& spec) { return {spec.color, spec.alpha}; }
 
-Outputs RequestOf(const RunSpec& spec) { return {.alpha = spec.alpha, .attributes = spec.color}; }
+Outputs RequestOf(const RunSpec& spec) {
+  return {.color = false, .alpha = spec.alpha, .attributes = spec.color};
+}
 
 PipelineCotangents CotangentsOf(const RunSpec& spec, const BenchBatch& batch) {
   PipelineCotangents d_frame;
@@ -89,13 +87,11 @@ void Forward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const Workers workers(spec.workers);
   Pipeline renderer(workers);
-  PipelineFrame frame;
+  FrameImages frame;
   const Outputs request = RequestOf(spec);
   // The first frame finds its memory: not what a steady state costs.
-  Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
-  for (auto _ : state) {
-    Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
-  }
+  Draw(batch, request, &renderer, &frame);
+  for (auto _ : state) Draw(batch, request, &renderer, &frame);
   SetEvaluated(state, spec, renderer);
 }
 
@@ -103,13 +99,15 @@ void Backward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const Workers workers(spec.workers);
   Pipeline renderer(workers);
-  PipelineFrame frame;
-  Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
+  FrameImages frame;
+  Draw(batch, {.color = false}, &renderer, &frame);
   const PipelineCotangents d_frame = CotangentsOf(spec, batch);
-  Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
-  for (auto _ : state) {
-    Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
-  }
+  const auto backward = [&] {
+    if (renderer.Backward(batch.views, batch.options, frame, d_frame, batch.d_scenes)) return;
+    state.SkipWithError("a gradient is not finite");
+  };
+  backward();
+  for (auto _ : state) backward();
   SetEvaluated(state, spec, renderer);
 }
 
@@ -126,20 +124,11 @@ void CulledBackwardRun(benchmark::State& state, const RunSpec& spec) {
   for (auto _ : state) culled.Backward(PartsOf(spec));
 }
 
-Scene FirstScene(const BenchBatch& batch) {
-  const PipelineScene& first = batch.scenes[0];
-  return {.positions = first.positions,
-          .faces = first.faces,
-          .camera = first.camera,
-          .attributes = {first.attributes, first.rate},
-          .channels = first.channels};
-}
-
 void NaiveForward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
-  const Scene scene = FirstScene(batch);
-  const Outputs request{.color = false, .alpha = spec.alpha, .attributes = spec.color};
+  const Scene& scene = batch.scenes[0];
+  const Outputs request = RequestOf(spec);
   FrameImages frame;
   for (auto _ : state) {
     const auto ids = FaceIdsRef(scene, batch.options, rows);
@@ -150,7 +139,7 @@ void NaiveForward(benchmark::State& state, const RunSpec& spec) {
 void NaiveBackward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
-  const Scene scene = FirstScene(batch);
+  const Scene& scene = batch.scenes[0];
   const auto ids = FaceIdsRef(scene, batch.options, rows);
   const PipelineCotangents d_images = CotangentsOf(spec, batch);
   const FrameGradients d_frame{.alpha = d_images.alpha, .attributes = d_images.attributes};

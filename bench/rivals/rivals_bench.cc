@@ -31,7 +31,7 @@ struct RivalBench {
   std::vector<Camera> cameras;
 
   explicit RivalBench(bool with_color = false) {
-    for (const PipelineScene& scene : batch.scenes) {
+    for (const Scene& scene : batch.scenes) {
       positions.insert(positions.end(), scene.positions.begin(), scene.positions.end());
       cameras.push_back(scene.camera);
     }
@@ -97,18 +97,16 @@ void Dibr(benchmark::State& state, Way way, int count) {
   bench.batch.options.max_alpha_error = 1e-5;
   const Workers workers(count);
   Pipeline renderer(workers);
-  PipelineFrame frame;
-  PipelineCotangents d_frame;
-  d_frame.alpha = bench.batch.d_alpha;
+  FrameImages frame;
   const auto forward = [&] {
-    Check(renderer.Render(bench.batch.scenes, bench.batch.options,
-                          {.alpha = true, .attributes = false}, &frame),
-          state);
+    Draw(bench.batch, {.color = false, .attributes = false}, &renderer, &frame);
   };
   const auto backward = [&] {
-    Check(renderer.Backward(bench.batch.scenes, bench.batch.options, frame, d_frame,
-                            bench.batch.d_scenes),
-          state);
+    if (renderer.Backward(bench.batch.views, bench.batch.options, frame, {{}, bench.batch.d_alpha},
+                          bench.batch.d_scenes)) {
+      return;
+    }
+    state.SkipWithError("a gradient is not finite");
   };
   forward();
   backward();

@@ -73,11 +73,9 @@ class ShadedBatch {
   }
 
   void AddScene(std::size_t n) {
-    Scene scene;
-    const PipelineScene& mesh = batch_.scenes[n];
-    scene.positions = mesh.positions;
-    scene.faces = mesh.faces;
-    scene.camera = mesh.camera;
+    Scene scene = batch_.scenes[n];
+    scene.attributes = {};
+    scene.channels = 0;
     SceneGradients d;
     d.positions = batch_.d_positions[n];
     if (request_spec_.textured) {

@@ -3,9 +3,9 @@
 
 #include <limits>
 
+#include "base/array_checks.h"
 #include "base/error.h"
-#include "render/pipeline/quick_checks.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 
 namespace tilegrad::compat {
 namespace {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/engine.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
 #include "base/clocks.h"
+#include "base/error.h"
+#include "render/checks.h"
 #include "render/pipeline/pipeline.h"
-#include "render/pipeline/validate.h"
 #include "render/shading/gradients.h"
 #include "render/shading/inputs.h"
 #include "render/shading/merge.h"
@@ -48,18 +50,15 @@ struct Engine::Impl {
         inputs(w),
         gradients(w) {}
 
-  std::size_t PixelsOf(const RenderOptions& options) const {  // of all images
-    return inputs.views().size() * static_cast<std::size_t>(options.width) *
-           static_cast<std::size_t>(options.height);
-  }
-  Status RenderStaged(const RenderOptions& options, FrameImages* frame);
-  Status RenderPlain(const RenderOptions& options, FrameImages* frame);
+  // Streams for the pipeline: side by side for the stage, or as they are.
+  Status SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
+                   bool user_only);
   Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& request,
                 FrameImages* frame);
 
-  // The pipeline's backward pass, with the stage if there is one.
-  Status RunBackward(const RenderOptions& options, const FrameImages& frame,
-                     const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
+  // The pipeline's backward pass, with the stage if there is one. False: a number is not finite.
+  bool RunBackward(const RenderOptions& options, const FrameImages& frame,
+                   const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
   // From what that pass has summed to gradients of the scenes' arrays.
   void MergeBackward(std::span<const Scene> scenes, std::span<const SceneGradients> d_scenes);
   Status Backward(std::span<const Scene> scenes, const RenderOptions& options,
@@ -81,52 +80,34 @@ struct Engine::Impl {
   double merge_ms = 0;
 };
 
-Status Engine::Impl::RenderStaged(const RenderOptions& options, FrameImages* frame) {
-  const std::size_t pixels = PixelsOf(options);
-  const Outputs& request = forward.request;
-  frame->channels = forward.varyings.width(Varying::kUser);
-  frame->color.resize(request.color ? 3 * pixels : 0);
-  frame->normals.resize(request.normals ? 3 * pixels : 0);
-  frame->uv.resize(request.uv ? 2 * pixels : 0);
-  stage.BeginForward(forward, inputs.scenes(), options, frame);
-  return pipeline.Render(inputs.views(), options, request, frame, &stage);
-}
-
-// Attributes are the images themselves, or there are none.
-Status Engine::Impl::RenderPlain(const RenderOptions& options, FrameImages* frame) {
-  Outputs request = forward.request;
-  request.attributes = forward.colors_only || forward.user_only;
-  // Wanted, but of a scene that has none: background.
-  const std::size_t pixels = PixelsOf(options);
-  frame->normals.assign(request.normals ? 3 * pixels : 0, 0.0f);
-  frame->uv.assign(request.uv ? 2 * pixels : 0, 0.0f);
-  if (!forward.colors_only) {
-    frame->color.clear();
-    return pipeline.Render(inputs.views(), options, request, frame);
-  }
-  frame->attributes.swap(frame->color);
-  Status status = pipeline.Render(inputs.views(), options, request, frame);
-  frame->attributes.swap(frame->color);
-  frame->attributes.clear();
-  frame->channels = 0;
-  return status;
+Status Engine::Impl::SetInputs(std::span<const Scene> scenes, const StreamSets& sets,
+                               bool colors_only, bool user_only) {
+  if (staged) return inputs.Pack(scenes, sets);
+  inputs.UsePlain(scenes, colors_only, user_only);
+  return {};
 }
 
 Status Engine::Impl::Render(std::span<const Scene> scenes, const RenderOptions& options,
                             const Outputs& request, FrameImages* frame) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes));
+  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers));
   forward = PlanForward(parts, request);
   staged = forward.staged() && !scenes.empty();
   was_backward = false;
   merge_ms = 0;
   inputs.Begin(scenes, staged && forward.steps.texture);
+  TILEGRAD_TRY(SetInputs(scenes, {forward.varyings, forward.varyings[Varying::kNormal]},
+                         forward.colors_only, forward.user_only));
+  SizeFrame(scenes.size(), parts.user_channels, options, request, frame);
+  Pipeline::Attributes attributes;
   if (staged) {
-    inputs.Pack(scenes, {forward.varyings, forward.varyings[Varying::kNormal]});
+    stage.BeginForward(forward, inputs.scenes(), options, frame);
+    attributes.stage = &stage;
   } else {
-    inputs.UsePlain(scenes, forward.colors_only, forward.user_only);
+    std::fill(frame->uv.begin(), frame->uv.end(), 0.0f);  // wanted, but of a scene that has none
+    if (forward.colors_only) attributes.image = &frame->color;
+    if (forward.user_only) attributes.image = &frame->attributes;
   }
-  TILEGRAD_TRY(staged ? RenderStaged(options, frame) : RenderPlain(options, frame));
+  pipeline.Render(inputs.views(), options, attributes, frame);
   return parts.may_overflow ? ValidateImages(*frame) : Status();
 }
 
@@ -140,44 +121,43 @@ PlanReport Engine::Impl::Explain() const {
 Status Engine::Impl::Backward(std::span<const Scene> scenes, const RenderOptions& options,
                               const FrameImages& frame, const FrameGradients& d_frame,
                               std::span<const SceneGradients> d_scenes) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes));
-  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, d_frame, d_scenes));
+  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers));
+  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, frame, d_frame, d_scenes));
   backward = PlanBackward(parts, WishesOf(d_frame, d_scenes));
   staged = backward.staged() && !scenes.empty();
   was_backward = true;
   inputs.Begin(scenes, staged && backward.steps.texture);
-  if (staged) {
-    const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
-    const bool same = backward.pulled == backward.recomputed;
-    inputs.Pack(scenes, {backward.pulled, normals, same ? nullptr : &backward.recomputed});
-    stage.BeginBackward(backward, inputs.scenes(), options, d_frame);
-  } else {
-    inputs.UsePlain(scenes, backward.colors_only, backward.user_only);
-  }
+  const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
+  const bool same = backward.pulled == backward.recomputed;
+  TILEGRAD_TRY(SetInputs(scenes, {backward.pulled, normals, same ? nullptr : &backward.recomputed},
+                         backward.colors_only, backward.user_only));
+  if (staged) stage.BeginBackward(backward, inputs.scenes(), options, d_frame);
   const std::span<PipelineGradients> d_views = gradients.Begin(backward, inputs.views(), d_scenes);
-  TILEGRAD_TRY(RunBackward(options, frame, d_frame, d_views));
+  const bool sound = RunBackward(options, frame, d_frame, d_views);
+  if (!sound) {
+    TILEGRAD_TRY(CheckNumbers("d_frame.alpha", d_frame.alpha));
+    TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
+  }
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (d_scenes[n].camera != nullptr) *d_scenes[n].camera = d_views[n].d_camera;
   }
   MergeBackward(scenes, d_scenes);
-  return ValidateResult(d_scenes);
+  TILEGRAD_TRY(ValidateResult(d_scenes));
+  return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody wants
 }
 
-Status Engine::Impl::RunBackward(const RenderOptions& options, const FrameImages& frame,
-                                 const FrameGradients& d_frame,
-                                 std::span<PipelineGradients> d_views) {
+bool Engine::Impl::RunBackward(const RenderOptions& options, const FrameImages& frame,
+                               const FrameGradients& d_frame,
+                               std::span<PipelineGradients> d_views) {
   PipelineCotangents d_images{{}, d_frame.alpha};
   if (backward.colors_only) d_images.attributes = d_frame.color;
   if (backward.user_only) d_images.attributes = d_frame.attributes;
-  Status status = pipeline.Backward(inputs.views(), options, frame, d_images, d_views,
-                                    staged ? &stage : nullptr);
+  const bool sound = pipeline.Backward(inputs.views(), options, frame, d_images, d_views,
+                                       staged ? &stage : nullptr);
+  if (staged) return sound && stage.sound();
   // Cotangents that pull nothing have been looked at by nobody.
-  const bool unseen = !staged && !backward.colors_only && !backward.user_only;
-  if (!status.ok() || unseen || (staged && !stage.sound())) {
-    TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
-  }
-  return status;
+  const bool seen = backward.colors_only || backward.user_only;
+  return sound && (seen || ValidateCotangents(d_frame, frame.face_ids).ok());
 }
 
 void Engine::Impl::MergeBackward(std::span<const Scene> scenes,

@@ -23,8 +23,7 @@ class Engine {
   Engine(Engine&&) noexcept;
   Engine& operator=(Engine&&) noexcept;
 
-  // As RendererT::Render, given enumerators (render/validate.h). After an error `frame` is left
-  // unspecified.
+  // As RendererT::Render. After an error `frame` is left unspecified.
   Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& outputs,
                 FrameImages* frame);
 

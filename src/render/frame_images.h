@@ -2,20 +2,53 @@
 // The arrays behind a Frame.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
 #include "base/aligned.h"
-#include "render/pipeline/records.h"
+#include "render/scene_fields.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad {
 
-// 0 at background pixels. `attributes` [N,C,H,W] and `channels` are the user's.
+// The images of a batch, planar: row 0 on top. Reused between calls of one size without allocation.
 template <class T>
-struct FrameImagesT : PipelineFrameT<T> {
-  AlignedVector<T> color;    // [N,3,H,W]
-  AlignedVector<T> normals;  // [N,3,H,W]
-  AlignedVector<T> uv;       // [N,2,H,W]
+struct FrameImagesT {
+  int images = 0, channels = 0, height = 0, width = 0;  // channels: of attributes
+  // Of N images; shapes and background as in ImagesT.
+  AlignedVector<std::int32_t> face_ids;
+  AlignedVector<T> color, alpha, attributes, depth, normals, uv, barycentrics;
+  double alpha_error_bound = 0;
+  // [N, H W] 1 - alpha with more digits, where Backward has use for it, in the order of
+  // raster/soft_mask/soft_mask.h, SoftMaskImages; the rest is unspecified.
+  AlignedVector<T> transmittance;
+  // [N,H,W], or empty. Before Render: a pixel shows the nearest face whose 1/depth is less than
+  // this (raster/visibility.h: PeelVisibility). After it: 1/depth of that face, 0 where there is
+  // none. Only the engine's forward pass knows it.
+  AlignedVector<T> peeled;
 };
 using FrameImages = FrameImagesT<float>;
+
+// Room for the images that are wanted of so many scenes, and for no others.
+template <class T>
+void SizeFrame(std::size_t images, int channels, const RenderOptions& options,
+               const Outputs& outputs, FrameImagesT<T>* frame) {
+  frame->images = static_cast<int>(images);
+  frame->channels = outputs.attributes ? channels : 0;
+  frame->height = options.height;
+  frame->width = options.width;
+  const std::size_t pixels =
+      images * static_cast<std::size_t>(options.height) * static_cast<std::size_t>(options.width);
+  frame->face_ids.resize(pixels);
+  ForEachOutput(
+      channels,
+      [&](const char*, int planes, bool wanted, AlignedVector<T>& image) {
+        image.resize(wanted ? static_cast<std::size_t>(planes) * pixels : 0);
+      },
+      outputs, *frame);
+  frame->alpha_error_bound = 0;
+}
 
 // Views of them.
 template <class T>
@@ -26,13 +59,12 @@ ImagesT<T> ImagesOf(const FrameImagesT<T>& frame) {
   out.width = frame.width;
   out.channels = frame.channels;
   out.face_ids = frame.face_ids;
-  out.color = frame.color;
-  out.alpha = frame.alpha;
-  out.attributes = frame.attributes;
-  out.depth = frame.depth;
-  out.normals = frame.normals;
-  out.uv = frame.uv;
-  out.barycentrics = frame.barycentrics;
+  ForEachOutput(
+      frame.channels,
+      [](const char*, int, std::span<const T>& view, const AlignedVector<T>& image) {
+        view = image;
+      },
+      out, frame);
   out.alpha_error_bound = frame.alpha_error_bound;
   return out;
 }

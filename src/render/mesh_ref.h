@@ -16,7 +16,7 @@
 #include "raster/project_ref.h"
 #include "raster/soft_mask/soft_mask_ref.h"
 #include "render/alpha/paper_bin.h"
-#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 

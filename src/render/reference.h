@@ -265,13 +265,12 @@ void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const
   PrepareRefScene(scene, options, &s);
   SizeFrame(1, scene.channels, options, request, frame);
   frame->face_ids.assign(face_ids.begin(), face_ids.end());
-  const std::size_t plane = face_ids.size();
-  frame->color.assign(request.color ? 3 * plane : 0, T(0));
-  frame->normals.assign(request.normals ? 3 * plane : 0, T(0));
-  frame->uv.assign(request.uv ? 2 * plane : 0, T(0));
-  for (auto* image : {&frame->attributes, &frame->alpha, &frame->barycentrics}) {
-    std::fill(image->begin(), image->end(), T(0));
-  }
+  ForEachOutput(
+      0,
+      [](const char*, int, AlignedVector<T>& image) {
+        std::fill(image.begin(), image.end(), T(0));
+      },
+      *frame);
   std::fill(frame->depth.begin(), frame->depth.end(), T(std::numeric_limits<double>::infinity()));
   ForEachPixelRef(s, options, face_ids, rows,
                   [&](const RefPixel<T>& at) { ShadePixelIntoFrame(s, options, at, frame); });

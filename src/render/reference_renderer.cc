@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 #include "render/reference.h"
 #include "render/validate.h"
 
@@ -20,16 +20,6 @@ namespace {
 using SceneD = SceneT<double>;
 using FrameD = FrameImagesT<double>;
 using GradientsD = SceneGradientsT<double>;
-
-Status ValidateInput(std::span<const SceneD> scenes, const RenderOptions& options) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_TRY(ValidateScenes(scenes).status());
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Status status = ValidateSceneNumbers(PipelineSceneOf(scenes[n]));
-    if (!status.ok()) return status.Within(fmt::format("scene {}", n));
-  }
-  return {};
-}
 
 FrameD RenderImage(const SceneD& scene, const RenderOptions& options, const Outputs& outputs) {
   FrameD frame;
@@ -114,13 +104,13 @@ class OwnGradients {
 
 Status ReferenceRenderer::Render(std::span<const SceneD> scenes, const RenderOptions& options,
                                  const Outputs& outputs, FrameD* frame) {
-  TILEGRAD_TRY(ValidateInput(scenes, options));
+  TILEGRAD_TRY(ValidateScenes(scenes, options, *workers_).status());
   std::vector<FrameD> frames(scenes.size());
   workers_->For(scenes.size(), [&](std::size_t n, std::size_t) {
     frames[n] = RenderImage(scenes[n], options, outputs);
   });
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
-  SizeFrame(static_cast<int>(scenes.size()), channels, options, outputs, frame);
+  SizeFrame(scenes.size(), channels, options, outputs, frame);
   Gather(frames, frame);
   if (outputs.alpha && options.alpha_rule == AlphaRule::kPaper) {
     frame->alpha_error_bound = std::numeric_limits<double>::infinity();
@@ -131,14 +121,10 @@ Status ReferenceRenderer::Render(std::span<const SceneD> scenes, const RenderOpt
 Status ReferenceRenderer::Backward(std::span<const SceneD> scenes, const RenderOptions& options,
                                    const FrameD& frame, const FrameGradientsT<double>& d_frame,
                                    std::span<const GradientsD> d_scenes) {
-  TILEGRAD_TRY(ValidateInput(scenes, options));
-  TILEGRAD_TRY(ValidateBackward(scenes, options, d_frame, d_scenes));
+  TILEGRAD_TRY(ValidateScenes(scenes, options, *workers_).status());
+  TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
   TILEGRAD_TRY(CheckNumbers("d_frame.alpha", d_frame.alpha));
   TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
-  if (!d_frame.alpha.empty() && frame.alpha.size() != d_frame.alpha.size()) {
-    return InvalidArgument("frame.alpha has {} numbers, expected {}", frame.alpha.size(),
-                           d_frame.alpha.size());
-  }
   if (scenes.empty()) return {};
   std::vector<std::unique_ptr<OwnGradients>> own;
   for (const GradientsD& d : d_scenes) own.push_back(std::make_unique<OwnGradients>(d));

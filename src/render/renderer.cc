@@ -18,7 +18,6 @@
 #include "render/gradient_records.h"
 #include "render/reference_renderer.h"
 #include "render/scene_fields.h"
-#include "render/validate.h"
 
 namespace tilegrad {
 
@@ -131,26 +130,9 @@ struct RendererT<T>::Impl {
   std::optional<RendererScratch<T>> scratch;  // from Start on
 };
 
-// The border's own check: shape and numbers of each image agree, whichever path has drawn it.
-template <class T>
-Status CheckShapes(const ImagesT<T>& images, const Outputs& outputs) {
-  const std::size_t pixels = images.face_ids.size();
-  Status status;
-  ForEachOutput(
-      images.channels,
-      [&](const char* name, int planes, bool wanted, std::span<const T> image) {
-        const std::size_t expected = wanted ? static_cast<std::size_t>(planes) * pixels : 0;
-        if (!status.ok() || image.size() == expected) return;
-        status = InternalError("{} has {} numbers, expected {}", name, image.size(), expected);
-      },
-      outputs, images);
-  return status;
-}
-
 template <class T>
 Status RendererT<T>::Impl::Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
                                   const Outputs& outputs, typename FrameT<T>::Impl* frame) {
-  TILEGRAD_TRY(ValidateEnumerators(scenes, options));
   frame->options = options;
   frame->Keep(scenes);
   return scratch->engine.Render(frame->scenes, frame->options, outputs, &frame->images);
@@ -223,11 +205,10 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
                             const Outputs& outputs, FrameT<T>* frame) {
   if (frame == nullptr) return Guarded([] { return InvalidArgument("frame is null"); });
   frame->images_ = {};
-  Status status = Guarded([&] {
+  Status status = Guarded([&]() -> Status {
     TILEGRAD_TRY(Start());
     if (frame->impl_ == nullptr) frame->impl_ = std::make_unique<typename FrameT<T>::Impl>();
-    TILEGRAD_TRY(impl_->Render(scenes, options, outputs, frame->impl_.get()));
-    return CheckShapes(ImagesOf(frame->impl_->images), outputs);
+    return impl_->Render(scenes, options, outputs, frame->impl_.get());
   });
   if (status.ok()) {
     frame->images_ = ImagesOf(frame->impl_->images);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The border of the renderer: what scenes, cotangents and gradients of the public interface must
-// hold. T: float, or double of numbers in float's range.
+// The border of the renderer: what a caller may get wrong is checked here, once in each call and
+// before anything is computed; code behind relies on it. What takes long is not checked here but
+// where it is read first, in parallel (cotangents of images, sums of gradients): only if that finds
+// something, it is searched here. T: float, or double of numbers in float's range.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
+#include "base/parallel.h"
 #include "render/frame_images.h"
 #include "render/shading/plan.h"
 #include "tilegrad/renderer.h"
@@ -13,21 +16,18 @@
 
 namespace tilegrad {
 
-// What the engine takes for granted and a caller may still get wrong: numbers that are no
-// enumerator, from C at least, and lights without a direction, which would be darkness that pulls
-// nothing, so that an optimiser would stay there.
+// What the scenes are made of. Options are in their ranges; scenes agree, and every enumerator,
+// size, index and number of theirs is sound: scenes are looked through side by side. Lights have a
+// direction: without one they would be darkness that pulls nothing, so that an optimiser would stay
+// there. Errors name the scene, the array, the index and what was expected.
 template <class T>
-Status ValidateEnumerators(std::span<const SceneT<T>> scenes, const RenderOptions& options);
+Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                                  const Workers& workers);
 
-// What the scenes are made of; they agree, and every size, index and number of theirs is sound, but
-// those of cameras. Errors name the scene, the array, the index and what was expected.
-template <class T>
-Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes);
-
-// Sizes of images against `options`, and of gradients against the scenes.
+// Sizes of cotangents against the frame of valid scenes, and of gradients against the scenes.
 template <class T>
 Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& options,
-                        const FrameGradientsT<T>& d_frame,
+                        const FrameImagesT<T>& frame, const FrameGradientsT<T>& d_frame,
                         std::span<const SceneGradientsT<T>> d_scenes);
 
 // Cotangents that are not finite, but of alpha; of depth those of pixels that have a face. Only

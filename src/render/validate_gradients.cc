@@ -6,7 +6,7 @@
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 #include "render/scene_fields.h"
 #include "render/validate.h"
 
@@ -61,23 +61,24 @@ Status CheckResult(const SceneGradients& d, const SceneGradients& known) {
 
 template <class T>
 Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& options,
-                        const FrameGradientsT<T>& d_frame,
+                        const FrameImagesT<T>& frame, const FrameGradientsT<T>& d_frame,
                         std::span<const SceneGradientsT<T>> d_scenes) {
   if (d_scenes.size() != scenes.size()) {
     return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
   }
-  const std::size_t pixels = scenes.size() * static_cast<std::size_t>(options.width) *
-                             static_cast<std::size_t>(options.height);
   Status status;
   ForEachImage(
       scenes.empty() ? 0 : scenes[0].channels,
-      [&](std::string_view name, int planes, std::span<const T> image) {
-        if (!status.ok() || name == "alpha") return;  // against the frame's
-        status = CheckWanted("d_frame", name.data(), image.size(),
-                             static_cast<std::size_t>(planes) * pixels);
+      [&](const char* name, int planes, std::span<const T> image) {
+        if (!status.ok()) return;
+        status = CheckWanted("d_frame", name, image.size(),
+                             static_cast<std::size_t>(planes) * frame.face_ids.size());
       },
       d_frame);
   TILEGRAD_TRY(status);
+  if (!d_frame.alpha.empty()) {
+    TILEGRAD_TRY(CheckSize("frame.alpha", frame.alpha.size(), d_frame.alpha.size()));
+  }
   if (!d_frame.depth.empty() && options.interpolation != Interpolation::kPerspective) {
     return InvalidArgument("d_frame.depth needs options.interpolation kPerspective");
   }
@@ -125,10 +126,10 @@ Status ValidateResult(std::span<const SceneGradients> d_scenes) {
   return {};
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                      \
-  template Status ValidateBackward(std::span<const SceneT<T>>, const RenderOptions&, \
-                                   const FrameGradientsT<T>&,                        \
-                                   std::span<const SceneGradientsT<T>>);             \
+#define TILEGRAD_INSTANTIATE(T)                                                       \
+  template Status ValidateBackward(std::span<const SceneT<T>>, const RenderOptions&,  \
+                                   const FrameImagesT<T>&, const FrameGradientsT<T>&, \
+                                   std::span<const SceneGradientsT<T>>);              \
   template Status ValidateCotangents(const FrameGradientsT<T>&, std::span<const std::int32_t>);
 TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
+#include <utility>
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 #include "render/scene_fields.h"
 #include "render/validate.h"
 #include "shade/normalize.h"
@@ -24,11 +27,23 @@ Status CheckEnumerator(const char* name, Enum value, Enum last) {
   return InvalidArgument("{} is {}, must be in 0..{}", name, number, end);
 }
 
-Status CheckEnumerators(const RenderOptions& options) {
+Status CheckOptions(const RenderOptions& options) {
+  TILEGRAD_TRY(CheckImageSize("width", options.width));
+  TILEGRAD_TRY(CheckImageSize("height", options.height));
+  if (!(options.delta > 0) || !std::isfinite(options.delta)) {
+    return InvalidArgument("options.delta is {}, must be finite and > 0", options.delta);
+  }
+  if (!(options.max_alpha_error >= 0 && options.max_alpha_error <= 1)) {
+    return InvalidArgument("options.max_alpha_error is {}, must be in [0, 1]",
+                           options.max_alpha_error);
+  }
   TILEGRAD_TRY(CheckEnumerator("options.interpolation", options.interpolation,
                                Interpolation::kScreenLinear));
   TILEGRAD_TRY(CheckEnumerator("options.culling", options.culling, FaceCulling::kBack));
-  return CheckEnumerator("options.alpha_rule", options.alpha_rule, AlphaRule::kPaper);
+  TILEGRAD_TRY(CheckEnumerator("options.alpha_rule", options.alpha_rule, AlphaRule::kPaper));
+  TILEGRAD_TRY(CheckNotNegative("options.paper_box", options.paper_box));
+  if (options.paper_faces >= 0) return {};
+  return InvalidArgument("options.paper_faces is {}, must be >= 0", options.paper_faces);
 }
 
 template <class T>
@@ -64,18 +79,80 @@ Status CheckDirections(const SceneT<T>& scene) {
   return {};
 }
 
+template <class T>
+Camera CameraInFloat(const CameraT<T>& c) {
+  const auto cast = [](T x) { return InFloat(x); };
+  Camera out;
+  std::transform(std::begin(c.rotation), std::end(c.rotation), out.rotation, cast);
+  std::transform(std::begin(c.translation), std::end(c.translation), out.translation, cast);
+  out.fx = cast(c.fx);
+  out.fy = cast(c.fy);
+  out.cx = cast(c.cx);
+  out.cy = cast(c.cy);
+  out.near_plane = cast(c.near_plane);
+  return out;
+}
+
+Status CheckCamera(const Camera& camera) {
+  TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
+  TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
+  using Number = std::pair<const char*, float>;
+  for (const auto& [name, value] : {Number("fx", camera.fx), Number("fy", camera.fy)}) {
+    if (value != 0 && std::isfinite(value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite and not 0", name, value);
+  }
+  if (!(camera.near_plane > 0) || !std::isfinite(camera.near_plane)) {
+    return InvalidArgument("camera.near_plane is {}, must be finite and > 0", camera.near_plane);
+  }
+  for (const auto& [name, value] : {Number("cx", camera.cx), Number("cy", camera.cy)}) {
+    if (std::isfinite(value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite", name, value);
+  }
+  return {};
+}
+
+Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (faces[i] < 0 || static_cast<std::size_t>(faces[i]) >= vertices) {
+      return InvalidArgument("faces[{}] is {}, outside of [0, {})", i, faces[i], vertices);
+    }
+  }
+  return {};
+}
+
+// No array is so large that its indices, times the few numbers of a row, are not.
+template <class T>
+Status CheckMeshSizes(const SceneT<T>& scene) {
+  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
+  const std::size_t positions = scene.positions.size(), faces = scene.faces.size();
+  const std::size_t attributes = scene.attributes.values.size();
+  if (positions % 3 != 0) {
+    return InvalidArgument("positions must be [V,3], got {} numbers", positions);
+  }
+  if (faces % 3 != 0) return InvalidArgument("faces must be [F,3], got {} indices", faces);
+  if (std::max({positions, faces, attributes}) > kMost) {
+    return ResourceExhausted(
+        "{} numbers of positions, {} of faces, {} of attributes: the limit is {} each", positions,
+        faces, attributes, kMost);
+  }
+  if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
+  if (static_cast<std::size_t>(scene.channels) <= kMost) return {};
+  return ResourceExhausted("{} channels: the limit is {}", scene.channels, kMost);
+}
+
 // Many views of one mesh share its arrays: what was checked for the scene before is not looked
 // through again.
 template <class T>
 Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
-  const PipelineSceneT<T> mesh = PipelineSceneOf(scene);
-  TILEGRAD_TRY(ValidateSceneSizes(mesh));
-  if (SameArray(scene.positions, known.positions) && SameArray(scene.faces, known.faces)) return {};
-  if (AllWithin(scene.faces, 0, static_cast<std::int32_t>(scene.positions.size() / 3)) &&
-      CheckNumbers("positions", scene.positions).ok()) {
-    return {};
+  TILEGRAD_TRY(CheckMeshSizes(scene));
+  const std::size_t vertices = scene.positions.size() / 3;
+  const bool known_faces =
+      SameArray(scene.faces, known.faces) && scene.positions.size() == known.positions.size();
+  if (!known_faces && !AllWithin(scene.faces, 0, static_cast<std::int32_t>(vertices))) {
+    return CheckFaces(scene.faces, vertices);
   }
-  return ValidateSceneNumbers(mesh);
+  if (SameArray(scene.positions, known.positions)) return {};
+  return CheckNumbers("positions", scene.positions);
 }
 
 // While no number is beyond this, no colour leaves float's range: it is a product of at most five
@@ -95,7 +172,8 @@ template <class T>
 Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   Status status;
   ForEachStream(scene, {}, [&](const SceneStream<T>& s) {
-    if (!status.ok() || s.what == Varying::kPosition || s.values.empty()) return;
+    if (!status.ok() || s.what == Varying::kPosition) return;
+    if (s.values.empty() && s.what != Varying::kUser) return;  // `channels` asks for attributes
     status = CheckShape(s.name, s.values.size(), s.rows(scene), static_cast<std::size_t>(s.width));
     if (!status.ok() || SameArray(s.values, StreamOf(known, s.what).values)) return;
     status = CheckValues(s.name, s.values, large);
@@ -183,13 +261,15 @@ Status CheckLights(const SceneT<T>& scene, bool* large) {
     const Status status = CheckValues<T>("direction, intensity", numbers, large);
     if (!status.ok()) return status.Within(fmt::format("lights[{}]", i));
   }
-  return {};
+  return CheckDirections(scene);
 }
 
 // `known`: the scene before, or an empty one.
 template <class T>
 Status CheckScene(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
+  TILEGRAD_TRY(CheckEnumerators(scene));
   TILEGRAD_TRY(CheckMesh(scene, known));
+  TILEGRAD_TRY(CheckCamera(CameraInFloat(scene.camera)));
   TILEGRAD_TRY(CheckStreams(scene, known, large));
   TILEGRAD_TRY(CheckTextures(scene, known, large));
   TILEGRAD_TRY(CheckSurfaces(scene, large));
@@ -237,41 +317,37 @@ Status CheckAgreement(const SceneParts& a, const SceneParts& b, const SceneT<T>&
 }  // namespace
 
 template <class T>
-Status ValidateEnumerators(std::span<const SceneT<T>> scenes, const RenderOptions& options) {
-  TILEGRAD_TRY(CheckEnumerators(options));
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    Status status = CheckEnumerators(scenes[n]);
-    if (status.ok()) status = CheckDirections(scenes[n]);
-    if (!status.ok()) return status.Within(SceneName(n));
-  }
-  return {};
-}
-
-template <class T>
-Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
-  SceneParts parts;
-  bool large = false;
+Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                                  const Workers& workers) {
+  TILEGRAD_TRY(CheckOptions(options));
   const SceneT<T> nothing;
+  const auto check = [&](std::size_t n, bool* large) {
+    return CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing, large);
+  };
+  std::atomic<bool> sound = true, any_large = false;
+  workers.For(scenes.size(), [&](std::size_t n, std::size_t) {
+    bool large = false;
+    if (!check(n, &large).ok()) sound = false;
+    if (large) any_large = true;
+  });
+  SceneParts parts;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Status sound = CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing, &large);
-    if (!sound.ok()) return sound.Within(SceneName(n));
+    bool large = false;
+    Status status = sound ? Status() : check(n, &large);
     const SceneParts own = PartsOf(scenes[n]);
     if (n == 0) parts = own;
-    if (const Status status = CheckAgreement(parts, own, scenes[n]); !status.ok()) {
-      return status.Within(SceneName(n));
-    }
+    if (status.ok()) status = CheckAgreement(parts, own, scenes[n]);
+    if (!status.ok()) return status.Within(SceneName(n));
     parts.bilinear |= own.bilinear;
     parts.trilinear |= own.trilinear;
   }
-  parts.may_overflow = large;
+  parts.may_overflow = any_large;
   return parts;
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                          \
-  template Status ValidateEnumerators(std::span<const SceneT<T>>, const RenderOptions&); \
-  template Result<SceneParts> ValidateScenes(std::span<const SceneT<T>>);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+template Result<SceneParts> ValidateScenes(std::span<const Scene>, const RenderOptions&,
+                                           const Workers&);
+template Result<SceneParts> ValidateScenes(std::span<const SceneT<double>>, const RenderOptions&,
+                                           const Workers&);
 
 }  // namespace tilegrad

@@ -9,7 +9,6 @@
 
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad::bench::culled_test {
 
@@ -30,7 +29,7 @@ double Distance(std::vector<float> a, const std::vector<float>& b) {
 // From dL/d(NDC) to dL/d(positions).
 std::vector<float> ToWorld(const BenchBatch& batch, std::size_t image,
                            const std::vector<float>& d_ndc) {
-  const PipelineScene& scene = batch.scenes[image];
+  const Scene& scene = batch.scenes[image];
   raster::ScreenMeshBuffers screen;
   raster::Project(FaceSourceOf(scene, batch.options), batch.options.width, batch.options.height,
                   &screen);
@@ -53,8 +52,8 @@ TEST(Culled, AgreesWithTheRenderer) {
   culled.Backward({});
   const Workers workers(1);
   Pipeline renderer(workers);
-  PipelineFrame frame;
-  ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
+  FrameImages frame;
+  Draw(batch, {.color = false}, &renderer, &frame);
   const std::size_t pixels = culled.frames[0].face_ids.size();
   std::size_t different = 0, covered = 0;
   double alpha = 0, color = 0;
@@ -90,12 +89,10 @@ TEST(Culled, GradientsAgreeWithTheRenderer) {
   culled.Backward({});
   const Workers workers(1);
   Pipeline renderer(workers);
-  PipelineFrame frame;
-  ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
-  ASSERT_TRUE(renderer
-                  .Backward(batch.scenes, batch.options, frame, {batch.d_attributes, batch.d_alpha},
-                            batch.d_scenes)
-                  .ok());
+  FrameImages frame;
+  Draw(batch, {.color = false}, &renderer, &frame);
+  ASSERT_TRUE(renderer.Backward(batch.views, batch.options, frame,
+                                {batch.d_attributes, batch.d_alpha}, batch.d_scenes));
   for (std::size_t i = 0; i < culled.frames.size(); ++i) {
     // Pixels whose face differs move their whole gradient: a share of up to 1/500 of them.
     EXPECT_GT(Norm(batch.d_colors[i]), 1);

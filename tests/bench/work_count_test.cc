@@ -74,13 +74,11 @@ TEST(WorkCount, TheRendererEvaluatesLittleElse) {
     }
     for (const std::string target : EveryTarget()) {
       Pipeline renderer(workers);
-      PipelineFrame frame;
-      ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
+      FrameImages frame;
+      Draw(batch, {.color = false}, &renderer, &frame);
       const RenderStats forward = renderer.stats();
-      ASSERT_TRUE(renderer
-                      .Backward(batch.scenes, batch.options, frame,
-                                {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
-                      .ok());
+      ASSERT_TRUE(renderer.Backward(batch.views, batch.options, frame,
+                                    {batch.d_attributes, batch.d_alpha}, batch.d_scenes));
       const RenderStats backward = renderer.stats();
       for (const RenderStats* stats : {&forward, &backward}) {
         const double share = static_cast<double>(stats->pairs) / work.pairs;

@@ -39,6 +39,9 @@ class Overflow : public testing::Test {
     const Scene view = scene.View();
     return renderer_.Render({&view, 1}, test::TrialOptions(), test::EveryImage(), &frame_);
   }
+  SceneParts Parts(const Scene& view) const {
+    return *ValidateScenes<float>({&view, 1}, test::TrialOptions(), workers_);
+  }
   // On every target.
   void ExpectError(OwnedScene<float> scene, const char* image) {
     for (const std::string& target : RunnableTargets()) {
@@ -111,9 +114,9 @@ TEST_F(Overflow, OrdinaryNumbersAreNotLookedThrough) {
   auto scene = Triangle(0x1p20f);
   const Scene view = scene.View();
   ASSERT_TRUE(Render(scene).ok());
-  EXPECT_FALSE(ValidateScenes<float>({&view, 1})->may_overflow);
+  EXPECT_FALSE(Parts(view).may_overflow);
   scene.colors[4] = 0x1.1p20f;
-  EXPECT_TRUE(ValidateScenes<float>({&view, 1})->may_overflow);
+  EXPECT_TRUE(Parts(view).may_overflow);
 }
 
 }  // namespace tilegrad::overflow_test

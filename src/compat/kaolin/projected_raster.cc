@@ -7,7 +7,7 @@
 
 #include "compat/kaolin/face_visibility.h"
 #include "raster/conventions.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 
 namespace tilegrad::compat::kaolin {
 namespace {

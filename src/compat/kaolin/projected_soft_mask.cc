@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "raster/soft_mask/soft_mask.h"
 #include "render/alpha/paper_bin.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 
 namespace tilegrad::compat::kaolin {
 namespace {

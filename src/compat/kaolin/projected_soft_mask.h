@@ -8,7 +8,7 @@
 
 #include "base/parallel.h"
 #include "compat/projected_batch.h"
-#include "render/pipeline/pipeline.h"
+#include "tilegrad/options.h"
 
 namespace tilegrad::compat::kaolin {
 

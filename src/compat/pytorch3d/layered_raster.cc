@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "render/pipeline/validate.h"
+#include "render/checks.h"
 
 namespace tilegrad::compat::pytorch3d {
 namespace {

@@ -10,7 +10,6 @@
 #include "raster/project_ref.h"
 #include "render/alpha/paper_bin.h"
 #include "render/alpha/stage.h"
-#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad {
 namespace {
@@ -121,10 +120,10 @@ void PaperAlpha::AddToScene(const PipelineScene& scene, std::size_t n, const Ima
     sums.Add(mesh, image.ids, image.bins[bin][next[bin]++]);
   }
   std::vector<float> d_z(mesh.vertices()), d_clip_t(mesh.clipped.size());
-  std::vector<float> d_positions(scene.positions.size());
-  std::vector<raster::CameraPoint<float>> points(scene.positions.size() / 3, {0, 0, 0});
+  std::vector<float> d_positions(scene.mesh->positions.size());
+  std::vector<raster::CameraPoint<float>> points(scene.mesh->positions.size() / 3, {0, 0, 0});
   Camera d_camera = raster::ZeroCamera<float>();
-  raster::ProjectRefBackward<float>(FaceSourceOf(scene, *options_), mesh,
+  raster::ProjectRefBackward<float>(FaceSourceOf(*scene.mesh, *options_), mesh,
                                     {sums.x, sums.y, d_z, d_clip_t}, points, d_positions,
                                     &d_camera);
   for (std::size_t i = 0; i < d_scene->positions.size(); ++i) {

@@ -21,7 +21,7 @@ namespace tilegrad {
 struct AlphaNeeds {
   bool soft_tree = false;  // ImageScratch::soft is built before Prepare
   bool transmittance =
-      false;              // PipelineFrame::transmittance has room, and comes back in AlphaAdjoint
+      false;              // FrameImages::transmittance has room, and comes back in AlphaAdjoint
   bool bounded = true;    // false: Frame::alpha_error_bound is infinite, whatever Forward says
   bool own_sums = false;  // gradients go through AddToScene, not through BinGradients
 };

@@ -6,7 +6,6 @@
 #include "base/clocks.h"
 #include "base/prefetch.h"
 #include "raster/conventions.h"
-#include "render/pipeline/frame_layout.h"
 #include "render/pipeline/stages.h"
 
 namespace tilegrad {
@@ -69,8 +68,8 @@ void MixCutWeights(const PipelineScene& scene, const raster::ScreenMesh& mesh,
     if (faces[from] == raster::kNoFace) return;
     const float piece[3] = {1 - w1[to] - w2[to], w1[to], w2[to]};
     float source[3];
-    raster::SourceWeights<float>(mesh, scene.faces, static_cast<std::size_t>(faces[from]), piece,
-                                 source);
+    raster::SourceWeights<float>(mesh, scene.mesh->faces, static_cast<std::size_t>(faces[from]),
+                                 piece, source);
     w1[to] = source[1];
     w2[to] = source[2];
   });
@@ -78,7 +77,7 @@ void MixCutWeights(const PipelineScene& scene, const raster::ScreenMesh& mesh,
 
 // The images of one scene within a batch.
 struct ImageOfFrame {
-  std::size_t pixels, channels, n;
+  std::size_t pixels, n;
   template <class T>
   T* plane(AlignedVector<T>& batch, std::size_t planes) const {
     return batch.empty() ? nullptr : batch.data() + n * planes * pixels;
@@ -108,7 +107,7 @@ void PeelBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, 
 // Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
 // then only the frame's are written.
 bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
-                     WorkerScratch* worker, PipelineFrame* frame) {
+                     WorkerScratch* worker, FrameImages* frame) {
   const raster::PixelRect& rect = task.rect;
   const ImageScratch& image = input.image;
   const int width = input.options.width;
@@ -134,25 +133,26 @@ bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFr
 
 // Where a bin's attributes go: into the frame, or to the stage.
 raster::PlanarView<float> AttributeTarget(const BinInput& input, const BinTask& task,
-                                          const ImageOfFrame& part, WorkerScratch* worker,
-                                          PipelineFrame* frame) {
+                                          const ImageOfFrame& part, WorkerScratch* worker) {
+  const auto channels = static_cast<std::size_t>(input.image.attributes.channels);
   if (input.stage != nullptr) {
     const auto plane = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
-    const std::size_t size = static_cast<std::size_t>(input.image.attributes.channels) * plane;
+    const std::size_t size = channels * plane;
     if (worker->varyings.size() < size) worker->varyings.resize(size);
     return {worker->varyings.data(), static_cast<std::ptrdiff_t>(plane), raster::kBinSize};
   }
   const auto row = static_cast<std::ptrdiff_t>(input.options.width);
-  float* attributes = part.plane(frame->attributes, part.channels);
+  float* attributes =
+      input.attributes == nullptr ? nullptr : part.plane(*input.attributes, channels);
   if (attributes != nullptr) attributes += task.rect.y0 * row + task.rect.x0;
   return {attributes, static_cast<std::ptrdiff_t>(part.pixels), row};
 }
 
 void InterpolateBin(const BinInput& bin, const BinTask& task, const ImageOfFrame& part, bool drawn,
-                    WorkerScratch* worker, PipelineFrame* frame) {
+                    WorkerScratch* worker, FrameImages* frame) {
   const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
   const raster::PixelRect& rect = task.rect;
-  const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker, frame);
+  const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker);
   float* barycentrics = part.plane(frame->barycentrics, 2);
   raster::InterpolateInput input{&bin.image.mesh, bin.image.attributes, bin.options.interpolation,
                                  barycentrics != nullptr};
@@ -193,7 +193,7 @@ void RunStage(const BinInput& bin, const BinTask& task, bool any_face, WorkerScr
 
 // Alpha of a bin. Returns the error spent.
 double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
-                WorkerScratch* worker, PipelineFrame* frame) {
+                WorkerScratch* worker, FrameImages* frame) {
   const auto plane = [&](auto& batch) {
     return std::span(part.plane(batch, 1), batch.empty() ? 0 : part.pixels);
   };
@@ -206,17 +206,16 @@ double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& 
 }  // namespace
 
 double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker,
-                 PipelineFrame* frame) {
+                 FrameImages* frame) {
   RenderTimes* const times = &worker->times;
   StageClock clock;
   const ImageOfFrame part{
-      static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
-      static_cast<std::size_t>(frame->channels), task.image};
+      static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height), task.image};
   const bool drawn = WriteVisibility(input, task, part, worker, frame);
   clock.Lap(&times->visibility);
   const auto pixels = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
   const bool to_stage = input.stage != nullptr && drawn && AnyFace(worker->bin.face, pixels);
-  const bool to_frame = input.stage == nullptr && !frame->attributes.empty();
+  const bool to_frame = input.attributes != nullptr && !input.attributes->empty();
   if (to_stage || to_frame || !frame->barycentrics.empty()) {
     InterpolateBin(input, task, part, drawn, worker, frame);
   }

@@ -41,7 +41,7 @@ struct ImageScratch {
   AlignedVector<float> clipped_attributes;
   raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
   AlignedVector<float> clipped_recomputed;
-  raster::AttributeViewT<const float> recomputed;  // of a PixelStage, in the layout of `mesh`
+  raster::AttributeViewT<const float> recomputed;  // for a PixelStage, in the layout of `mesh`
   raster::DrawnFaces drawn_faces;
   raster::BinListBuffers drawn_buffers;
   raster::BinLists drawn;

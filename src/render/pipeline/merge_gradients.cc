@@ -3,9 +3,8 @@
 #include <cstddef>
 #include <cstring>
 
+#include "base/array_checks.h"
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
-#include "render/pipeline/quick_checks.h"
 #include "render/pipeline/stages.h"
 
 namespace tilegrad {
@@ -102,12 +101,17 @@ void MergeClippedAttributes(const PipelineScene& scene, const ImageScratch& imag
                             PipelineGradients* d_scene) {
   std::fill(d_scene->attributes.begin(), d_scene->attributes.end(), 0.0f);
   scratch->d_clip_t.assign(image.mesh.clipped.size(), 0.0f);
-  scratch->d_attributes.resize(raster::AttributeRows(image.mesh, scene.rate) *
-                               static_cast<std::size_t>(scene.channels));
+  scratch->d_attributes.resize(raster::AttributeRows(image.mesh, scene.attributes.rate) *
+                               static_cast<std::size_t>(scene.attributes.channels));
   SumAttributes(image, gradients, &scratch->d_rows, scratch->d_attributes);
-  raster::ClipAttributesBackward<float>(image.mesh, scene.faces, AttributesOf(scene),
+  raster::ClipAttributesBackward<float>(image.mesh, scene.mesh->faces, scene.attributes,
                                         scratch->d_attributes, d_scene->attributes,
                                         scratch->d_clip_t);
+}
+
+bool IsFiniteCamera(const Camera& camera) {
+  const float numbers[4] = {camera.fx, camera.fy, camera.cx, camera.cy};
+  return AllFinite(camera.rotation) && AllFinite(camera.translation) && AllFinite(numbers);
 }
 
 }  // namespace
@@ -136,8 +140,8 @@ bool MergeGeometry(const PipelineScene& scene, const RenderOptions& options,
   }
   if (!gradients.request.geometry) return finite;
   ++worker->stats.merged;
-  raster::ProjectBackward(FaceSourceOf(scene, options), image.mesh, {d_vertices, scratch->d_clip_t},
-                          &scratch->project,
+  raster::ProjectBackward(FaceSourceOf(*scene.mesh, options), image.mesh,
+                          {d_vertices, scratch->d_clip_t}, &scratch->project,
                           {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
   return finite && IsFiniteGeometry(*d_scene);
 }

@@ -2,11 +2,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "base/array_checks.h"
 #include "base/clocks.h"
 #include "raster/conventions.h"
 #include "raster/visibility_ref.h"
-#include "render/pipeline/frame_layout.h"
-#include "render/pipeline/quick_checks.h"
 #include "render/pipeline/stages.h"
 
 namespace tilegrad {
@@ -46,10 +45,7 @@ struct BandPlace {
   }
 };
 
-bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std::size_t channels,
-                 const BandPlace& place) {
-  const std::span<const std::int32_t> ids(input.frame.face_ids);
-  if (!AllWithin(place.Of(ids, 1, 0), raster::kNoFace, mesh.source_faces)) return false;
+bool IsSoundBand(const BackwardInput& input, std::size_t channels, const BandPlace& place) {
   const PipelineCotangents& d_frame = input.d_frame;
   if (!d_frame.alpha.empty() && !AllFinite(place.Of(d_frame.alpha, 1, 0))) return false;
   for (std::size_t c = 0; c < channels && !d_frame.attributes.empty(); ++c) {
@@ -159,7 +155,7 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
   const auto channels = static_cast<std::size_t>(image.attributes.channels);
   const bool staged = input.stage != nullptr, wanted = request.geometry || request.attributes;
   out->faces.clear();
-  if (!IsSoundBand(input, image.mesh, channels, place)) return false;
+  if (!IsSoundBand(input, channels, place)) return false;
   if (!staged && (input.d_frame.attributes.empty() || !wanted)) return true;
   ++worker->stats.interpolated;
   auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);

@@ -11,9 +11,7 @@
 #include <vector>
 
 #include "base/clocks.h"
-#include "render/pipeline/frame_layout.h"
 #include "render/pipeline/stages.h"
-#include "render/pipeline/validate.h"
 
 namespace tilegrad {
 namespace {
@@ -23,8 +21,8 @@ struct ForwardCall {
   std::span<const PipelineScene> scenes;
   const RenderOptions& options;
   PrepareRequest request;  // and the rule of alpha
-  PipelineFrame* frame;
-  PixelStage* stage;
+  Pipeline::Attributes attributes;
+  FrameImages* frame;
 };
 
 struct BackwardCall {
@@ -47,13 +45,6 @@ struct BackwardCall {
   }
 };
 
-// Only after something was found to be wrong.
-Status FindError(const BackwardCall& call) {
-  TILEGRAD_TRY(ValidateSceneNumbers(call.scenes));
-  TILEGRAD_TRY(ValidateBackwardNumbers(call.scenes, call.input.frame, call.input.d_frame));
-  return ValidateResult(call.d_scenes);
-}
-
 }  // namespace
 
 // How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
@@ -68,10 +59,10 @@ struct Pipeline::Impl {
     for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
   }
 
-  Status Render(const ForwardCall& call);
-  Status Backward(const BackwardCall& call);
+  void Render(const ForwardCall& call);
+  bool Backward(const BackwardCall& call);
 
-  bool Prepare(const PipelineScene& scene, const RenderOptions& options,
+  void Prepare(const PipelineScene& scene, const RenderOptions& options,
                const PrepareRequest& request, std::size_t n, WorkerScratch* worker);
   void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
   void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
@@ -88,8 +79,7 @@ struct Pipeline::Impl {
   void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
                    BinGradients* out);
 
-  // Returns whether the indices of all scenes are in range.
-  bool Begin(std::span<const PipelineScene> scenes, const RenderOptions& options,
+  void Begin(std::span<const PipelineScene> scenes, const RenderOptions& options,
              AlphaStage* rule) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
@@ -99,8 +89,8 @@ struct Pipeline::Impl {
     }
     alpha = rule;
     if (alpha != nullptr) alpha->Begin(options, count);
-    sound = topologies.Update(scenes, *workers);
-    return sound;
+    topologies.Update(scenes, *workers);
+    sound = true;
   }
   AlphaStage* RuleOf(AlphaRule rule) const {
     return rule == AlphaRule::kPaper ? paper.get() : all_faces.get();
@@ -110,7 +100,8 @@ struct Pipeline::Impl {
   }
 
   const Workers* workers;
-  std::atomic<bool> sound = true;  // false: some task met a number that is an error
+  std::atomic<bool> sound =
+      true;  // of a way back; false: some task met a number that is not finite
   std::unique_ptr<AlphaStage> all_faces, paper;
   AlphaStage* alpha = nullptr;  // of the last call; null: no alpha
   Topologies topologies;
@@ -121,22 +112,21 @@ struct Pipeline::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-bool Pipeline::Impl::Prepare(const PipelineScene& scene, const RenderOptions& options,
+void Pipeline::Impl::Prepare(const PipelineScene& scene, const RenderOptions& options,
                              const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
   StageClock clock;
-  const bool done = PrepareImage({n, scene, topologies.of(n)}, options, request, *workers,
-                                 &images[n], &worker->stats);
-  Require(done);
+  PrepareImage({n, scene, topologies.of(n)}, options, request, *workers, &images[n],
+               &worker->stats);
   clock.Lap(&worker->times.prepare);
-  return done;
 }
 
 void Pipeline::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
-  bin_errors[bin.image * bins + bin.bin] = RenderBin(
-      {call.scenes[bin.image], call.options, images[bin.image], call.stage, call.request.alpha},
-      bin, worker, call.frame);
+  bin_errors[bin.image * bins + bin.bin] =
+      RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.attributes.image,
+                 call.attributes.stage, call.request.alpha},
+                bin, worker, call.frame);
 }
 
 // The list of drawn faces, the largest thing of all, is the worker's, not the image's.
@@ -145,9 +135,8 @@ void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
   std::swap(image.drawn_buffers, worker->drawn_buffers);
-  if (Prepare(call.scenes[n], call.options, call.request, n, worker)) {
-    RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
-  }
+  Prepare(call.scenes[n], call.options, call.request, n, worker);
+  RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
   image.prepared.drawn_bins = false;
   std::swap(image.drawn_faces, worker->drawn_faces);
   std::swap(image.drawn_buffers, worker->drawn_buffers);
@@ -155,19 +144,17 @@ void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
 
 void Pipeline::Impl::RenderImage(const ForwardCall& call, std::size_t n,
                                  const Workers::Part& part) {
-  WorkerScratch* const own = &worker_scratch[part.worker()];
-  if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
+  Prepare(call.scenes[n], call.options, call.request, n, &worker_scratch[part.worker()]);
   const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
   part.For(bins.cells(), [&](std::size_t bin, std::size_t worker) {
     RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
   });
 }
 
-Status Pipeline::Impl::Render(const ForwardCall& call) {
+void Pipeline::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  if (!Begin(call.scenes, call.options, call.request.alpha))
-    return ValidateSceneNumbers(call.scenes);
+  Begin(call.scenes, call.options, call.request.alpha);
   bin_errors.assign(count * bins.cells(), 0.0);
   if (bins.cells() == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
@@ -177,11 +164,9 @@ Status Pipeline::Impl::Render(const ForwardCall& call) {
     workers->ForParts(
         count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
   }
-  if (!sound) return ValidateSceneNumbers(call.scenes);
   double* const bound = &call.frame->alpha_error_bound;
   for (const double error : bin_errors) *bound = std::max(*bound, error);
   if (alpha != nullptr && !alpha->needs().bounded) *bound = std::numeric_limits<double>::infinity();
-  return {};
 }
 
 void Pipeline::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
@@ -203,8 +188,8 @@ void Pipeline::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
   const PipelineScene& scene = call.scenes[n];
-  if (!Prepare(scene, call.input.options, call.request, n, worker)) return;
-  PrepareRecomputed(call.input.stage, scene, n, &image);
+  Prepare(scene, call.input.options, call.request, n, worker);
+  PrepareRecomputed(scene, &image);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
   if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
   const ImageGradients gradients{{&worker->band_gradients, 1},
@@ -224,8 +209,8 @@ void Pipeline::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
 void Pipeline::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
                                    const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
-  if (!Prepare(call.scenes[n], call.input.options, call.request, n, own)) return;
-  PrepareRecomputed(call.input.stage, call.scenes[n], n, &images[n]);
+  Prepare(call.scenes[n], call.input.options, call.request, n, own);
+  PrepareRecomputed(call.scenes[n], &images[n]);
   BandGradients* const bands = &band_gradients[n * call.bands];
   BinGradients* const bins = bin_gradients.data() + n * call.bins;
   part.For(call.bands + call.bins, [&](std::size_t i, std::size_t worker) {
@@ -284,8 +269,8 @@ void Pipeline::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
   Require(IsFiniteGeometry(call.d_scenes[n]));
 }
 
-Status Pipeline::Impl::Backward(const BackwardCall& call) {
-  if (!Begin(call.scenes, call.input.options, call.request.alpha)) return FindError(call);
+bool Pipeline::Impl::Backward(const BackwardCall& call) {
+  Begin(call.scenes, call.input.options, call.request.alpha);
   const std::size_t count = call.scenes.size();
   if (call.grid.cells() == 1 && call.bands == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
@@ -297,7 +282,7 @@ Status Pipeline::Impl::Backward(const BackwardCall& call) {
     workers->ForParts(
         count, [&](std::size_t n, const Workers::Part& part) { BackwardImage(call, n, part); });
   }
-  return sound ? Status() : FindError(call);
+  return sound;
 }
 
 Pipeline::Pipeline(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
@@ -305,22 +290,17 @@ Pipeline::~Pipeline() = default;
 Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
-Status Pipeline::Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
-                        const Outputs& request, PipelineFrame* frame, PixelStage* stage) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_TRY(ValidateSceneSizes(scenes));
-  const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
-  SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  AlphaStage* const alpha = request.alpha ? impl_->RuleOf(options.alpha_rule) : nullptr;
+void Pipeline::Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                      const Attributes& attributes, FrameImages* frame) {
+  AlphaStage* const alpha = frame->alpha.empty() ? nullptr : impl_->RuleOf(options.alpha_rule);
   const bool transmittance = alpha != nullptr && alpha->needs().transmittance;
   frame->transmittance.resize(transmittance ? frame->alpha.size() : 0);
-  return impl_->Render({scenes, options, {true, alpha, false}, frame, stage});
+  impl_->Render({scenes, options, {true, alpha, false}, attributes, frame});
 }
 
-Status Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
-                          const PipelineFrame& frame, const PipelineCotangents& d_frame,
-                          std::span<PipelineGradients> d_scenes, PixelStage* stage) {
-  TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
+bool Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                        const FrameImages& frame, const PipelineCotangents& d_frame,
+                        std::span<PipelineGradients> d_scenes, PixelStage* stage) {
   const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
   AlphaStage* const alpha = d_frame.alpha.empty() ? nullptr : impl_->RuleOf(options.alpha_rule);
   return impl_->Backward({scenes,

@@ -4,25 +4,25 @@
 // A batch of N scenes, each with its own mesh and camera, is rendered to N images of one size.
 // Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha is made by a
 // rule (AlphaRule; by default equation 6 over all faces, within `max_alpha_error`). The backward
-// pass is analytic and needs only the frame: face ids and alpha, and goes faster with its
-// transmittance.
+// pass is analytic and needs only the frame: face ids, alpha and its transmittance.
 #pragma once
 
 #include <memory>
 #include <span>
 
+#include "base/aligned.h"
 #include "base/parallel.h"
+#include "render/frame_images.h"
 #include "render/pipeline/records.h"
 #include "render/pipeline/work.h"
-#include "tilegrad/status.h"
 
 namespace tilegrad {
 
 class PixelStage;  // pixel_stage.h
 
 // Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
-// at a time per Renderer. Same bits for any worker count and any run. All scenes of a batch have
-// the same number of channels.
+// at a time per Pipeline. Same bits for any worker count and any run. All scenes of a batch have
+// the same number of channels. What it gets is valid (render/validate.h).
 class Pipeline {
  public:
   explicit Pipeline(const Workers& workers);  // keeps a reference
@@ -30,21 +30,24 @@ class Pipeline {
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
 
-  // Errors: a span of the wrong size (names scene, array, expected and got), an index out of range,
-  // a non-finite input (names scene, array, index), options out of range. Then `frame` is left
-  // unspecified.
-  // With a stage, `attributes` of the scenes are its input, and it writes frame->attributes, whose
-  // `channels` the caller has set.
-  Status Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
-                const Outputs& request, PipelineFrame* frame, PixelStage* stage = nullptr);
+  // Where interpolated attributes go: an image of the frame, as large as they are; to a stage,
+  // which writes images of its own; or, both null, nowhere.
+  struct Attributes {
+    AlignedVector<float>* image = nullptr;
+    PixelStage* stage = nullptr;
+  };
 
-  // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` needs alpha
-  // where d_frame has it. A gradient that overflows float is an error too; after an error d_scenes
-  // may be written in part.
-  // With a stage, the cotangents of `attributes` come from it, and d_frame.attributes is empty.
-  Status Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
-                  const PipelineFrame& frame, const PipelineCotangents& d_frame,
-                  std::span<PipelineGradients> d_scenes, PixelStage* stage = nullptr);
+  // Fills face_ids and, where `frame` has room for them (SizeFrame), depth, barycentrics and alpha.
+  void Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
+              const Attributes& attributes, FrameImages* frame);
+
+  // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` has alpha
+  // where d_frame has it. With a stage, the cotangents of attributes come from it, and
+  // d_frame.attributes is empty. Returns false, and may have written gradients in part, if a
+  // cotangent or a gradient is not finite.
+  [[nodiscard]] bool Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                              const FrameImages& frame, const PipelineCotangents& d_frame,
+                              std::span<PipelineGradients> d_scenes, PixelStage* stage = nullptr);
 
   RenderStats stats() const;  // of the last call
   RenderTimes times() const;

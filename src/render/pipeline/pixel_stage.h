@@ -35,10 +35,8 @@ class PixelStage {
   // Writes its images for the pixels of a strip.
   virtual void Forward(const PixelStrip& strip) = 0;
 
-  // The attributes that Backward needs, in the layout of the scene; channels may be 0. Those of the
-  // scene itself are the ones that get a gradient.
-  virtual raster::AttributeViewT<const float> recomputed(std::size_t image) const = 0;
-  // Before the strips of a band. False: a cotangent is not finite.
+  // Before the strips of a band, which have PipelineScene::recomputed. False: a cotangent is not
+  // finite.
   virtual bool BeginBand(std::size_t image, std::size_t band, std::size_t first,
                          std::size_t pixels) = 0;
   // Writes the cotangents of the attributes, from the strip's first pixel on; those of background

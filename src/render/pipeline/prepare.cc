@@ -3,8 +3,6 @@
 #include <cstring>
 
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
-#include "render/pipeline/quick_checks.h"
 #include "render/pipeline/stages.h"
 
 namespace tilegrad {
@@ -18,7 +16,7 @@ raster::AttributeViewT<const float> InMeshLayout(const PipelineScene& scene,
   if (!mesh.was_clipped()) return attributes;
   storage->resize(raster::AttributeRows(mesh, attributes.rate) *
                   static_cast<std::size_t>(attributes.channels));
-  raster::ClipAttributes<float>(mesh, scene.faces, attributes, *storage);
+  raster::ClipAttributes<float>(mesh, scene.mesh->faces, attributes, *storage);
   attributes.values = *storage;
   return attributes;
 }
@@ -34,21 +32,16 @@ bool SameCamera(const Camera& a, const Camera& b) {
   return std::memcmp(&a, &b, sizeof(Camera)) == 0;  // NOLINT(bugprone-suspicious-memory-comparison)
 }
 
-bool IsSoundScene(const PipelineScene& scene, bool same_positions) {
-  return (same_positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
-         IsSoundCamera(scene.camera);
-}
-
 bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
                 const PrepareRequest& request, const PreparedFrom& from) {
   return from.valid && in.topology.id == from.topology &&
          (from.drawn_bins || !request.drawn_bins) && (from.alpha || request.alpha == nullptr) &&
-         from.options == options && SameCamera(in.scene.camera, from.camera);
+         from.options == options && SameCamera(in.scene.mesh->camera, from.camera);
 }
 
 void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
                       const PrepareRequest& request, PreparedFrom* from) {
-  const PipelineScene& scene = in.scene;
+  const Scene& scene = *in.scene.mesh;
   from->valid = true;
   from->drawn_bins = request.drawn_bins;
   from->alpha = request.alpha != nullptr;
@@ -60,7 +53,7 @@ void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
 
 void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
                  const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
-  raster::FaceSource<float> source = FaceSourceOf(in.scene, options);
+  raster::FaceSource<float> source = FaceSourceOf(*in.scene.mesh, options);
   source.corners = &in.topology.corners;
   const bool soft_tree = request.alpha != nullptr && request.alpha->needs().soft_tree;
   raster::Project(source, options.width, options.height, &image->buffers,
@@ -79,14 +72,14 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
 
 }  // namespace
 
-bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
+void PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats) {
   const PipelineScene& scene = in.scene;
   // Compared only if that may save something: positions change from frame to frame. By bits, not
   // hashes: what was kept is what would be computed again.
-  const bool same_positions = request.reuse && SameBits(scene.positions, image->prepared.positions);
-  if (!IsSoundScene(scene, same_positions)) return false;
+  const bool same_positions =
+      request.reuse && SameBits(scene.mesh->positions, image->prepared.positions);
   if (!same_positions || !IsPrepared(in, options, request, image->prepared)) {
     ++stats->prepared;
     image->prepared.valid = false;
@@ -94,15 +87,12 @@ bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
     RememberPrepared(in, options, request, &image->prepared);
   }
   image->attributes =
-      InMeshLayout(scene, image->mesh, AttributesOf(scene), &image->clipped_attributes);
-  return true;
+      InMeshLayout(scene, image->mesh, scene.attributes, &image->clipped_attributes);
 }
 
-void PrepareRecomputed(const PixelStage* stage, const PipelineScene& scene, std::size_t n,
-                       ImageScratch* image) {
-  if (stage == nullptr) return;
+void PrepareRecomputed(const PipelineScene& scene, ImageScratch* image) {
   image->recomputed =
-      InMeshLayout(scene, image->mesh, stage->recomputed(n), &image->clipped_recomputed);
+      InMeshLayout(scene, image->mesh, scene.recomputed, &image->clipped_recomputed);
 }
 
 }  // namespace tilegrad

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "render/alpha/stage.h"
+#include "render/frame_images.h"
 #include "render/pipeline/image_scratch.h"
 #include "render/pipeline/pixel_stage.h"
 #include "render/pipeline/records.h"
@@ -28,28 +29,28 @@ struct SceneToPrepare {
   const Topology& topology;  // of its faces
 };
 
-// Returns false, and prepares nothing, if a number of the scene is not finite or out of range.
-bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
+void PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats);
 
-// The attributes that a stage needs again on the way back; null: none. `image` is prepared.
-void PrepareRecomputed(const PixelStage* stage, const PipelineScene& scene, std::size_t n,
-                       ImageScratch* image);
+// The attributes that a stage needs again on the way back. `image` is prepared.
+void PrepareRecomputed(const PipelineScene& scene, ImageScratch* image);
 
 // What the bins of an image have in common.
 struct BinInput {
   const PipelineScene& scene;
   const RenderOptions& options;
   const ImageScratch& image;
-  PixelStage* stage;  // null: attributes are images themselves
-  AlphaStage* alpha;  // null: not wanted
+  AlignedVector<float>* attributes;  // the image that attributes are; null: there is a stage, or
+                                     // none is wanted
+  PixelStage* stage;                 // of attributes; null: none
+  AlphaStage* alpha;                 // null: not wanted
 };
 
 // Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
 // task.bin and task.rect are those of raster::BinGrid.
 double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker,
-                 PipelineFrame* frame);
+                 FrameImages* frame);
 
 // The bands of an image: whole rows, so that faces are cut seldom; short enough to share one large
 // image among workers. They depend on the size of the image only.
@@ -66,7 +67,7 @@ struct BandGrid {
 // What a task of the backward pass reads.
 struct BackwardInput {
   const RenderOptions& options;
-  const PipelineFrame& frame;
+  const FrameImages& frame;
   const PipelineCotangents& d_frame;
   PixelStage* stage;  // null: cotangents of attributes are images themselves
   AlphaStage* alpha;  // null: alpha has no gradient
@@ -78,7 +79,7 @@ struct BandTask {
 };
 
 // Gradients of the faces seen in a band, through their attributes. Returns false, and does nothing
-// else, if a number of the frame or its gradients in the band is not finite or out of range.
+// else, if a cotangent in the band is not finite.
 bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
                         const raster::BackwardRequest& request, WorkerScratch* worker,
                         BandGradients* out);

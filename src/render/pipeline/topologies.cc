@@ -1,28 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/pipeline/topologies.h"
 
-#include <atomic>
 #include <cstring>
 
-#include "base/array_checks.h"
 #include "raster/project.h"
 
 namespace tilegrad {
 namespace {
 
-std::size_t VerticesOf(const PipelineScene& scene) { return scene.positions.size() / 3; }
+std::size_t VerticesOf(const PipelineScene& scene) { return scene.mesh->positions.size() / 3; }
 
 // The very same array: its numbers need not be looked at.
 bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
-  return a.faces.data() == b.faces.data() && a.faces.size() == b.faces.size() &&
-         VerticesOf(a) == VerticesOf(b);
+  return a.mesh->faces.data() == b.mesh->faces.data() &&
+         a.mesh->faces.size() == b.mesh->faces.size() && VerticesOf(a) == VerticesOf(b);
 }
 
 bool HasFacesOf(const Topology& topology, const PipelineScene& scene) {
+  const std::span<const std::int32_t> faces = scene.mesh->faces;
   return topology.id.version != 0 && topology.vertices == VerticesOf(scene) &&
-         topology.faces.size() == scene.faces.size() &&
-         (scene.faces.empty() ||
-          std::memcmp(topology.faces.data(), scene.faces.data(), scene.faces.size_bytes()) == 0);
+         topology.faces.size() == faces.size() &&
+         (faces.empty() ||
+          std::memcmp(topology.faces.data(), faces.data(), faces.size_bytes()) == 0);
 }
 
 }  // namespace
@@ -38,25 +37,19 @@ void Topologies::Group(std::span<const PipelineScene> scenes) {
   if (topologies_.size() < first_scene_.size()) topologies_.resize(first_scene_.size());
 }
 
-bool Topologies::Update(std::span<const PipelineScene> scenes, const Workers& workers) {
+void Topologies::Update(std::span<const PipelineScene> scenes, const Workers& workers) {
   Group(scenes);
   ++updates_;
-  std::atomic<bool> sound = true;
   workers.For(first_scene_.size(), [&](std::size_t i, std::size_t) {
     const PipelineScene& scene = scenes[first_scene_[i]];
     Topology& topology = topologies_[i];
     if (HasFacesOf(topology, scene)) return;
     topology.id = {};
-    if (!AllWithin(scene.faces, 0, static_cast<std::int32_t>(VerticesOf(scene)))) {
-      sound = false;
-      return;
-    }
     topology.vertices = VerticesOf(scene);
-    topology.faces.assign(scene.faces.begin(), scene.faces.end());
+    topology.faces.assign(scene.mesh->faces.begin(), scene.mesh->faces.end());
     raster::SplitFaces(topology.faces, &topology.corners, &workers);
     topology.id = {i, updates_};
   });
-  return sound;
 }
 
 }  // namespace tilegrad

@@ -33,9 +33,8 @@ struct Topology {
 // Grows to its largest use and stays.
 class Topologies {
  public:
-  // Makes the topologies of a batch, if they are not those of the last one. Returns false if a
-  // vertex index is out of range.
-  bool Update(std::span<const PipelineScene> scenes, const Workers& workers);
+  // Makes the topologies of a batch, if they are not those of the last one.
+  void Update(std::span<const PipelineScene> scenes, const Workers& workers);
 
   // That of scene n. Images may look at its corners as long as it has the same id.
   const Topology& of(std::size_t n) const { return topologies_[of_scene_[n]]; }

@@ -15,7 +15,7 @@ std::span<PipelineGradients> ShadeGradients::Begin(const BackwardPlan& plan,
   for (std::size_t n = 0; n < views.size(); ++n) {
     SceneScratch& s = scratch_[n];
     s.d_positions.resize(d_scenes[n].positions.size());
-    s.d_varyings.resize(attributes ? views[n].attributes.size() : 0);
+    s.d_varyings.resize(attributes ? views[n].attributes.values.size() : 0);
     d_views_.push_back({s.d_positions, s.d_varyings, d_scenes[n].camera != nullptr, {}});
   }
   return d_views_;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shading/inputs.h"
 
+#include <atomic>
 #include <cstdint>
 #include <utility>
 
+#include "base/array_checks.h"
 #include "base/clocks.h"
+#include "base/error.h"
 #include "shade/normalize_ref.h"
 #include "shade/spherical_harmonics_ref.h"
 
@@ -116,14 +119,17 @@ void ShadeInputs::DerivePackNormals(std::span<const Scene> scenes) {
   clock.Lap(&work_.normals_ms);
 }
 
-void ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& sets) {
+bool ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& sets) {
   StageClock clock;
+  std::atomic<bool> finite = true;
   workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
     ScenePack& pack = packs_[i];
     const Scene& scene = scenes[first_of_pack_[i]];
     PackVaryings(scene, sets.varyings, pack.normals, &pack.varyings);
+    if (!AllFinite(pack.varyings)) finite = false;
     if (sets.recomputed == nullptr) return;
     PackVaryings(scene, *sets.recomputed, pack.normals, &pack.recomputed);
+    if (!AllFinite(pack.recomputed)) finite = false;
   });
   for (std::size_t i = 0; i < first_of_pack_.size(); ++i) {
     work_.packed += static_cast<std::int64_t>(packs_[i].varyings.size());
@@ -131,41 +137,35 @@ void ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& s
     work_.packed += static_cast<std::int64_t>(packs_[i].recomputed.size());
   }
   clock.Lap(&work_.pack_ms);
+  return finite;
 }
 
-void ShadeInputs::Pack(std::span<const Scene> scenes, const StreamSets& sets) {
+Status ShadeInputs::Pack(std::span<const Scene> scenes, const StreamSets& sets) {
   FindPacks(scenes);
   if (sets.normals && scenes[0].shading.normals != Normals::kGiven) DerivePackNormals(scenes);
-  PackStreams(scenes, sets);
-  const VaryingSet& set = sets.varyings;
+  if (!PackStreams(scenes, sets)) {
+    return InvalidArgument("normals from positions overflow: the product of two edges is no float");
+  }
+  views_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     const ScenePack& pack = packs_[pack_of_scene_[n]];
-    StageScene& out = stage_scenes_[n];
-    out.varyings = {pack.varyings, set.channels(), set.rate};
-    out.recomputed = out.varyings;
-    if (sets.recomputed == nullptr) continue;
-    out.recomputed = {pack.recomputed, sets.recomputed->channels(), sets.recomputed->rate};
+    const VaryingSet& set = sets.varyings;
+    PipelineScene view{&scenes[n], {pack.varyings, set.channels(), set.rate}};
+    view.recomputed = view.attributes;
+    if (sets.recomputed != nullptr) {
+      view.recomputed = {pack.recomputed, sets.recomputed->channels(), sets.recomputed->rate};
+    }
+    views_.push_back(view);
   }
-  SetViews(scenes);
+  return {};
 }
 
 void ShadeInputs::UsePlain(std::span<const Scene> scenes, bool colors, bool user) {
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Scene& s = scenes[n];
-    stage_scenes_[n].varyings = {};
-    if (colors) stage_scenes_[n].varyings = {s.colors.values, 3, s.colors.rate};
-    if (user) stage_scenes_[n].varyings = {s.attributes.values, s.channels, s.attributes.rate};
-  }
-  SetViews(scenes);
-}
-
-void ShadeInputs::SetViews(std::span<const Scene> scenes) {
   views_.clear();
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    PipelineScene view = PipelineSceneOf(scenes[n]);
-    view.attributes = stage_scenes_[n].varyings.values;
-    view.channels = stage_scenes_[n].varyings.channels;
-    view.rate = stage_scenes_[n].varyings.rate;
+  for (const Scene& s : scenes) {
+    PipelineScene view{&s, {}};
+    if (colors) view.attributes = {s.colors.values, 3, s.colors.rate};
+    if (user) view.attributes = {s.attributes.values, s.channels, s.attributes.rate};
     views_.push_back(view);
   }
 }

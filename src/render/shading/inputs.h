@@ -17,6 +17,7 @@
 #include "render/shading/plan.h"
 #include "render/shading/report.h"
 #include "render/shading/stage.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad {
 
@@ -33,8 +34,8 @@ class ShadeInputs {
 
   // Everything but streams, which Pack or UsePlain adds. `textures`: whether they are sampled.
   void Begin(std::span<const Scene> scenes, bool textures);
-  // Streams side by side.
-  void Pack(std::span<const Scene> scenes, const StreamSets& sets);
+  // Streams side by side. Error: normals of positions that overflow float.
+  Status Pack(std::span<const Scene> scenes, const StreamSets& sets);
   // Streams as they are: colours, user attributes, or none.
   void UsePlain(std::span<const Scene> scenes, bool colors, bool user);
 
@@ -57,8 +58,7 @@ class ShadeInputs {
   void PrepareTextures(std::span<const Scene> scenes);
   void FindPacks(std::span<const Scene> scenes);
   void DerivePackNormals(std::span<const Scene> scenes);
-  void PackStreams(std::span<const Scene> scenes, const StreamSets& sets);
-  void SetViews(std::span<const Scene> scenes);
+  bool PackStreams(std::span<const Scene> scenes, const StreamSets& sets);  // all are finite
 
   const Workers* workers_;
   SceneWork work_;

@@ -3,10 +3,9 @@
 
 #include <algorithm>
 
+#include "base/array_checks.h"
 #include "base/clocks.h"
 #include "raster/conventions.h"
-#include "raster/conventions.h"
-#include "render/pipeline/quick_checks.h"
 #include "render/pipeline/stages.h"
 #include "render/shading/uv_level.h"
 
@@ -200,10 +199,6 @@ void ShadeStage::Forward(const PixelStrip& strip) {
     worker->work.pixels += static_cast<std::int64_t>(run.count);
     ForwardRun(strip, run, worker);
   });
-}
-
-raster::AttributeViewT<const float> ShadeStage::recomputed(std::size_t image) const {
-  return scenes_[image].recomputed;
 }
 
 bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t first,

@@ -28,8 +28,6 @@ struct StageScene {
   shade::ShPolynomial sh = {};
   shade::Vec3<float> eye = {};
   std::vector<const shade::TexturePyramid*> textures;
-  raster::AttributeViewT<const float> varyings;    // forward, or what is pulled on
-  raster::AttributeViewT<const float> recomputed;  // on the way back
 };
 
 // What a band of an image has summed.
@@ -57,7 +55,6 @@ class ShadeStage : public PixelStage {
                      const RenderOptions& options, const FrameGradients& d_frame);
 
   void Forward(const PixelStrip& strip) override;
-  raster::AttributeViewT<const float> recomputed(std::size_t image) const override;
   bool BeginBand(std::size_t image, std::size_t band, std::size_t first,
                  std::size_t pixels) override;
   void Backward(const PixelStrip& strip, const raster::PlanarView<float>& d_varyings) override;

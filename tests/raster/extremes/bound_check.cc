@@ -6,7 +6,7 @@
 
 #include "raster/extremes/soft_scene.h"
 #include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/records.h"
 #include "render/pipeline/test_scenes.h"
 
 namespace tilegrad::test {

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The border of the renderer: every input is checked here, once, and relied on behind. Sizes and
-// options are checked first. The numbers in arrays are checked where they are read first, in
-// parallel (quick_checks.h); only if that finds something, they are searched here.
+// Checks of one array or number, for the borders of the renderer (render/validate.h) and of
+// src/compat. Errors name the array, the index and what was expected.
 #pragma once
 
 #include <cstddef>
 #include <span>
 #include <string>
 
-#include "render/pipeline/records.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
@@ -44,22 +42,5 @@ Status CheckNotNegative(const char* name, double value);
 
 // Of options.width or options.height.
 Status CheckImageSize(const char* axis, int pixels);
-
-// Errors name the scene, the array, the index and what was expected.
-Status ValidateOptions(const RenderOptions& options);
-Status ValidateSceneSizes(std::span<const PipelineScene> scenes);
-Status ValidateSceneNumbers(std::span<const PipelineScene> scenes);
-// Of one scene, whom the errors do not name. T: float or double.
-template <class T>
-Status ValidateSceneSizes(const PipelineSceneT<T>& scene);
-template <class T>
-Status ValidateSceneNumbers(const PipelineSceneT<T>& scene);
-Status ValidateBackwardSizes(std::span<const PipelineScene> scenes, const RenderOptions& options,
-                             const PipelineFrame& frame, const PipelineCotangents& d_frame,
-                             std::span<const PipelineGradients> d_scenes);
-Status ValidateBackwardNumbers(std::span<const PipelineScene> scenes, const PipelineFrame& frame,
-                               const PipelineCotangents& d_frame);
-// Gradients that overflow float are an error, not an Inf that spreads.
-Status ValidateResult(std::span<const PipelineGradients> d_scenes);
 
 }  // namespace tilegrad
