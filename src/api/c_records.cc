@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "render/gradient_records.h"
 #include "render/scene_fields.h"
 
 namespace tilegrad::api {
@@ -193,7 +192,7 @@ void CGradients::Set(const tilegrad_scene_gradients& from, const Scene& scene) {
   gradients.lights = lights;
   gradients.sh = SpanOf(from.sh, scene.sh.size());
   SetArrays(from, scene, &gradients);
-  GradientRecords<float>::Clear(gradients);
+  ClearRecords(gradients);
 }
 
 void CGradients::Clear(const tilegrad_scene_gradients& to, const Scene& scene) {

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "render/checks.h"
 #include "render/pipeline/pipeline.h"
-#include "render/shading/gradients.h"
 #include "render/shading/inputs.h"
 #include "render/shading/merge.h"
 #include "render/shading/report.h"
@@ -44,11 +43,7 @@ GradientWishes WishesOf(const FrameGradients& d_frame, std::span<const SceneGrad
 
 struct Engine::Impl {
   explicit Impl(const Workers& w)
-      : workers(&w),
-        pipeline(w),
-        stage(static_cast<std::size_t>(w.count())),
-        inputs(w),
-        gradients(w) {}
+      : workers(&w), pipeline(w), stage(static_cast<std::size_t>(w.count())), inputs(w), merge(w) {}
 
   // Streams for the pipeline: side by side for the stage, or as they are.
   Status SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
@@ -59,11 +54,9 @@ struct Engine::Impl {
   // The pipeline's backward pass, with the stage if there is one. False: a number is not finite.
   bool RunBackward(const RenderOptions& options, const FrameImages& frame,
                    const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
-  // From what that pass has summed to gradients of the scenes' arrays.
-  void MergeBackward(std::span<const Scene> scenes, std::span<const SceneGradients> d_scenes);
   Status Backward(std::span<const Scene> scenes, const RenderOptions& options,
                   const FrameImages& frame, const FrameGradients& d_frame,
-                  std::span<const SceneGradients> d_scenes);
+                  const GradientTargets<float>& targets);
 
   PlanReport Explain() const;
 
@@ -74,9 +67,7 @@ struct Engine::Impl {
   ForwardPlan forward;
   BackwardPlan backward;
   ShadeInputs inputs;
-  ShadeGradients gradients;
-  TextureMerge texture_merge;
-  SceneSums scene_sums;
+  GradientMerge merge;
   double merge_ms = 0;
 };
 
@@ -120,10 +111,10 @@ PlanReport Engine::Impl::Explain() const {
 
 Status Engine::Impl::Backward(std::span<const Scene> scenes, const RenderOptions& options,
                               const FrameImages& frame, const FrameGradients& d_frame,
-                              std::span<const SceneGradients> d_scenes) {
+                              const GradientTargets<float>& targets) {
   TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers));
-  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, frame, d_frame, d_scenes));
-  backward = PlanBackward(parts, WishesOf(d_frame, d_scenes));
+  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, frame, d_frame, targets.scenes()));
+  backward = PlanBackward(parts, WishesOf(d_frame, targets.scenes()));
   staged = backward.staged() && !scenes.empty();
   was_backward = true;
   inputs.Begin(scenes, staged && backward.steps.texture);
@@ -132,17 +123,16 @@ Status Engine::Impl::Backward(std::span<const Scene> scenes, const RenderOptions
   TILEGRAD_TRY(SetInputs(scenes, {backward.pulled, normals, same ? nullptr : &backward.recomputed},
                          backward.colors_only, backward.user_only));
   if (staged) stage.BeginBackward(backward, inputs.scenes(), options, d_frame);
-  const std::span<PipelineGradients> d_views = gradients.Begin(backward, inputs.views(), d_scenes);
-  const bool sound = RunBackward(options, frame, d_frame, d_views);
+  const bool sound =
+      RunBackward(options, frame, d_frame, merge.Begin(backward, inputs.views(), targets));
   if (!sound) {
     TILEGRAD_TRY(CheckNumbers("d_frame.alpha", d_frame.alpha));
     TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
   }
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (d_scenes[n].camera != nullptr) *d_scenes[n].camera = d_views[n].d_camera;
-  }
-  MergeBackward(scenes, d_scenes);
-  TILEGRAD_TRY(ValidateResult(d_scenes));
+  StageClock clock;
+  merge.Run({backward, inputs, staged ? &stage : nullptr, targets});
+  clock.Lap(&merge_ms);
+  TILEGRAD_TRY(targets.CheckSums());
   return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody wants
 }
 
@@ -160,20 +150,6 @@ bool Engine::Impl::RunBackward(const RenderOptions& options, const FrameImages& 
   return sound && (seen || ValidateCotangents(d_frame, frame.face_ids).ok());
 }
 
-void Engine::Impl::MergeBackward(std::span<const Scene> scenes,
-                                 std::span<const SceneGradients> d_scenes) {
-  StageClock clock;
-  ClearUniforms(d_scenes);
-  if (staged) MergeUniforms(stage, inputs.scenes(), d_scenes, &scene_sums);
-  if (staged && backward.to_texture) {
-    texture_merge.Run(stage, inputs.scenes(), *workers, d_scenes);
-  } else {
-    ClearTextures(d_scenes);
-  }
-  gradients.Merge(backward, inputs, scenes, d_scenes);
-  clock.Lap(&merge_ms);
-}
-
 Engine::Engine(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
 Engine::~Engine() = default;
 Engine::Engine(Engine&&) noexcept = default;
@@ -186,8 +162,8 @@ Status Engine::Render(std::span<const Scene> scenes, const RenderOptions& option
 
 Status Engine::Backward(std::span<const Scene> scenes, const RenderOptions& options,
                         const FrameImages& frame, const FrameGradients& d_frame,
-                        std::span<const SceneGradients> d_scenes) {
-  return impl_->Backward(scenes, options, frame, d_frame, d_scenes);
+                        GradientTargets<float>* targets) {
+  return impl_->Backward(scenes, options, frame, d_frame, *targets);
 }
 
 PlanReport Engine::Explain() const { return impl_->Explain(); }

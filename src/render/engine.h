@@ -9,6 +9,7 @@
 
 #include "base/parallel.h"
 #include "render/frame_images.h"
+#include "render/gradient_targets.h"
 #include "render/shading/plan.h"
 #include "tilegrad/status.h"
 
@@ -28,17 +29,33 @@ class Engine {
                 FrameImages* frame);
 
   // `scenes`, `options` and `frame` as they were given to and filled by Render; of the frame, face
-  // ids are read, and alpha where d_frame has it. Gradients are overwritten, and after an error may
-  // be written in part. Scenes may share them, but for cameras.
+  // ids are read, and alpha where d_frame has it. Overwrites what the targets have listed, arrays
+  // and scenes' own records; after an error that may be done in part.
   Status Backward(std::span<const Scene> scenes, const RenderOptions& options,
                   const FrameImages& frame, const FrameGradients& d_frame,
-                  std::span<const SceneGradients> d_scenes);
+                  GradientTargets<float>* targets);
 
   PlanReport Explain() const;  // the last call
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
+};
+
+// The same calls in double, of the naive renderer (render/reference.h). Images are its units of
+// work; memory is allocated by every call.
+class ReferenceRenderer {
+ public:
+  explicit ReferenceRenderer(const Workers& workers) : workers_(&workers) {}  // keeps a reference
+
+  Status Render(std::span<const SceneT<double>> scenes, const RenderOptions& options,
+                const Outputs& outputs, FrameImagesT<double>* frame);
+  Status Backward(std::span<const SceneT<double>> scenes, const RenderOptions& options,
+                  const FrameImagesT<double>& frame, const FrameGradientsT<double>& d_frame,
+                  GradientTargets<double>* targets);
+
+ private:
+  const Workers* workers_;
 };
 
 }  // namespace tilegrad

@@ -1,74 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "base/aligned.h"
 #include "base/error.h"
 #include "render/engine.h"
-#include "render/gradient_arrays.h"
-#include "render/gradient_records.h"
-#include "render/reference_renderer.h"
-#include "render/scene_fields.h"
 
 namespace tilegrad {
-
-// GradientMode::kAdd over a renderer that overwrites: what the caller's arrays hold is kept aside,
-// and added when the gradients are there.
-template <class T>
-class SavedGradients {
- public:
-  // Each array once, whoever shares it.
-  void Save(std::span<const SceneGradientsT<T>> gradients) {
-    arrays_.clear();
-    for (const SceneGradientsT<T>& d : gradients) {
-      ForEachGradientArray(SceneT<T>(), d, [&](const char*, std::span<T> array, int) {
-        if (!array.empty()) arrays_.push_back(array);
-      });
-    }
-    const auto before = [](auto a, auto b) { return std::less<T*>()(a.data(), b.data()); };
-    const auto same = [](auto a, auto b) { return a.data() == b.data(); };
-    std::sort(arrays_.begin(), arrays_.end(), before);
-    arrays_.erase(std::unique(arrays_.begin(), arrays_.end(), same), arrays_.end());
-    values_.clear();
-    for (const auto& array : arrays_) values_.insert(values_.end(), array.begin(), array.end());
-  }
-
-  void Restore() const {
-    const T* from = values_.data();
-    for (const auto& array : arrays_) {
-      std::copy_n(from, array.size(), array.begin());
-      from += array.size();
-    }
-  }
-
-  // False, and the arrays are as they were, if a sum is not finite.
-  bool Add() const {
-    const T* from = values_.data();
-    T not_finite = T(0);
-    for (const auto& array : arrays_) {
-      for (T& x : array) {
-        x += *from++;
-        not_finite += x - x;
-      }
-    }
-    if (not_finite == T(0)) return true;
-    Restore();
-    return false;
-  }
-
- private:
-  std::vector<std::span<T>> arrays_;
-  AlignedVector<T> values_;
-};
 
 // What a failed call may have left between two states.
 template <class T>
@@ -78,10 +21,7 @@ struct RendererScratch {
   explicit RendererScratch(const Workers& workers) : engine(workers) {}
 
   EngineOf engine;
-  std::vector<GradientRecords<T>> records;
-  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
-  GradientArrays<T> arrays;
-  SavedGradients<T> saved;
+  GradientTargets<T> targets;
 };
 
 inline namespace v0 {
@@ -143,23 +83,17 @@ Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
                                     const FrameGradientsT<T>& d_frame,
                                     std::span<const SceneGradientsT<T>> d_scenes,
                                     GradientMode mode) {
-  auto& [engine, records, gradients, arrays, saved] = *scratch;
-  TILEGRAD_TRY(arrays.Check(frame.scenes, d_scenes));
+  auto& [engine, targets] = *scratch;
   const bool add = mode == GradientMode::kAdd;
-  if (records.size() < d_scenes.size()) records.resize(d_scenes.size());
-  gradients.clear();
-  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    gradients.push_back(records[n].Begin(d_scenes[n]));
-  }
-  if (add) saved.Save(d_scenes);
-  Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, gradients);
+  TILEGRAD_TRY(targets.Begin(frame.scenes, d_scenes));
+  if (add) targets.Save();
+  Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, &targets);
   if (!status.ok()) {
-    if (add) saved.Restore();
+    if (add) targets.Restore();
     return status;
   }
-  if (add && !saved.Add()) return InvalidArgument("a sum of gradients overflows");
-  for (std::size_t n = 0; n < d_scenes.size() && !add; ++n) records[n].Clear(d_scenes[n]);
-  for (std::size_t n = 0; n < d_scenes.size(); ++n) records[n].AddTo(d_scenes[n]);
+  if (add && !targets.AddSaved()) return InvalidArgument("a sum of gradients overflows");
+  targets.JoinRecords(add);
   return {};
 }
 

@@ -3,6 +3,7 @@
 // so here, and learns of a new one by itself.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 
@@ -90,16 +91,6 @@ void ForEachPlainArray(Gradients& d, const Visit& visit) {
   visit("sh", d.sh);
 }
 
-// Calls visit(name, array, width) for all of them; width: of a texture, whose gradients only mean
-// the same in one of the same width.
-template <class T, class Visit>
-void ForEachGradientArray(const SceneT<T>& scene, const SceneGradientsT<T>& d, const Visit& visit) {
-  ForEachPlainArray(d, [&](const char* name, std::span<T> array) { visit(name, array, 0); });
-  for (std::size_t t = 0; t < d.textures.size(); ++t) {
-    visit("textures", d.textures[t], t < scene.textures.size() ? scene.textures[t].width : 0);
-  }
-}
-
 // Calls visit(name, numbers of a record...) for the parts of records that have a gradient. Records
 // of one kind are visited side by side: a gradient and what is added to it, say.
 template <class Visit, class... Cameras>
@@ -139,6 +130,15 @@ void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {
   for (LightT<T>& l : d.lights) {
     ForEachLightPart([&](const char* name, auto part) { visit("lights", name, part); }, l);
   }
+}
+
+// Sets the numbers of all records of some gradients to 0.
+template <class T>
+void ClearRecords(const SceneGradientsT<T>& d) {
+  ForEachRecordPart(d, [](const char*, const char*, std::span<T> part) {
+    std::fill(part.begin(), part.end(), T(0));
+  });
+  if (d.camera != nullptr) d.camera->near_plane = T(0);
 }
 
 // Calls visit(name, planes, field of a record...) for the images that have a gradient, of records

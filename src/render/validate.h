@@ -40,7 +40,4 @@ Status ValidateCotangents(const FrameGradientsT<T>& d_frame,
 // (SceneParts::may_overflow).
 Status ValidateImages(const FrameImages& frame);
 
-// Gradients that overflow float are an error, not an Inf that spreads.
-Status ValidateResult(std::span<const SceneGradients> d_scenes);
-
 }  // namespace tilegrad

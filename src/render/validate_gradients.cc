@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
-#include <string_view>
 
 #include "base/array_checks.h"
 #include "base/error.h"
@@ -34,26 +33,6 @@ Status CheckGradients(const SceneT<T>& scene, const SceneGradientsT<T>& d) {
   for (std::size_t i = 0; i < d.textures.size() && status.ok(); ++i) {
     check("textures[i]", d.textures[i].size(), scene.textures[i].texels.size());
   }
-  return status;
-}
-
-Status CheckResult(const SceneGradients& d, const SceneGradients& known) {
-  Status status;
-  const auto check = [&](const char* name, std::span<const float> values) {
-    if (status.ok() && !AllFinite(values)) {
-      status = CheckFinite(fmt::format("d_scene.{}", name).c_str(), values);
-    }
-  };
-  std::size_t texture = 0;
-  ForEachGradientArray(Scene(), d, [&](const char* name, std::span<float> values, int) {
-    const bool of_texture = name == std::string_view("textures");
-    const std::size_t t = of_texture ? texture++ : 0;
-    if (of_texture && t < known.textures.size() && SameArray(values, known.textures[t])) return;
-    check(name, values);
-  });
-  ForEachRecordPart(d, [&](const char* record, const char* part, std::span<const float> values) {
-    if (!AllFinite(values)) check(fmt::format("{}.{}", record, part).c_str(), values);
-  });
   return status;
 }
 
@@ -113,15 +92,6 @@ Status ValidateImages(const FrameImages& frame) {
         .Within(
             "the image overflows: a product of colours, textures, surfaces and lights, or a sum, "
             "is beyond float; scale them down");
-  }
-  return {};
-}
-
-Status ValidateResult(std::span<const SceneGradients> d_scenes) {
-  const SceneGradients nothing;
-  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    const Status status = CheckResult(d_scenes[n], n > 0 ? d_scenes[n - 1] : nothing);
-    if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
   }
   return {};
 }

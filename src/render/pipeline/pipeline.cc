@@ -100,8 +100,7 @@ struct Pipeline::Impl {
   }
 
   const Workers* workers;
-  std::atomic<bool> sound =
-      true;  // of a way back; false: some task met a number that is not finite
+  std::atomic<bool> sound = true;  // false: on a way back some number was not finite
   std::unique_ptr<AlphaStage> all_faces, paper;
   AlphaStage* alpha = nullptr;  // of the last call; null: no alpha
   Topologies topologies;

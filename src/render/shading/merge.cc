@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <string_view>
 
+#include "render/shading/pack.h"
 #include "shade/spherical_harmonics_ref.h"
 
 namespace tilegrad {
@@ -97,79 +97,127 @@ void AddSh(const StageScene& scene, const SceneSums& sums, std::span<float> d_sh
 
 }  // namespace
 
-void ClearUniforms(std::span<const SceneGradients> d_scenes) {
-  for (const SceneGradients& d : d_scenes) {
-    std::fill(d.sh.begin(), d.sh.end(), 0.0f);
-    ForEachRecordPart(d, [](const char* record, const char*, std::span<float> part) {
-      if (record != std::string_view("camera")) std::fill(part.begin(), part.end(), 0.0f);
-    });
+std::span<PipelineGradients> GradientMerge::Begin(const BackwardPlan& plan,
+                                                  std::span<const PipelineScene> views,
+                                                  const Targets& targets) {
+  d_views_.clear();
+  if (scratch_.size() < views.size()) scratch_.resize(views.size());
+  const bool attributes = plan.pulled.channels() > 0;
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    SceneScratch& s = scratch_[n];
+    const SceneGradients& wanted = targets.scenes()[n];
+    s.d_positions.resize(wanted.positions.size());
+    s.d_varyings.resize(attributes ? views[n].attributes.values.size() : 0);
+    d_views_.push_back({s.d_positions, s.d_varyings, wanted.camera != nullptr, {}});
   }
+  return d_views_;
 }
 
-void ClearTextures(std::span<const SceneGradients> d_scenes) {
-  for (const SceneGradients& d : d_scenes) {
-    for (const auto& texture : d.textures) std::fill(texture.begin(), texture.end(), 0.0f);
+void GradientMerge::Run(const Batch& batch) {
+  const std::size_t count = d_views_.size();
+  for (std::size_t n = 0; n < count; ++n) {
+    const SceneGradients& d = batch.targets.scenes()[n];
+    if (d.camera != nullptr) *d.camera = d_views_[n].d_camera;
   }
+  if (batch.plan.staged()) {
+    workers_->For(count, [&](std::size_t n, std::size_t) { AddToPositions(batch, n); });
+  }
+  const auto arrays = batch.targets.arrays();
+  workers_->For(arrays.size(), [&](std::size_t i, std::size_t) { FillArray(batch, arrays[i]); });
+  if (batch.stage == nullptr) return;
+  MergeUniforms(batch);
+  if (batch.plan.to_texture) MergeTextures(batch);
 }
 
-void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
-                   std::span<const SceneGradients> d_scenes, SceneSums* scratch) {
-  SceneSums& sums = *scratch;
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    sums.Clear(scenes[n].surfaces.size(), scenes[n].lights.size());
-    for (const StageBand& band : stage.bands(n)) AddBand(band.sums, sums);
-    const SceneGradients& d = d_scenes[n];
-    AddSurfaces(scenes[n], sums, d.surfaces);
-    AddLights(scenes[n], sums, d.lights);
-    AddSh(scenes[n], sums, d.sh);
-    if (d.camera != nullptr) AddCamera(scenes[n], sums, d.camera);
+// Positions that were interpolated, and normals derived from positions.
+void GradientMerge::AddToPositions(const Batch& batch, std::size_t n) {
+  SceneScratch& s = scratch_[n];
+  if (s.d_positions.empty()) return;
+  const Scene& scene = *batch.inputs.scenes()[n].scene;
+  const VaryingSet& set = batch.plan.pulled;
+  if (set[Varying::kPosition]) {
+    AddStream(scene, set, Varying::kPosition, s.d_varyings, s.d_positions);
   }
+  if (!set[Varying::kNormal] || scene.shading.normals == Normals::kGiven) return;
+  const SceneNormals& normals = batch.inputs.normals(n);
+  if (normals.empty()) return;  // of no faces
+  s.d_units.assign(normals.size(), {0, 0, 0});
+  AddStream(scene, set, Varying::kNormal, s.d_varyings,
+            {s.d_units[0].data(), 3 * s.d_units.size()});
+  AddNormalsAdjoint(scene, normals, s.d_units, s.d_positions);
 }
 
-void TextureMerge::FindTargets(std::span<const StageScene> scenes,
-                               std::span<const SceneGradients> d_scenes) {
-  targets_.clear();
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    for (std::size_t t = 0; t < d_scenes[n].textures.size(); ++t) {
-      const std::span<float> out = d_scenes[n].textures[t];
-      if (out.empty()) continue;
-      const auto known = std::find_if(targets_.begin(), targets_.end(), [&](const Target& target) {
-        return target.out.data() == out.data();
-      });
-      const shade::TexturePyramid* pyramid = scenes[n].textures[t];
-      if (known == targets_.end()) {
-        targets_.push_back({out, pyramid});
-      } else if (pyramid->sizes().size() > known->pyramid->sizes().size()) {
-        known->pyramid = pyramid;  // one is mip-mapped: there is room for all of its levels
-      }
+// Of a stream; others, to which this adds nothing, are set to 0 unless that is done later.
+void GradientMerge::FillArray(const Batch& batch, std::span<const Targets::Target> array) const {
+  const Targets::Target& first = array.front();
+  const BackwardPlan& plan = batch.plan;
+  if (first.texture && batch.stage != nullptr && plan.to_texture) return;
+  const std::span<float> out = first.out;
+  std::fill(out.begin(), out.end(), 0.0f);
+  const bool position = first.stream == Varying::kPosition;
+  // Normals of positions are pulled; those that the scene has besides are not used.
+  const bool unused =
+      first.stream == Varying::kNormal && plan.parts.shading.normals != Normals::kGiven;
+  if (!first.stream || unused || (!position && !plan.pulled[*first.stream])) return;
+  for (const Targets::Target& target : array) {
+    const SceneScratch& s = scratch_[target.scene];
+    if (position) {
+      for (std::size_t i = 0; i < out.size(); ++i) out[i] += s.d_positions[i];
+    } else {
+      AddStream(*batch.inputs.scenes()[target.scene].scene, plan.pulled, *first.stream,
+                s.d_varyings, out);
     }
   }
-  while (gradients_.size() < targets_.size()) {
-    gradients_.push_back(std::make_unique<shade::TextureGradient>());
+}
+
+// Lights, coefficients, surfaces and, beside what geometry pulls, cameras.
+void GradientMerge::MergeUniforms(const Batch& batch) {
+  const std::span<const StageScene> scenes = batch.inputs.scenes();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    sums_.Clear(scenes[n].surfaces.size(), scenes[n].lights.size());
+    for (const StageBand& band : batch.stage->bands(n)) AddBand(band.sums, sums_);
+    const SceneGradients& d = batch.targets.scenes()[n];
+    AddSurfaces(scenes[n], sums_, d.surfaces);
+    AddLights(scenes[n], sums_, d.lights);
+    AddSh(scenes[n], sums_, d.sh);
+    if (d.camera != nullptr) AddCamera(scenes[n], sums_, d.camera);
   }
 }
 
-void TextureMerge::Run(const ShadeStage& stage, std::span<const StageScene> scenes,
-                       const Workers& workers, std::span<const SceneGradients> d_scenes) {
-  FindTargets(scenes, d_scenes);
-  workers.For(targets_.size(),
-              [&](std::size_t i, std::size_t) { gradients_[i]->Clear(*targets_[i].pyramid); });
-  // Each texel gets its sum in the order of scenes, bands and pixels, whatever the number of parts.
-  const std::size_t parts = targets_.size() >= static_cast<std::size_t>(workers.count()) ? 1 : 4;
-  workers.For(targets_.size() * parts, [&](std::size_t task, std::size_t) {
-    const Target& target = targets_[task / parts];
+void GradientMerge::FindTextures(const Batch& batch) {
+  textures_.clear();
+  for (const auto& array : batch.targets.arrays()) {
+    if (!array.front().texture) continue;
+    const shade::TexturePyramid* most = nullptr;  // one is mip-mapped: there is room for its levels
+    for (const Targets::Target& target : array) {
+      const auto* pyramid = batch.inputs.scenes()[target.scene].textures[*target.texture];
+      if (most == nullptr || pyramid->sizes().size() > most->sizes().size()) most = pyramid;
+    }
+    textures_.push_back({array, most});
+  }
+  while (texture_gradients_.size() < textures_.size()) {
+    texture_gradients_.push_back(std::make_unique<shade::TextureGradient>());
+  }
+}
+
+// Each texel gets its sum in the order of scenes, bands and pixels, whatever the number of parts.
+void GradientMerge::MergeTextures(const Batch& batch) {
+  FindTextures(batch);
+  workers_->For(textures_.size(), [&](std::size_t i, std::size_t) {
+    texture_gradients_[i]->Clear(*textures_[i].pyramid);
+  });
+  const std::size_t parts = textures_.size() >= static_cast<std::size_t>(workers_->count()) ? 1 : 4;
+  workers_->For(textures_.size() * parts, [&](std::size_t task, std::size_t) {
     const shade::RowShare rows{static_cast<int>(task % parts), static_cast<int>(parts)};
-    for (std::size_t n = 0; n < scenes.size(); ++n) {
-      for (std::size_t t = 0; t < d_scenes[n].textures.size(); ++t) {
-        if (d_scenes[n].textures[t].data() != target.out.data()) continue;
-        for (const StageBand& band : stage.bands(n)) {
-          gradients_[task / parts]->Scatter(band.shares[t], rows);
-        }
+    for (const Targets::Target& target : textures_[task / parts].array) {
+      for (const StageBand& band : batch.stage->bands(target.scene)) {
+        texture_gradients_[task / parts]->Scatter(band.shares[*target.texture], rows);
       }
     }
   });
-  workers.For(targets_.size(),
-              [&](std::size_t i, std::size_t) { gradients_[i]->Finish(targets_[i].out); });
+  workers_->For(textures_.size(), [&](std::size_t i, std::size_t) {
+    texture_gradients_[i]->Finish(textures_[i].array.front().out);
+  });
 }
 
 }  // namespace tilegrad

@@ -1,45 +1,70 @@
 // SPDX-License-Identifier: Apache-2.0
-// Last stage of the way back through shading: what bands have summed, to gradients of lights,
-// coefficients, surfaces, cameras and textures. Sums are made in the order of scenes and bands.
+// Last stage of the way back through shading: what the pipeline has pulled on a scene's streams and
+// what bands have summed, to gradients of the scene. Sums are made in the order of scenes and
+// bands.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "base/aligned.h"
 #include "base/parallel.h"
-#include "render/scene_fields.h"
+#include "render/gradient_targets.h"
+#include "render/pipeline/records.h"
+#include "render/shading/inputs.h"
+#include "render/shading/plan.h"
 #include "render/shading/stage.h"
 #include "shade/texture_levels.h"
 
 namespace tilegrad {
 
-// Overwrites lights, sh and surfaces of d_scenes where they are wanted, and adds to cameras.
-void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
-                   std::span<const SceneGradients> d_scenes, SceneSums* scratch);
-
-// Sets them to 0.
-void ClearUniforms(std::span<const SceneGradients> d_scenes);
-// Where no texture is pulled on.
-void ClearTextures(std::span<const SceneGradients> d_scenes);
-
-// Gradients of textures, each in an array of its own. Scratch that is reused.
-class TextureMerge {
+// Scratch that is reused.
+class GradientMerge {
  public:
-  // Overwrites textures of d_scenes where they are wanted.
-  void Run(const ShadeStage& stage, std::span<const StageScene> scenes, const Workers& workers,
-           std::span<const SceneGradients> d_scenes);
+  using Targets = GradientTargets<float>;
+
+  explicit GradientMerge(const Workers& workers) : workers_(&workers) {}
+
+  // Where Pipeline::Backward is to write, given the views that it gets: scratch of each scene.
+  std::span<PipelineGradients> Begin(const BackwardPlan& plan, std::span<const PipelineScene> views,
+                                     const Targets& targets);
+
+  // What a merge is about.
+  struct Batch {
+    const BackwardPlan& plan;
+    const ShadeInputs& inputs;
+    const ShadeStage* stage;  // null: none has run
+    const Targets& targets;
+  };
+  // Overwrites the arrays of the targets and their scenes' own records.
+  void Run(const Batch& batch);
 
  private:
-  // An array of the caller and the texture that it is the gradient of; scenes may share it.
-  struct Target {
-    std::span<float> out;
+  // Of one scene before they are summed.
+  struct SceneScratch {
+    AlignedVector<float> d_varyings, d_positions;
+    AlignedVector<shade::Vec3<float>> d_units;
+  };
+  // The array of a texture's gradient.
+  struct TextureTarget {
+    std::span<const Targets::Target> array;
     const shade::TexturePyramid* pyramid;
   };
-  void FindTargets(std::span<const StageScene> scenes, std::span<const SceneGradients> d_scenes);
 
-  std::vector<Target> targets_;
-  std::vector<std::unique_ptr<shade::TextureGradient>> gradients_;
+  void AddToPositions(const Batch& batch, std::size_t n);
+  void FillArray(const Batch& batch, std::span<const Targets::Target> array) const;
+  void MergeUniforms(const Batch& batch);
+  void MergeTextures(const Batch& batch);
+  void FindTextures(const Batch& batch);
+
+  const Workers* workers_;
+  std::vector<SceneScratch> scratch_;
+  std::vector<PipelineGradients> d_views_;
+  SceneSums sums_;
+  std::vector<TextureTarget> textures_;
+  std::vector<std::unique_ptr<shade::TextureGradient>> texture_gradients_;
 };
 
 }  // namespace tilegrad
