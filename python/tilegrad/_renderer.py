@@ -12,7 +12,7 @@ from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size, common_size, filled_size
 from tilegrad._packed import Packed
 from tilegrad._picture import Pictured
-from tilegrad._scene import Light, Scene, Surface
+from tilegrad._scene import DIFFERENTIABLE, Light, Scene, Surface
 from tilegrad._threads import thread_count
 
 _Reader = Callable[[str, str, Any], Any]
@@ -56,8 +56,6 @@ def options_of(*values: Any) -> _core.RenderOptions:
 _OUTPUTS = ("color", "alpha")
 # Names whose values are not plain arrays.
 RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
-_NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
-          "light_directions", "sh", "attributes")
 
 
 class Frame(Pictured):
@@ -171,7 +169,7 @@ class Gradients:
         self._arrays = arrays
 
     def __getattr__(self, name: str) -> Any:
-        if name not in _NAMES:
+        if name not in DIFFERENTIABLE:
             raise AttributeError(f"Gradients have no {name!r}")
         if name not in self._arrays:
             raise AttributeError(f"{name} was not asked for: wrt={tuple(self._arrays)!r}")
@@ -257,9 +255,9 @@ class Renderer:
 
         color, alpha, attributes, depth, normals, uv: dL/d(image), in the image's shape and dtype;
             None is zero. The image must have been rendered. depth: background pixels are not read.
-        wrt: which gradients are wanted, of "positions", "camera", "colors", "uvs", "normals",
-            "textures", "surfaces", "lights", "light_directions", "sh", "attributes"; what is not
-            wanted is not computed. Default: those of `out`, or positions.
+        wrt: which gradients are wanted: names of the Scene's arguments that are real numbers
+            ("positions", "camera", "colors", ...); what is not wanted is not computed. Default:
+            those of `out`, or positions.
         out: what an earlier backward of such scenes returned, to be overwritten.
         accumulate: add to `out` instead.
 
@@ -303,7 +301,8 @@ class Renderer:
                  accumulate: bool) -> list[Gradients]:
         if out is None and accumulate:
             raise ValueError("backward: accumulate=True needs out")
-        names = _arrays.as_names("backward", "wrt", "positions" if wrt is None else wrt, _NAMES)
+        names = _arrays.as_names("backward", "wrt", "positions" if wrt is None else wrt,
+                                 DIFFERENTIABLE)
         if out is None:
             return [Gradients({name: _empty_like(scene, name) for name in names})
                     for scene in frame.scenes]

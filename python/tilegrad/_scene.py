@@ -16,6 +16,8 @@ _SHAPES = {"colors": ("V", 3), "uvs": ("V", 2), "normals": ("V", 3), "attributes
 _CORNER_SHAPES = {"colors": ("F", 3, 3), "uvs": ("F", 3, 2), "normals": ("F", 3, 3),
                   "attributes": ("F", 3, "C")}  # in the order that C++ has them
 _FIELDS = ("positions", "faces", "camera", *_SHAPES, "face_surfaces", "lights")
+# Arguments that have a gradient.
+DIFFERENTIABLE = ("positions", "camera", *_SHAPES, "textures", "surfaces", "lights")
 _S, _L = _core.SURFACE, _core.LIGHT
 
 

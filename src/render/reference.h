@@ -169,23 +169,12 @@ RefPixel<T> InterpolatePixelRef(const RefScene<T>& s, const RenderOptions& optio
   return out;
 }
 
-// Calls visit(varying's first channel, its numbers) for the parts of a ShadePixel.
-template <class T, class Visit>
-void ForEachPixelPart(const VaryingSet& set, ShadePixel<T>* p, const Visit& visit) {
-  if (set[Varying::kColor]) visit(set.first(Varying::kColor), std::span<T>(p->color));
-  if (set[Varying::kUv]) visit(set.first(Varying::kUv), std::span<T>(p->uv));
-  visit(set.first(Varying::kNormal), std::span<T>(p->normal));
-  visit(set.first(Varying::kPosition), std::span<T>(p->position));
-  if (set[Varying::kLightDirection])
-    visit(set.first(Varying::kLightDirection), std::span<T>(p->light_direction));
-}
-
 template <class T>
 ShadePixel<T> ShadePixelOf(const RefScene<T>& s, const RenderOptions& options,
                            const RefPixel<T>& at) {
   ShadePixel<T> p;
-  ForEachPixelPart(s.set, &p, [&](int first, std::span<T> part) {
-    std::copy_n(at.values.begin() + first, part.size(), part.begin());
+  ForEachPixelPart(p, [&](Varying what, std::span<T> part) {
+    if (s.set[what]) std::copy_n(at.values.begin() + s.set.first(what), part.size(), part.begin());
   });
   const auto& mesh = s.prepared.mesh;
   const auto source = static_cast<std::size_t>(mesh.source_face[at.face]);
@@ -335,10 +324,9 @@ void ShadePixelBackward(const RefScene<T>& s, const RenderOptions& options,
     d->depth_axis[c] -= p.position[c] * d_depth[0];
   }
   d->depth_shift -= d_depth[0];
-  ForEachPixelPart(s.set, &d_p, [&](int first, std::span<T> part) {
-    for (std::size_t c = 0; c < part.size(); ++c) {
-      d_values[static_cast<std::size_t>(first) + c] += part[c];
-    }
+  ForEachPixelPart(d_p, [&](Varying what, std::span<T> part) {
+    const auto first = static_cast<std::size_t>(s.set.first(what));
+    for (std::size_t c = 0; c < part.size() && s.set[what]; ++c) d_values[first + c] += part[c];
   });
   raster::InterpolateRefBackward<T>(s.prepared.mesh, s.prepared.attributes, at.plane, at.face,
                                     options.interpolation, at.weights, d_values, d->prepared.screen,

@@ -9,6 +9,7 @@ import numpy as np
 import tilegrad
 from scenes import IMAGE, patch
 from tilegrad import Camera, Light, Renderer, Surface, Texture
+from tilegrad._scene import DIFFERENTIABLE
 
 
 class Picture:
@@ -147,9 +148,9 @@ class Errors(unittest.TestCase):
              lambda: renderer.backward(frame, depth=ones)),
             (ValueError, "backward: wrt has 'sh', but a scene has none",
              lambda: renderer.backward(frame, alpha=ones, wrt="sh")),
-            (ValueError, "backward: wrt is 'vertices', expected one of 'positions', 'camera', "
-             "'colors', 'uvs', 'normals', 'textures', 'surfaces', 'lights', 'light_directions', "
-             "'sh', 'attributes'", lambda: renderer.backward(frame, alpha=ones, wrt="vertices")),
+            (ValueError, "backward: wrt is 'vertices', expected one of "
+             + ", ".join(repr(name) for name in DIFFERENTIABLE),
+             lambda: renderer.backward(frame, alpha=ones, wrt="vertices")),
             (ValueError, "backward: accumulate=True needs out",
              lambda: renderer.backward(frame, alpha=ones, accumulate=True)),
             (TypeError, "backward: out[0] must be Gradients, got int",

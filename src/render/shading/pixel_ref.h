@@ -28,6 +28,16 @@ struct ShadePixel {
   std::size_t surface = 0;
 };
 
+// The list of what is interpolated: calls visit(varying, its numbers).
+template <class T, class Visit>
+void ForEachPixelPart(ShadePixel<T>& p, const Visit& visit) {
+  visit(Varying::kColor, std::span<T>(p.color));
+  visit(Varying::kUv, std::span<T>(p.uv));
+  visit(Varying::kNormal, std::span<T>(p.normal));
+  visit(Varying::kPosition, std::span<T>(p.position));
+  visit(Varying::kLightDirection, std::span<T>(p.light_direction));
+}
+
 // What pixels of a scene have in common. Also the gradient of it.
 template <class T>
 struct ShadeUniforms {

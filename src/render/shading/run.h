@@ -48,6 +48,17 @@ struct RunCotangents {
   shade::RunPlane texture[3], light, highlight, eye[3];
 };
 
+// The list of what is interpolated: calls visit(varying, planes of it), of RunValues or
+// RunCotangents.
+template <class Run, class Visit>
+void ForEachVarying(Run& run, const Visit& visit) {
+  visit(Varying::kColor, std::span(run.vertex_color));
+  visit(Varying::kUv, std::span(run.uv));
+  visit(Varying::kNormal, std::span(run.normal));
+  visit(Varying::kPosition, std::span(run.position));
+  visit(Varying::kLightDirection, std::span(run.light_direction));
+}
+
 // Sums over pixels of what they pull on what they have in common.
 struct SurfaceSums {
   shade::ColorFactorsT<double> factors = {};

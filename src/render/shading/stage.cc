@@ -129,14 +129,9 @@ RunScene ShadeStage::RunSceneOf(const StageScene& scene, std::int32_t surface) c
 void ShadeStage::GatherInputs(const PixelStrip& strip, const PixelRun& run, const VaryingSet& set,
                               const ShadeSteps& steps, StageWorker* worker) const {
   RunValues* const v = &worker->values;
-  const auto gather = [&](Varying what, std::span<RunPlane> to) {
+  ForEachVarying(*v, [&](Varying what, std::span<RunPlane> to) {
     if (set[what]) GatherChannels(run, strip, set.first(what), to);
-  };
-  gather(Varying::kColor, v->vertex_color);
-  gather(Varying::kUv, v->uv);
-  gather(Varying::kNormal, v->normal);
-  gather(Varying::kPosition, v->position);
-  gather(Varying::kLightDirection, v->light_direction);
+  });
   const StageScene& scene = scenes_[strip.image];
   if (steps.turn) SetSides(strip, run, &v->side);
   if (!steps.level) return;
@@ -262,18 +257,13 @@ void ShadeStage::ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
                                    const RunCotangents& d) const {
   const StripRows rows{d_varyings.row};
   const VaryingSet& set = backward_->pulled;
-  const auto scatter = [&](Varying what, std::span<const RunPlane> from) {
+  ForEachVarying(d, [&](Varying what, std::span<const RunPlane> from) {
     if (!set[what]) return;
     for (std::size_t c = 0; c < from.size(); ++c) {
       const std::ptrdiff_t plane = set.first(what) + static_cast<std::ptrdiff_t>(c);
       ScatterRun(run, from[c], rows, d_varyings.data + plane * d_varyings.plane);
     }
-  };
-  scatter(Varying::kColor, d.vertex_color);
-  scatter(Varying::kUv, d.uv);
-  scatter(Varying::kNormal, d.normal);
-  scatter(Varying::kPosition, d.position);
-  scatter(Varying::kLightDirection, d.light_direction);
+  });
   const auto user = static_cast<std::size_t>(set.width(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {
     RunPlane plane;
