@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // NumPy arrays as spans, and errors as Python's exceptions. tilegrad/_arrays.py has converted and
-// named what the caller gave; here the same is checked once more, because a wrong size would read
-// memory of others. The one home of both on this side.
+// named what the caller gave; here is checked what a span relies on, dtype, layout and, where
+// nobody behind knows how many numbers there must be, the shape. The one home of both on this side.
 #pragma once
 
 #include <fmt/format.h>

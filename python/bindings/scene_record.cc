@@ -65,11 +65,8 @@ void PutLight(const LightT<T>& light, std::span<T> numbers) {
 
 template <class T>
 SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
-    : arrays_(std::move(arrays)),
-      vertices_(Length(arrays_["positions"], 2)),
-      faces_(Length(arrays_["faces"], 2)),
-      scenes_(count) {
-  const auto faces = Take<std::int32_t>("faces", {faces_, 3});
+    : arrays_(std::move(arrays)), scenes_(count) {
+  const auto faces = Take<std::int32_t>("faces", {kAny, kAny});
   const auto cameras = Take<T>("camera", {kCameraNumbers});
   const auto model = [](int lighting, int normals, auto... flags) {
     return ShadingModel{static_cast<Lighting>(lighting), static_cast<Normals>(normals), flags...};
@@ -107,10 +104,8 @@ void SceneRecord<T>::SetStreams() {
   for (SceneT<T>& scene : scenes_) scene.channels = channels_;
   SceneT<T> names;
   ForEachStream(names, {}, [&](const SceneStream<T>& s) {
-    const py::ssize_t width = s.what == Varying::kUser ? channels : s.width;
     const bool corner = arrays_.at_corners(s.name);
-    const auto field =
-        corner ? Take<T>(s.name, {faces_, 3, width}) : Take<T>(s.name, {vertices_, width});
+    const auto field = Take<T>(s.name, std::vector<py::ssize_t>(corner ? 3 : 2, kAny));
     if (!field.given()) return;
     const Rate rate = corner ? Rate::kCorner : Rate::kVertex;
     for (std::size_t n = 0; n < scenes_.size(); ++n) {
@@ -151,7 +146,7 @@ void SceneRecord<T>::SetTextures() {
   for (std::size_t i = 0; i < each; ++i) {
     const py::object& texels = arrays_.textures[i];
     const py::ssize_t height = Length(texels, 3), width = Length(texels, 2);
-    const auto field = Take<T>("textures", texels, {height, width, 3});
+    const auto field = Take<T>("textures", texels, {kAny, kAny, kAny});
     for (std::size_t n = 0; n < scenes_.size(); ++n) {
       textures_[n * each + i] = {field.Of(n), static_cast<int>(width), static_cast<int>(height),
                                  static_cast<Wrap>(arrays_.wraps[i]),
@@ -165,7 +160,7 @@ void SceneRecord<T>::SetTextures() {
 
 template <class T>
 void SceneRecord<T>::SetSurfaces() {
-  const auto indices = Take<std::int32_t>("face_surfaces", {faces_});
+  const auto indices = Take<std::int32_t>("face_surfaces", {kAny});
   const auto count = static_cast<py::ssize_t>(arrays_.surface_textures.size());
   if (const py::object surfaces = arrays_["surfaces"]; !surfaces.is_none()) {
     const auto numbers = SpanOf<T>(surfaces, "Scene", "surfaces",
@@ -185,7 +180,7 @@ template <class T>
 void SceneRecord<T>::SetLights() {
   const py::ssize_t each = Length(arrays_["lights"], 2);
   const auto lights = Take<T>("lights", {each, kLightNumbers});
-  const auto sh = Take<T>("sh", {9});
+  const auto sh = Take<T>("sh", {kAny});
   lights_.resize(static_cast<std::size_t>(each) * lights.arrays());
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     lights_[i] = LightOf<T>(lights.all().subspan(i * kLightNumbers, kLightNumbers));

@@ -118,7 +118,6 @@ class SceneRecord {
   }
 
   SceneArrays arrays_;  // keeps them alive
-  py::ssize_t vertices_ = 0, faces_ = 0;
   int channels_ = 0;
   std::vector<SceneT<T>> scenes_;
   std::vector<TextureT<T>> textures_;  // of image 0, of image 1, ...
