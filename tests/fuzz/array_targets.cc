@@ -2,7 +2,7 @@
 // Readers of arrays and archives.
 #include "base/read_budget.h"
 #include "fuzz/target.h"
-#include "io/mat/mat_file.h"
+#include "io/mat_file.h"
 #include "io/npz.h"
 #include "io/sh3f.h"
 #include "nn/serialize.h"

@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "base/read_budget.h"
-#include "io/mat/mat_file.h"
+#include "io/mat_file.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::mat_test {

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/text.h"
-#include "io/mat/mat_file.h"
+#include "io/mat_file.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/photographs.h"
 

@@ -2,7 +2,7 @@
 #include "train/data/photographs/cmr_writer.h"
 
 #include "base/error.h"
-#include "io/mat/mat_file.h"
+#include "io/mat_file.h"
 #include "scene/weak_perspective_ref.h"
 
 namespace tilegrad::train {

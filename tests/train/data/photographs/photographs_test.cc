@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "io/mat/mat_file.h"
+#include "io/mat_file.h"
 #include "support/temp_folder.h"
 #include "train/data/photographs/miniature.h"
 #include "train/data/photographs/photo_store.h"

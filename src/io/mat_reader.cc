@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <memory>
 
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "base/text.h"
-#include "io/mat/mat_file.h"
-#include "io/mat/mat_stream.h"
+#include "io/mat_file.h"
 
 namespace tilegrad::io {
 namespace {
@@ -31,6 +31,48 @@ std::uint32_t Word(const std::uint8_t* at) {
   std::memcpy(&word, at, sizeof word);
   return word;
 }
+
+// Bytes one after the other: plain, or unpacked while they are read, so that what is packed never
+// lies in memory as a whole.
+class MatStream {
+ public:
+  MatStream(std::span<const std::uint8_t> bytes, bool packed)
+      : left_(bytes), packed_(packed), works_(!packed || inflateInit(&zlib_) == Z_OK) {
+    zlib_.next_in = const_cast<std::uint8_t*>(bytes.data());  // zlib does not write there
+    zlib_.avail_in = static_cast<uInt>(bytes.size());
+  }
+  ~MatStream() {
+    if (packed_) inflateEnd(&zlib_);
+  }
+  MatStream(const MatStream&) = delete;
+  MatStream& operator=(const MatStream&) = delete;
+
+  // All of `to`; false if there are fewer, or they cannot be unpacked.
+  bool Read(std::span<std::uint8_t> to) {
+    if (packed_) return Unpack(to);
+    if (to.size() > left_.size()) return false;
+    std::ranges::copy(left_.first(to.size()), to.begin());
+    left_ = left_.subspan(to.size());
+    return true;
+  }
+
+ private:
+  bool Unpack(std::span<std::uint8_t> to) {
+    if (!works_ || to.size() > UINT32_MAX) return false;
+    zlib_.next_out = to.data();
+    zlib_.avail_out = static_cast<uInt>(to.size());
+    while (zlib_.avail_out > 0) {
+      const int result = inflate(&zlib_, Z_NO_FLUSH);
+      if (result == Z_STREAM_END) break;
+      if (result != Z_OK) return works_ = false;
+    }
+    return zlib_.avail_out == 0;
+  }
+
+  std::span<const std::uint8_t> left_;  // plain
+  z_stream zlib_{};
+  bool packed_, works_;
+};
 
 // The arrays of one variable, from its bytes. `left_` counts what is left of the innermost array:
 // nothing reads beyond the array that it is part of.
@@ -264,14 +306,9 @@ Result<MatFile> ReadMat(std::span<const std::uint8_t> bytes, const std::string& 
       return DataLoss("{}: cut off: {} bytes of a variable, where {} are announced", name,
                       bytes.size() - at - 8, size);
     const bool packed = type == static_cast<std::uint32_t>(MatType::kCompressed);
-    std::unique_ptr<MatStream> stream;
-    if (packed) {
-      stream = std::make_unique<InflateStream>(bytes.subspan(at + 8, size));
-    } else {
-      stream = std::make_unique<PlainStream>(bytes.subspan(at, size + 8));
-    }
+    MatStream stream(packed ? bytes.subspan(at + 8, size) : bytes.subspan(at, size + 8), packed);
     auto& [variable, array] = file.variables.emplace_back();
-    TILEGRAD_TRY(Parser(*stream, name).Matrix(&array, &variable));
+    TILEGRAD_TRY(Parser(stream, name).Matrix(&array, &variable));
     // Plain variables are filled up to eight bytes, packed ones are not.
     at += 8 + (packed ? size : (size + 7) / 8 * 8);
   }

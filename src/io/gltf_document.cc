@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/gltf/gltf_document.h"
-
+// A glTF or GLB file, with its buffers, as tinygltf's model.
 #include <cctype>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -9,7 +8,7 @@
 #include "base/error.h"
 #include "base/json_text.h"
 #include "base/text.h"
-#include "io/gltf/gltf_extensions.h"
+#include "io/gltf_model.h"
 #include "io/mesh_readers.h"
 
 namespace tilegrad::io {

@@ -1,12 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "io/mat_file.h"
+
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "base/error.h"
-#include "io/mat/mat_file.h"
 
 namespace tilegrad::io {
+
 namespace {
+
+template <class T>
+double Load(const std::uint8_t* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return static_cast<double>(value);
+}
 
 const char* KindName(MatKind kind) {
   switch (kind) {
@@ -22,6 +32,108 @@ const char* KindName(MatKind kind) {
 }
 
 }  // namespace
+
+std::size_t SizeOfType(MatType type) {
+  switch (type) {
+    case MatType::kInt8:
+    case MatType::kUint8:
+      return 1;
+    case MatType::kInt16:
+    case MatType::kUint16:
+      return 2;
+    case MatType::kInt32:
+    case MatType::kUint32:
+    case MatType::kSingle:
+      return 4;
+    case MatType::kDouble:
+    case MatType::kInt64:
+    case MatType::kUint64:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+MatNumbers::MatNumbers(MatType type, std::vector<std::uint8_t> stored)
+    : type_(type), count_(stored.size() / SizeOfType(type)), stored_(std::move(stored)) {
+  bits_ = SizeOfType(type) == 1 && count_ > 0 &&
+          std::ranges::all_of(stored_, [](std::uint8_t b) { return b <= 1; });
+  if (!bits_) return;
+  std::vector<std::uint8_t> packed((count_ + 7) / 8);
+  for (std::size_t i = 0; i < count_; ++i)
+    packed[i / 8] = static_cast<std::uint8_t>(packed[i / 8] | (stored_[i] << (i % 8)));
+  stored_ = std::move(packed);
+}
+
+MatNumbers::MatNumbers(std::span<const double> numbers)
+    : count_(numbers.size()), stored_(numbers.size_bytes()) {
+  if (!numbers.empty()) std::memcpy(stored_.data(), numbers.data(), numbers.size_bytes());
+}
+
+double MatNumbers::operator[](std::size_t i) const {
+  if (bits_) return (stored_[i / 8] >> (i % 8)) & 1;
+  const std::uint8_t* const at = stored_.data() + i * SizeOfType(type_);
+  switch (type_) {
+    case MatType::kInt8:
+      return Load<std::int8_t>(at);
+    case MatType::kUint8:
+      return Load<std::uint8_t>(at);
+    case MatType::kInt16:
+      return Load<std::int16_t>(at);
+    case MatType::kUint16:
+      return Load<std::uint16_t>(at);
+    case MatType::kInt32:
+      return Load<std::int32_t>(at);
+    case MatType::kUint32:
+      return Load<std::uint32_t>(at);
+    case MatType::kSingle:
+      return Load<float>(at);
+    case MatType::kInt64:
+      return Load<std::int64_t>(at);
+    case MatType::kUint64:
+      return Load<std::uint64_t>(at);
+    default:
+      return Load<double>(at);
+  }
+}
+
+std::size_t MatArray::places() const {
+  std::size_t product = 1;
+  for (const std::size_t extent : dims) product *= extent;
+  return product;
+}
+
+MatArray MatArray::Numbers(std::vector<std::size_t> dims, std::span<const double> values) {
+  MatArray out;
+  out.dims = std::move(dims);
+  out.numbers = MatNumbers(values);
+  return out;
+}
+
+MatArray MatArray::Mask(std::size_t rows, std::size_t columns, std::vector<std::uint8_t> values) {
+  MatArray out;
+  out.logical = true;
+  out.dims = {rows, columns};
+  out.numbers = MatNumbers(MatType::kUint8, std::move(values));
+  return out;
+}
+
+MatArray MatArray::Text(std::string_view text) {
+  MatArray out;
+  out.kind = MatKind::kText;
+  out.dims = {1, text.size()};
+  out.text = text;
+  return out;
+}
+
+MatArray MatArray::Structs(std::vector<std::string> fields, std::vector<MatArray> elements) {
+  MatArray out;
+  out.kind = MatKind::kStruct;
+  out.dims = {1, fields.empty() ? 0 : elements.size() / fields.size()};
+  out.fields = std::move(fields);
+  out.elements = std::move(elements);
+  return out;
+}
 
 Result<MatPlace> MatPlace::Variable(const MatFile& file, const std::string& name) {
   std::string there;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: the statements of an OBJ file, as they stand.
+// Internal to io: the statements of OBJ files and of their material libraries, as they stand.
 #pragma once
 
 #include <array>
@@ -7,6 +7,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,5 +39,36 @@ struct ObjStatements {
 
 // DataLoss names `place` and the line: a number that is not finite, an index without its element.
 Result<ObjStatements> ParseObj(std::string_view text, const std::string& place);
+
+// An image on a material: uv * scale + offset says where in it.
+struct MtlImage {
+  std::string name;  // empty: none
+  glm::vec2 scale{1}, offset{0};
+  bool clamp = false;
+  bool operator==(const MtlImage&) const = default;
+};
+
+struct MtlMaterial {
+  std::string name;
+  glm::vec3 diffuse{1};  // Kd; white where the file has none
+  float opacity = 1;     // d, else 1 - Tr
+  MtlImage image{};      // map_Kd
+  bool operator==(const MtlMaterial&) const = default;
+};
+
+struct MtlLibrary {
+  std::vector<MtlMaterial> materials;           // in the order of the file
+  std::set<std::string, std::less<>> not_read;  // statements and options that change what is drawn
+};
+
+// DataLoss names `place` and the line: a number that is not finite.
+Result<MtlLibrary> ParseMtl(std::string_view text, const std::string& place);
+
+// The rest of a line as one name, which may contain spaces, without quotes around it.
+std::string_view WholeName(std::string_view rest);
+
+// What stands before " #", which begins a comment to some writers and belongs to the name for
+// others: for names that are not found whole.
+std::string_view WithoutComment(std::string_view name);
 
 }  // namespace tilegrad::io

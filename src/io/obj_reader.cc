@@ -8,9 +8,7 @@
 
 #include "base/error.h"
 #include "io/mesh_readers.h"
-#include "io/obj/mtl_library.h"
-#include "io/obj/obj_statements.h"
-#include "io/obj/obj_text.h"
+#include "io/obj_statements.h"
 #include "io/text_scan.h"
 
 namespace tilegrad::io {

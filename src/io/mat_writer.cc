@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <zlib.h>
+
 #include <algorithm>
 #include <cstring>
 
-#include "io/mat/mat_file.h"
-#include "io/mat/mat_stream.h"
+#include "io/mat_file.h"
 
 namespace tilegrad::io {
 namespace {
@@ -92,6 +93,15 @@ void MatWriter::Content(const MatArray& array) {
   std::vector<std::uint8_t> flags(numbers.size());
   std::ranges::transform(numbers, flags.begin(), [](double x) { return x != 0 ? 1 : 0; });
   Elements(MatType::kUint8, std::span<const std::uint8_t>(flags));
+}
+
+Bytes Deflated(std::span<const std::uint8_t> bytes) {
+  uLongf size = compressBound(bytes.size());
+  Bytes out(size);
+  // Cannot fail: the buffer is as large as it may get, and memory is the process's.
+  compress2(out.data(), &size, bytes.data(), bytes.size(), Z_BEST_SPEED);
+  out.resize(size);
+  return out;
 }
 
 Bytes WriteHeader() {
