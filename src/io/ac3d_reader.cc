@@ -4,18 +4,96 @@
 // a uv for each layer behind a corner, of which the first is read. Not read by Assimp, whose reader
 // exhausts memory, overflows the stack or leaves array bounds on wrong counts. Surfaces keep the
 // order of their corners; crease angles and subdivision are ignored.
+#include <algorithm>
 #include <glm/mat4x4.hpp>
 #include <map>
 
 #include "base/error.h"
-#include "io/ac3d_text.h"
 #include "io/mesh_readers.h"
+#include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
 
 constexpr int kMaxDepth = 256;                // objects are read recursively
 constexpr unsigned kPolygon = 0, kStrip = 4;  // the low four bits of a surface's flags
+
+// The next token, or a quoted string, which may contain spaces.
+std::string_view NextAc3dString(std::string_view& rest) {
+  const auto begin = rest.find_first_not_of(" \t");
+  if (begin == std::string_view::npos || rest[begin] != '"') return NextToken(rest);
+  const auto end = std::min(rest.find('"', begin + 1), rest.size());
+  const auto text = rest.substr(begin + 1, end - begin - 1);
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return text;
+}
+
+// Lines and numbers of the text, and its materials.
+class Ac3dText {
+ public:
+  // `place` stands in error messages.
+  Ac3dText(std::string place, std::string_view text) : place_(std::move(place)), lines_(text) {}
+
+  const std::string& place() const { return place_; }
+  bool NextRaw(std::string_view& line) { return lines_.Next(line); }
+  // The next line that is not empty.
+  bool Next(std::string_view& line) {
+    while (lines_.Next(line)) {
+      if (!Trimmed(line).empty()) return true;
+    }
+    return false;
+  }
+  Status Error(std::string_view what) const {
+    return DataLoss("{}: line {}: {}", place_, lines_.Number(), what);
+  }
+
+  // Takes `count` finite numbers off `rest`; `what` they are stands in the error.
+  template <class T>
+  Status Numbers(std::string_view& rest, T* values, int count, const char* what) const {
+    for (int i = 0; i < count; ++i) {
+      if (!ParseNumber(NextToken(rest), values[i]))
+        return Error(fmt::format("{} needs {} finite number{}", what, count, count > 1 ? "s" : ""));
+    }
+    return {};
+  }
+
+  // What follows MATERIAL on its line, or, in version 12 of the format, MAT: one line a property,
+  // up to ENDMAT.
+  Result<Material> ReadMaterial(std::string_view rest, bool block) {
+    Material material{.name = std::string(NextAc3dString(rest)), .base_color = glm::vec4(1)};
+    while (block) {
+      if (!Next(rest)) return Error("ends before ENDMAT");
+      if (rest.starts_with("ENDMAT")) return material;
+      TILEGRAD_TRY(MaterialValues(rest, material));
+    }
+    TILEGRAD_TRY(MaterialValues(rest, material));
+    return material;
+  }
+  // Whether any of these shines by itself.
+  bool emits() const { return emits_; }
+
+ private:
+  // "rgb 1 1 1  amb ...  trans 0", or a part of it.
+  Status MaterialValues(std::string_view rest, Material& material) {
+    for (auto key = NextToken(rest); !key.empty(); key = NextToken(rest)) {
+      if (key == "rgb") TILEGRAD_TRY(Numbers(rest, &material.base_color[0], 3, "rgb"));
+      if (key == "emis") {
+        glm::vec3 light(0);
+        TILEGRAD_TRY(Numbers(rest, &light[0], 3, "emis"));
+        emits_ = emits_ || light != glm::vec3(0);
+      }
+      if (key != "trans") continue;
+      float transparency = 0;
+      TILEGRAD_TRY(Numbers(rest, &transparency, 1, "trans"));
+      material.base_color.a = 1 - transparency;
+    }
+    return {};
+  }
+
+  const std::string place_;
+  Lines lines_;
+  bool emits_ = false;
+};
 
 // What an object hands to its children.
 struct Inherited {
@@ -48,8 +126,7 @@ class Ac3dReader {
       }
       if (keyword != "MATERIAL" && keyword != "MAT")
         return text_.Error("expected MATERIAL or OBJECT");
-      TILEGRAD_ASSIGN(Material material,
-                      keyword == "MAT" ? text_.ReadMaterialBlock(line) : text_.ReadMaterial(line));
+      TILEGRAD_ASSIGN(Material material, text_.ReadMaterial(line, /*block=*/keyword == "MAT"));
       palette_.push_back(std::move(material));
     }
     if (text_.emits()) out.warnings.emplace_back("the emission of materials is not drawn");

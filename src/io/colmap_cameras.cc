@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// COLMAP's sparse models: cameras.txt and images.txt, or the same as .bin (little-endian).
+// COLMAP's sparse models: cameras.txt and images.txt, or the same as .bin (little-endian); where a
+// project has its models; the text, written.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <map>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/text.h"
 #include "io/camera_file.h"
 #include "io/text_scan.h"
 #include "io/transforms_lens.h"
 
 namespace tilegrad::io {
+
 namespace {
 
 using Bend = LensDistortion::Model;
@@ -54,8 +59,10 @@ struct RawCamera {
   std::array<double, kMaxParams> params = {};
 };
 
-bool IsSize(std::uint64_t width, std::uint64_t height) {
-  constexpr std::uint64_t kMaxSide = 1 << 20;
+// Of integers of any type.
+template <class T>
+bool IsSize(T width, T height) {
+  constexpr T kMaxSide = 1 << 20;
   return width >= 1 && height >= 1 && width <= kMaxSide && height <= kMaxSide;
 }
 
@@ -272,7 +279,75 @@ Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras
   return views;
 }
 
+// Projects ------------------------------------------------------------------------------------
+
+bool IsModel(const Path& folder) {
+  return IsFile(folder / "cameras.txt") || IsFile(folder / "cameras.bin");
+}
+
+// In a folder `sparse`, sorted.
+std::vector<Path> ModelsIn(const Path& sparse) {
+  std::vector<Path> models;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(sparse, error), end; !error && at != end;
+       at.increment(error)) {
+    if (IsModel(at->path())) models.push_back(at->path());
+  }
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
+// 0 where they cannot be read.
+std::size_t CountImages(const Path& model) {
+  const auto views = LoadColmapCameras(model, {.bent = true});
+  return views.ok() ? views->size() : 0;
+}
+
+ColmapModel LargestOf(const std::vector<Path>& models) {
+  std::vector<std::size_t> counts;
+  for (const Path& model : models) counts.push_back(CountImages(model));
+  const auto best =
+      static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
+  std::string others;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (i != best) others += fmt::format(", {} ({})", models[i].filename().string(), counts[i]);
+  }
+  return {models[best],
+          fmt::format("{}: taken for its {}; other models of the project are left out: {}",
+                      models[best].string(), Count(counts[best], "image"), others.substr(2))};
+}
+
+// Written -------------------------------------------------------------------------------------
+
+// What the reader refuses, or would read as another name, is not written.
+Status CheckForColmap(const CameraView& view, const ColmapCamera& camera) {
+  const auto [width, height] = view.size;
+  if (!IsSize(width, height))
+    return InvalidArgument("\"{}\" has an image of {} x {} pixels", view.name, width, height);
+  if (view.name.empty()) return InvalidArgument("a view has no name, which COLMAP's text needs");
+  const bool one_line = view.name.find_first_of(std::string_view("\n\r\0", 3)) == std::string::npos;
+  if (!one_line || view.name.starts_with(' ') || view.name.starts_with('\t')) {
+    return InvalidArgument(
+        "\"{}\" cannot be a name in COLMAP's text: it begins with a space or has "
+        "a line break",
+        view.name);
+  }
+  TILEGRAD_TRY(Validate(view.camera).Within(view.name));  // a quaternion would hide a mirror
+  return FromColmap(camera).status().Within(view.name);
+}
+
 }  // namespace
+
+std::optional<ColmapModel> FindColmapModel(const Path& folder) {
+  for (const Path& root : {folder, folder / "colmap"}) {
+    if (IsModel(root)) return ColmapModel{root, ""};
+    const std::vector<Path> models = ModelsIn(root / "sparse");
+    if (models.size() > 1) return LargestOf(models);
+    if (models.size() == 1) return ColmapModel{models[0], ""};
+    if (IsModel(root / "sparse")) return ColmapModel{root / "sparse", ""};
+  }
+  return std::nullopt;
+}
 
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
                                                   const CameraFileOptions& options) {
@@ -295,6 +370,29 @@ Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
     TILEGRAD_TRY(CheckStraight(view.lens).Within(at.string() + ": " + view.name));
   }
   return views;
+}
+
+std::vector<Path> ColmapFiles(const Path& folder) {
+  return {folder / "cameras.txt", folder / "points3D.txt", folder / "images.txt"};
+}
+
+Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views) {
+  if (views.empty()) return InvalidArgument("{}: no views to write", folder.string());
+  std::string cameras = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
+  std::string images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ColmapCamera c = ToColmap(views[i].camera);
+    TILEGRAD_TRY(CheckForColmap(views[i], c).Within(folder.string()));
+    const auto& [q, t, fx, fy, cx, cy] = c;
+    cameras += fmt::format("{} PINHOLE {} {} {} {} {} {}\n", i + 1, views[i].size.width,
+                           views[i].size.height, fx, fy, cx, cy);
+    images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n\n", i + 1, q[0], q[1], q[2], q[3], t[0],
+                          t[1], t[2], i + 1, views[i].name);
+  }
+  const std::vector<Path> files = ColmapFiles(folder);
+  TILEGRAD_TRY(WriteTextAtomic(files[0], cameras));
+  TILEGRAD_TRY(WriteTextAtomic(files[1], "# none\n"));
+  return WriteTextAtomic(files[2], images);
 }
 
 }  // namespace tilegrad::io

@@ -11,7 +11,6 @@
 #include <unordered_map>
 
 #include "base/error.h"
-#include "io/glb_builder.h"
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
 #include "scene/srgb.h"
@@ -19,7 +18,74 @@
 namespace tilegrad::io {
 namespace {
 
-using Json = GlbBuilder::Json;
+using Json = nlohmann::ordered_json;
+
+// The binary chunk and the JSON that describes it.
+struct GlbBuilder {
+  static constexpr int kFloat = 5126, kUnsignedInt = 5125, kArrayBuffer = 34962,
+                       kElementBuffer = 34963;
+
+  Bytes binary;
+  Json json = {{"asset", {{"version", "2.0"}, {"generator", "tilegrad"}}}};
+
+  int AddView(const void* data, std::size_t bytes, int target) {
+    while (binary.size() % 4 != 0) binary.push_back(0);
+    Json view = {{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", bytes}};
+    if (target != 0) view["target"] = target;
+    const auto* begin = static_cast<const std::uint8_t*>(data);
+    binary.insert(binary.end(), begin, begin + bytes);
+    json["bufferViews"].push_back(std::move(view));
+    return static_cast<int>(json["bufferViews"].size()) - 1;
+  }
+
+  template <class Vec>
+  int AddVectors(const std::vector<Vec>& values) {
+    const int view = AddView(values.data(), values.size() * sizeof(Vec), kArrayBuffer);
+    json["accessors"].push_back({{"bufferView", view},
+                                 {"componentType", kFloat},
+                                 {"count", values.size()},
+                                 {"type", fmt::format("VEC{}", Vec::length())}});
+    return static_cast<int>(json["accessors"].size()) - 1;
+  }
+
+  int AddIndices(const std::vector<std::uint32_t>& values) {
+    const int view = AddView(values.data(), values.size() * sizeof(std::uint32_t), kElementBuffer);
+    json["accessors"].push_back({{"bufferView", view},
+                                 {"componentType", kUnsignedInt},
+                                 {"count", values.size()},
+                                 {"type", "SCALAR"}});
+    return static_cast<int>(json["accessors"].size()) - 1;
+  }
+};
+
+void AppendChunk(Bytes& out, const char type[5], const std::uint8_t* data, std::size_t size,
+                 std::uint8_t padding) {
+  const auto padded = static_cast<std::uint32_t>((size + 3) / 4 * 4);
+  const auto* length = reinterpret_cast<const std::uint8_t*>(&padded);
+  out.insert(out.end(), length, length + 4);
+  out.insert(out.end(), type, type + 4);
+  out.insert(out.end(), data, data + size);
+  out.resize(out.size() + padded - size, padding);
+}
+
+// The file. ResourceExhausted beyond 4 GiB.
+Result<Bytes> AssembleGlb(GlbBuilder& glb) {
+  glb.json["buffers"] = Json::array({{{"byteLength", glb.binary.size()}}});
+  // Names come from files and may not be UTF-8: replace what is not.
+  const std::string text = glb.json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::size_t total =
+      12 + 8 + (text.size() + 3) / 4 * 4 + 8 + (glb.binary.size() + 3) / 4 * 4;
+  if (total > 0xFFFFFFFFu)
+    return ResourceExhausted("a GLB file holds at most 4 GiB, this mesh needs {}", total);
+  Bytes out = {'g', 'l', 'T', 'F', 2, 0, 0, 0};
+  out.reserve(total);
+  const auto total32 = static_cast<std::uint32_t>(total);
+  const auto* length = reinterpret_cast<const std::uint8_t*>(&total32);
+  out.insert(out.end(), length, length + 4);
+  AppendChunk(out, "JSON", reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), ' ');
+  AppendChunk(out, "BIN\0", glb.binary.data(), glb.binary.size(), 0);
+  return out;
+}
 
 // The vertices of one primitive: corners with equal attributes share one.
 struct Primitive {
@@ -203,10 +269,6 @@ Status CheckLinearColors(const Mesh& mesh) {
   }
   return {};
 }
-
-}  // namespace
-
-namespace {
 
 // A node whose z axis points to the sun: lights shine along -z. Illuminance pi of a white surface
 // is what looks white.

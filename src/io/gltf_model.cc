@@ -31,39 +31,38 @@ constexpr std::array<unsigned char, 16 * 8> kZeros = {};  // one element
 
 using Names = std::span<const std::string_view>;
 
-constexpr auto kRead =
-    std::to_array<std::string_view>({"KHR_mesh_quantization", "KHR_texture_transform",
-                                     "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"});
+constexpr std::string_view kRead[] = {"KHR_mesh_quantization", "KHR_texture_transform",
+                                      "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"};
 // Geometry is read where it is there uncompressed, too; else the file is refused where its bytes
 // are asked for.
-constexpr auto kCompressions =
-    std::to_array<std::string_view>({"KHR_draco_mesh_compression", "EXT_meshopt_compression"});
+constexpr std::string_view kCompressions[] = {"KHR_draco_mesh_compression",
+                                              "EXT_meshopt_compression"};
 // Images in other formats. A texture's own image is drawn instead where it has one.
-constexpr auto kImages = std::to_array<std::string_view>(
-    {"EXT_texture_webp", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"});
+constexpr std::string_view kImages[] = {"EXT_texture_webp", "KHR_texture_basisu",
+                                        "EXT_texture_avif", "MSFT_texture_dds"};
 // They do not change what is drawn at rest.
-constexpr auto kUnseen = std::to_array<std::string_view>({"KHR_materials_variants",
-                                                          "KHR_animation_pointer",
-                                                          "KHR_xmp",
-                                                          "KHR_xmp_json_ld",
-                                                          "EXT_mesh_features",
-                                                          "EXT_instance_features",
-                                                          "EXT_feature_metadata",
-                                                          "EXT_structural_metadata",
-                                                          "EXT_mesh_manifold",
-                                                          "EXT_mesh_polygon",
-                                                          "FB_geometry_metadata",
-                                                          "AGI_articulations",
-                                                          "AGI_stk_metadata",
-                                                          "MSFT_lod",
-                                                          "KHR_audio",
-                                                          "KHR_audio_emitter",
-                                                          "MSFT_audio_emitter",
-                                                          "KHR_physics_rigid_bodies",
-                                                          "KHR_implicit_shapes",
-                                                          "KHR_interactivity",
-                                                          "KHR_node_selectability",
-                                                          "KHR_node_hoverability"});
+constexpr std::string_view kUnseen[] = {"KHR_materials_variants",
+                                        "KHR_animation_pointer",
+                                        "KHR_xmp",
+                                        "KHR_xmp_json_ld",
+                                        "EXT_mesh_features",
+                                        "EXT_instance_features",
+                                        "EXT_feature_metadata",
+                                        "EXT_structural_metadata",
+                                        "EXT_mesh_manifold",
+                                        "EXT_mesh_polygon",
+                                        "FB_geometry_metadata",
+                                        "AGI_articulations",
+                                        "AGI_stk_metadata",
+                                        "MSFT_lod",
+                                        "KHR_audio",
+                                        "KHR_audio_emitter",
+                                        "MSFT_audio_emitter",
+                                        "KHR_physics_rigid_bodies",
+                                        "KHR_implicit_shapes",
+                                        "KHR_interactivity",
+                                        "KHR_node_selectability",
+                                        "KHR_node_hoverability"};
 
 bool IsIn(Names names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();

@@ -11,13 +11,6 @@ namespace tilegrad::io {
 
 namespace {
 
-template <class T>
-double Load(const std::uint8_t* at) {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  return static_cast<double>(value);
-}
-
 const char* KindName(MatKind kind) {
   switch (kind) {
     case MatKind::kText:
@@ -33,30 +26,20 @@ const char* KindName(MatKind kind) {
 
 }  // namespace
 
-std::size_t SizeOfType(MatType type) {
-  switch (type) {
-    case MatType::kInt8:
-    case MatType::kUint8:
-      return 1;
-    case MatType::kInt16:
-    case MatType::kUint16:
-      return 2;
-    case MatType::kInt32:
-    case MatType::kUint32:
-    case MatType::kSingle:
-      return 4;
-    case MatType::kDouble:
-    case MatType::kInt64:
-    case MatType::kUint64:
-      return 8;
-    default:
-      return 0;
-  }
+std::optional<StoredType> NumberTypeOf(MatType type) {
+  static constexpr std::pair<MatType, StoredType> kTypes[] = {
+      {MatType::kInt8, StoredType::kI8},    {MatType::kUint8, StoredType::kU8},
+      {MatType::kInt16, StoredType::kI16},  {MatType::kUint16, StoredType::kU16},
+      {MatType::kInt32, StoredType::kI32},  {MatType::kUint32, StoredType::kU32},
+      {MatType::kInt64, StoredType::kI64},  {MatType::kUint64, StoredType::kU64},
+      {MatType::kSingle, StoredType::kF32}, {MatType::kDouble, StoredType::kF64}};
+  const auto* row = std::ranges::find(kTypes, type, &std::pair<MatType, StoredType>::first);
+  return row == std::end(kTypes) ? std::nullopt : std::optional(row->second);
 }
 
-MatNumbers::MatNumbers(MatType type, std::vector<std::uint8_t> stored)
-    : type_(type), count_(stored.size() / SizeOfType(type)), stored_(std::move(stored)) {
-  bits_ = SizeOfType(type) == 1 && count_ > 0 &&
+MatNumbers::MatNumbers(StoredType type, std::vector<std::uint8_t> stored)
+    : type_(type), count_(stored.size() / RowOf(type).size), stored_(std::move(stored)) {
+  bits_ = RowOf(type).size == 1 && count_ > 0 &&
           std::ranges::all_of(stored_, [](std::uint8_t b) { return b <= 1; });
   if (!bits_) return;
   std::vector<std::uint8_t> packed((count_ + 7) / 8);
@@ -72,29 +55,8 @@ MatNumbers::MatNumbers(std::span<const double> numbers)
 
 double MatNumbers::operator[](std::size_t i) const {
   if (bits_) return (stored_[i / 8] >> (i % 8)) & 1;
-  const std::uint8_t* const at = stored_.data() + i * SizeOfType(type_);
-  switch (type_) {
-    case MatType::kInt8:
-      return Load<std::int8_t>(at);
-    case MatType::kUint8:
-      return Load<std::uint8_t>(at);
-    case MatType::kInt16:
-      return Load<std::int16_t>(at);
-    case MatType::kUint16:
-      return Load<std::uint16_t>(at);
-    case MatType::kInt32:
-      return Load<std::int32_t>(at);
-    case MatType::kUint32:
-      return Load<std::uint32_t>(at);
-    case MatType::kSingle:
-      return Load<float>(at);
-    case MatType::kInt64:
-      return Load<std::int64_t>(at);
-    case MatType::kUint64:
-      return Load<std::uint64_t>(at);
-    default:
-      return Load<double>(at);
-  }
+  const StoredTypeRow& row = RowOf(type_);
+  return row.load(stored_.data() + i * row.size);
 }
 
 std::size_t MatArray::places() const {
@@ -114,7 +76,7 @@ MatArray MatArray::Mask(std::size_t rows, std::size_t columns, std::vector<std::
   MatArray out;
   out.logical = true;
   out.dims = {rows, columns};
-  out.numbers = MatNumbers(MatType::kUint8, std::move(values));
+  out.numbers = MatNumbers(StoredType::kU8, std::move(values));
   return out;
 }
 

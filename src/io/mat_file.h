@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,11 +18,11 @@
 #include <vector>
 
 #include "base/file.h"
+#include "io/stored_number.h"
 
 namespace tilegrad::io {
 
-// How numbers are stored ("mi" types of the format). Arrays of doubles are often stored as small
-// integers.
+// The "mi" types of the format.
 enum class MatType : std::uint32_t {
   kInt8 = 1,
   kUint8 = 2,
@@ -39,19 +40,20 @@ enum class MatType : std::uint32_t {
   kUtf16 = 17,
   kUtf32 = 18
 };
-std::size_t SizeOfType(MatType type);  // bytes of one number; 0 of what is no number
+// Nothing for what is no number. Arrays of doubles are often stored as small integers.
+std::optional<StoredType> NumberTypeOf(MatType type);
 
 // Numbers as they are stored. Bytes that are all 0 or 1, as masks are, take a bit each.
 class MatNumbers {
  public:
   MatNumbers() = default;
-  MatNumbers(MatType type, std::vector<std::uint8_t> stored);  // whole numbers of that type
+  MatNumbers(StoredType type, std::vector<std::uint8_t> stored);  // whole numbers of that type
   explicit MatNumbers(std::span<const double> numbers);
   std::size_t size() const { return count_; }
   double operator[](std::size_t i) const;
 
  private:
-  MatType type_ = MatType::kDouble;
+  StoredType type_ = StoredType::kF64;
   bool bits_ = false;
   std::size_t count_ = 0;
   std::vector<std::uint8_t> stored_;

@@ -209,13 +209,13 @@ class Parser {
   Status Numbers(MatArray* out) {
     Tag tag;
     TILEGRAD_TRY(ReadTag(&tag));
-    const std::size_t each = SizeOfType(tag.type);
-    if (each == 0 || tag.size != each * out->places())
+    const auto type = NumberTypeOf(tag.type);
+    if (!type || tag.size != RowOf(*type).size * out->places())
       return Damaged("{} numbers, stored as {} bytes of type {}", out->places(), tag.size,
                      static_cast<std::uint32_t>(tag.type));
     std::vector<std::uint8_t> bytes;
     TILEGRAD_TRY(Data(tag, &bytes));
-    out->numbers = MatNumbers(tag.type, std::move(bytes));
+    out->numbers = MatNumbers(*type, std::move(bytes));
     return {};
   }
 
@@ -229,8 +229,11 @@ class Parser {
       out->text.assign(bytes.begin(), bytes.end());
       return {};
     }
-    const bool two = tag.type == MatType::kUtf16 || tag.type == MatType::kUint16;
-    const std::size_t each = two ? 2 : tag.type == MatType::kUtf32 ? 4 : SizeOfType(tag.type);
+    const auto number = NumberTypeOf(tag.type);
+    const std::size_t each = tag.type == MatType::kUtf16   ? 2
+                             : tag.type == MatType::kUtf32 ? 4
+                             : number                      ? RowOf(*number).size
+                                                           : 0;
     if (each == 0 || each > 4 || bytes.size() % each != 0)
       return Damaged("text of type {}", static_cast<std::uint32_t>(tag.type));
     for (std::size_t i = 0; i < bytes.size(); i += each) {

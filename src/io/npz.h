@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -20,26 +21,12 @@ std::size_t NpyTypeSize(NpyType type);  // bytes
 const char* NpyTypeName(NpyType type);  // "float32", ...
 
 template <class T>
-constexpr NpyType NpyTypeOf();
-template <>
-constexpr NpyType NpyTypeOf<std::uint8_t>() {
-  return NpyType::kU8;
-}
-template <>
-constexpr NpyType NpyTypeOf<std::int32_t>() {
-  return NpyType::kI32;
-}
-template <>
-constexpr NpyType NpyTypeOf<std::int64_t>() {
-  return NpyType::kI64;
-}
-template <>
-constexpr NpyType NpyTypeOf<float>() {
-  return NpyType::kF32;
-}
-template <>
-constexpr NpyType NpyTypeOf<double>() {
-  return NpyType::kF64;
+constexpr NpyType NpyTypeOf() {
+  if constexpr (std::is_same_v<T, std::uint8_t>) return NpyType::kU8;
+  if constexpr (std::is_same_v<T, std::int32_t>) return NpyType::kI32;
+  if constexpr (std::is_same_v<T, std::int64_t>) return NpyType::kI64;
+  if constexpr (std::is_same_v<T, float>) return NpyType::kF32;
+  if constexpr (std::is_same_v<T, double>) return NpyType::kF64;
 }
 
 // A dense array in C order.

@@ -16,19 +16,18 @@ constexpr std::size_t kMaxProperties = 256;
 
 struct TypeName {
   std::string_view name, sized_name;
-  PlyType type;
-  std::size_t size;
+  StoredType type;
 };
-constexpr std::array<TypeName, 8> kPlyTypes = {{{"char", "int8", PlyType::kI8, 1},
-                                                {"uchar", "uint8", PlyType::kU8, 1},
-                                                {"short", "int16", PlyType::kI16, 2},
-                                                {"ushort", "uint16", PlyType::kU16, 2},
-                                                {"int", "int32", PlyType::kI32, 4},
-                                                {"uint", "uint32", PlyType::kU32, 4},
-                                                {"float", "float32", PlyType::kF32, 4},
-                                                {"double", "float64", PlyType::kF64, 8}}};
+constexpr std::array<TypeName, 8> kPlyTypes = {{{"char", "int8", StoredType::kI8},
+                                                {"uchar", "uint8", StoredType::kU8},
+                                                {"short", "int16", StoredType::kI16},
+                                                {"ushort", "uint16", StoredType::kU16},
+                                                {"int", "int32", StoredType::kI32},
+                                                {"uint", "uint32", StoredType::kU32},
+                                                {"float", "float32", StoredType::kF32},
+                                                {"double", "float64", StoredType::kF64}}};
 
-bool ParseType(std::string_view token, PlyType& type) {
+bool ParseType(std::string_view token, StoredType& type) {
   for (const TypeName& row : kPlyTypes) {
     if (token != row.name && token != row.sized_name) continue;
     type = row.type;
@@ -60,9 +59,9 @@ bool ParseProperty(std::string_view rest, PlyHeader& header) {
   PlyProperty property;
   auto token = NextToken(rest);
   if (token == "list") {
-    PlyType count_type;
+    StoredType count_type;
     if (!ParseType(NextToken(rest), count_type)) return false;
-    if (count_type == PlyType::kF32 || count_type == PlyType::kF64) return false;
+    if (count_type == StoredType::kF32 || count_type == StoredType::kF64) return false;
     property.count_type = count_type;
     token = NextToken(rest);
   }
@@ -91,7 +90,7 @@ bool ParseLine(std::string_view line, PlyHeader& header) {
 std::size_t LeastRowSize(const PlyElement& element, PlyHeader::Encoding encoding) {
   std::size_t size = 0;
   for (const PlyProperty& p : element.properties) {
-    size += encoding == PlyHeader::Encoding::kText ? 2 : PlyTypeSize(p.count_type.value_or(p.type));
+    size += encoding == PlyHeader::Encoding::kText ? 2 : RowOf(p.count_type.value_or(p.type)).size;
   }
   return size;
 }
@@ -111,8 +110,6 @@ Status CheckCounts(const PlyHeader& header, const std::string& place) {
 }
 
 }  // namespace
-
-std::size_t PlyTypeSize(PlyType type) { return kPlyTypes[static_cast<std::size_t>(type)].size; }
 
 std::size_t PlyHeader::CountOf(std::string_view element) const {
   for (const PlyElement& e : elements) {

@@ -7,17 +7,15 @@
 #include <string_view>
 #include <vector>
 
+#include "io/stored_number.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::io {
 
-enum class PlyType { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
-std::size_t PlyTypeSize(PlyType type);
-
 struct PlyProperty {
   std::string name;
-  PlyType type;
-  std::optional<PlyType> count_type;  // set for a list, which begins with its length
+  StoredType type;
+  std::optional<StoredType> count_type;  // set for a list, which begins with its length
 };
 
 struct PlyElement {

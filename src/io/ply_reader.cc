@@ -4,23 +4,145 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_file.h"
 #include "io/mesh_readers.h"
-#include "io/ply_columns.h"
 #include "io/ply_header.h"
-#include "io/ply_values.h"
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
+
+bool IsPlyIndices(const PlyProperty& property) {
+  return property.name == "vertex_indices" || property.name == "vertex_index";
+}
+
+// A place, a normal, a colour or a uv without all of its numbers is none.
+struct PlyColumns {
+  // Of faces (to kAlpha) and of vertices (from kRed).
+  enum Slot { kTexNumber, kRed, kGreen, kBlue, kAlpha, kX, kY, kZ, kNx, kNy, kNz, kU, kV, kSlots };
+  struct Column {
+    Slot slot = kSlots;  // of a number that is read
+    bool list = false;   // that is read
+    double scale = 1;
+  };
+
+  // Numbers from `first` up to `end` are read.
+  PlyColumns(const PlyElement& element, Slot first, Slot end) {
+    for (const PlyProperty& p : element.properties) {
+      of.push_back(ColumnOf(p));
+      const Slot slot = of.back().slot;
+      if (slot >= first && slot < end) has[slot] = true;
+    }
+    NeedAll({kX, kY, kZ});
+    NeedAll({kNx, kNy, kNz});
+    NeedAll({kRed, kGreen, kBlue});
+    NeedAll({kU, kV});
+    has[kAlpha] = has[kAlpha] && has[kRed];
+    for (Column& column : of) {
+      if (column.slot != kSlots && !has[column.slot]) column.slot = kSlots;
+    }
+  }
+
+  std::vector<Column> of;  // each property
+  std::array<bool, kSlots> has{};
+
+ private:
+  static Column ColumnOf(const PlyProperty& p) {
+    // As exporters name them.
+    static constexpr std::array<std::pair<std::string_view, Slot>, 27> kNames = {
+        {{"x", kX},          {"y", kY},          {"z", kZ},
+         {"nx", kNx},        {"ny", kNy},        {"nz", kNz},
+         {"red", kRed},      {"green", kGreen},  {"blue", kBlue},
+         {"r", kRed},        {"g", kGreen},      {"b", kBlue},
+         {"alpha", kAlpha},  {"a", kAlpha},      {"diffuse_red", kRed},
+         {"u", kU},          {"v", kV},          {"diffuse_green", kGreen},
+         {"s", kU},          {"t", kV},          {"diffuse_blue", kBlue},
+         {"texture_u", kU},  {"texture_v", kV},  {"diffuse_alpha", kAlpha},
+         {"texcoord_u", kU}, {"texcoord_v", kV}, {"texnumber", kTexNumber}}};
+    if (p.count_type) return {.list = IsPlyIndices(p) || p.name == "texcoord"};
+    const auto* row = std::ranges::find(kNames, p.name, &std::pair<std::string_view, Slot>::first);
+    if (row == kNames.end()) return {};
+    // Integer colours count from 0 to the type's largest value.
+    const bool color = row->second >= kRed && row->second <= kAlpha;
+    const double scale = p.type == StoredType::kU8 ? 255 : p.type == StoredType::kU16 ? 65535 : 1;
+    return {.slot = row->second, .scale = color ? scale : 1};
+  }
+
+  void NeedAll(std::initializer_list<Slot> slots) {
+    const bool all = std::all_of(slots.begin(), slots.end(), [&](Slot s) { return has[s]; });
+    for (const Slot slot : slots) has[slot] = all;
+  }
+};
+
+// The numbers of the body, one after the other, however they are written.
+class PlyValues {
+ public:
+  PlyValues(std::string_view data, PlyHeader::Encoding encoding)
+      : rest_(data),
+        text_(encoding == PlyHeader::Encoding::kText),
+        swap_(encoding == PlyHeader::Encoding::kBigEndian) {}
+
+  // False if the data ends or is no number; it need not be a finite one.
+  bool Next(StoredType type, double& value) {
+    if (text_) return ParseAnyNumber(NextToken(rest_), value);
+    const std::size_t size = RowOf(type).size;
+    if (rest_.size() < size) return false;
+    std::array<char, 8> bytes;
+    std::copy_n(rest_.begin(), size, bytes.begin());
+    if (swap_) std::reverse(bytes.begin(), bytes.begin() + size);
+    value = RowOf(type).load(bytes.data());
+    rest_.remove_prefix(size);
+    return true;
+  }
+
+  // A list of finite numbers. Its length is held against what is left before memory is taken.
+  bool NextList(const PlyProperty& property, std::vector<double>& list) {
+    std::size_t length = 0;
+    if (!NextLength(property, length)) return false;
+    list.resize(length);
+    return std::ranges::all_of(
+        list, [&](double& value) { return Next(property.type, value) && std::isfinite(value); });
+  }
+
+  // Passes over a number or a list, whatever it holds. False if the data ends.
+  bool Skip(const PlyProperty& property) {
+    std::size_t count = 1;
+    if (property.count_type && !NextLength(property, count)) return false;
+    if (text_) {
+      while (count > 0 && !NextToken(rest_).empty()) --count;
+      return count == 0;
+    }
+    const std::size_t bytes = count * RowOf(property.type).size;
+    if (rest_.size() < bytes) return false;
+    rest_.remove_prefix(bytes);
+    return true;
+  }
+
+ private:
+  // The length of a list, which the data that is left can hold.
+  bool NextLength(const PlyProperty& property, std::size_t& length) {
+    double value = 0;
+    if (!Next(*property.count_type, value)) return false;
+    const std::size_t least = text_ ? 1 : RowOf(property.type).size;
+    if (!(value >= 0 && value <= static_cast<double>(rest_.size() / least))) return false;
+    length = static_cast<std::size_t>(value);
+    return true;
+  }
+
+  std::string_view rest_;
+  bool text_, swap_;
+};
 
 struct PlyFace {
   std::size_t first = 0, count = 0;  // among the corners of all faces
