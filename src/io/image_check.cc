@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <ranges>
 #include <string_view>
 
 #include "base/error.h"
@@ -18,25 +19,25 @@ using ByteSpan = std::span<const std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 8> kPngSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
-std::uint32_t BigEndian32(const std::uint8_t* p) {
-  return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
-}
-
 // A chunk is length, type, data, CRC-32 of type and data (PNG, section 5.3).
 Status CheckPng(ByteSpan bytes, const std::string& name) {
   constexpr std::size_t kFrame = 12;
   std::size_t at = kPngSignature.size();
   while (bytes.size() - at >= kFrame) {
-    const std::size_t length = BigEndian32(&bytes[at]);
+    const std::size_t length = BigEndian(bytes.subspan(at, 4));
     const std::string_view type(reinterpret_cast<const char*>(&bytes[at + 4]), 4);
     if (length > bytes.size() - at - kFrame) {
       return DataLoss("{}: truncated or corrupt PNG: the chunk at byte {} claims {} bytes", name,
                       at, length);
     }
     const auto crc = crc32_z(0, &bytes[at + 4], length + 4);
-    if (crc != BigEndian32(&bytes[at + 8 + length]))
+    if (crc != BigEndian(bytes.subspan(at + 8 + length, 4)))
       return DataLoss("{}: corrupt PNG: the checksum of the chunk at byte {} is wrong", name, at);
     if (type == "IEND") return {};
+    if (type == "IHDR" && length >= 8) {
+      const auto header = bytes.subspan(at + 8, 8);
+      TILEGRAD_TRY(CheckImageSize(BigEndian(header.first(4)), BigEndian(header.last(4)), name));
+    }
     if (type == "CgBI") {  // blue before red, colours multiplied by alpha: stb_image leaves both so
       return DataLoss("{}: an Xcode PNG (CgBI), which is not read; save it as a standard PNG",
                       name);
@@ -128,7 +129,82 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated JPEG: it ends without an end marker", name);
 }
 
+// BMP and TGA: positions are where stb_image 2.27 reads them.
+
+// A TGA's header, and that of a BMP up to its bits a pixel.
+constexpr std::size_t kTgaHeader = 18, kBmpHeader = 30;
+
+Status Truncated(const std::string& name, const char* format, std::size_t need, std::size_t have) {
+  return DataLoss("{}: truncated {}: its pixels end at byte {} of {}", name, format, need, have);
+}
+
+// How many colours stb_image reads of a BMP's palette. Headers of 12 bytes have 3 bytes a colour,
+// of which it leaves some out.
+std::size_t ColorsOfBmp(std::size_t offset, std::size_t header) {
+  const std::size_t before = header == 12 ? 14 + 24 : 14 + header;
+  return offset < before ? 0 : (offset - before) / (header == 12 ? 3 : 4);
+}
+
+Status CheckBmp(ByteSpan bytes, std::size_t width, std::size_t height, const std::string& name) {
+  if (bytes.size() < kBmpHeader) return Truncated(name, "BMP", kBmpHeader, bytes.size());
+  const std::size_t offset = LittleEndian(bytes.subspan(10, 4)),
+                    header = LittleEndian(bytes.subspan(14, 4)),
+                    bits = LittleEndian(bytes.subspan(header == 12 ? 24 : 28, 2));
+  const std::size_t used = (width * bits + 7) / 8, row = (used + 3) / 4 * 4;
+  const std::size_t end = offset + (height - 1) * row + used;
+  if (end > bytes.size()) return Truncated(name, "BMP", end, bytes.size());
+  const std::size_t colors = ColorsOfBmp(offset, header);
+  // stb_image takes no other numbers of bits with a palette.
+  if ((bits != 1 && bits != 4 && bits != 8) || colors >= std::size_t{1} << bits) return {};
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t bit = x * bits;
+      const int byte = bytes[offset + y * row + bit / 8];
+      const int index = byte >> (8 - bits - bit % 8) & ((1 << bits) - 1);
+      if (static_cast<std::size_t>(index) >= colors)
+        return DataLoss("{}: corrupt BMP: colour {} of a palette of {}", name, index, colors);
+    }
+  }
+  return {};
+}
+
+// Packets of a head and 1 or as many pixels as it says; they may cross rows.
+std::size_t EndOfPackets(ByteSpan bytes, std::size_t at, std::size_t pixels,
+                         std::size_t pixel_bytes) {
+  while (pixels > 0 && at < bytes.size()) {
+    const std::size_t count = (bytes[at] & 127) + std::size_t{1};
+    at += 1 + pixel_bytes * (bytes[at] >= 128 ? 1 : std::min(count, pixels));
+    pixels -= std::min(count, pixels);
+  }
+  return pixels > 0 ? at + 1 : at;
+}
+
+Status CheckTga(ByteSpan bytes, std::size_t pixels, const std::string& name) {
+  if (bytes.size() < kTgaHeader) return Truncated(name, "TGA", kTgaHeader, bytes.size());
+  const bool palette = bytes[1] != 0, packed = bytes[2] >= 8;
+  const std::size_t bits = bytes[16], bytes_of_color = (bytes[7] + std::size_t{7}) / 8;
+  std::size_t at = kTgaHeader + bytes[0];
+  if (palette)
+    at += LittleEndian(bytes.subspan(3, 2)) + LittleEndian(bytes.subspan(5, 2)) * bytes_of_color;
+  const std::size_t pixel_bytes = palette ? (bits == 8 ? 1 : 2) : (bits + 7) / 8;
+  const std::size_t end =
+      packed ? EndOfPackets(bytes, at, pixels, pixel_bytes) : at + pixels * pixel_bytes;
+  return end > bytes.size() ? Truncated(name, "TGA", end, bytes.size()) : Status();
+}
+
 }  // namespace
+
+std::uint32_t BigEndian(ByteSpan bytes) {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
+  return value;
+}
+
+std::uint32_t LittleEndian(ByteSpan bytes) {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : std::views::reverse(bytes)) value = value << 8 | byte;
+  return value;
+}
 
 bool IsPng(ByteSpan bytes) {
   return bytes.size() >= kPngSignature.size() &&
@@ -156,7 +232,7 @@ std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
   constexpr std::size_t kFrame = 12, kFull = 3 * 256;
   if (!IsPng(bytes)) return std::nullopt;
   for (std::size_t at = kPngSignature.size();;) {  // CheckPng has seen an end
-    const std::size_t length = BigEndian32(&bytes[at]);
+    const std::size_t length = BigEndian(bytes.subspan(at, 4));
     const std::string_view type(reinterpret_cast<const char*>(&bytes[at + 4]), 4);
     if (type == "IEND" || (type == "PLTE" && length >= kFull)) return std::nullopt;
     if (type == "PLTE") {
@@ -168,6 +244,44 @@ std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
     }
     at += kFrame + length;
   }
+}
+
+Status CheckRawPixels(ByteSpan bytes, int width, int height, const std::string& name) {
+  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  if (IsPng(bytes) || IsJpeg(bytes)) return {};
+  if (bytes.size() > 1 && bytes[0] == 'B' && bytes[1] == 'M') return CheckBmp(bytes, w, h, name);
+  return CheckTga(bytes, w * h, name);
+}
+
+std::string_view UnreadImageFormat(ByteSpan bytes) {
+  struct Format {
+    std::string_view name, begins;
+    std::size_t at = 0;
+  };
+  using namespace std::string_view_literals;
+  constexpr std::array<Format, 17> kFormats = {{{"WebP (.webp)", "WEBP", 8},
+                                                {"AVIF", "ftypavif", 4},
+                                                {"HEIC", "ftyphei", 4},
+                                                {"HEIC", "ftypmif", 4},
+                                                {"GIF", "GIF8"},
+                                                {"TIFF", "II*\0"sv},
+                                                {"TIFF", "MM\0*"sv},
+                                                {"DDS", "DDS "},
+                                                {"KTX", "\xABKTX "},
+                                                {"Radiance HDR", "#?R"},
+                                                {"Photoshop", "8BPS"},
+                                                {"JPEG 2000", "jP  ", 4},
+                                                {"JPEG XL", "JXL ", 4},
+                                                {"text or bitmap PNM", "P1"},
+                                                {"text or bitmap PNM", "P2"},
+                                                {"text or bitmap PNM", "P3"},
+                                                {"text or bitmap PNM", "P4"}}};
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (const Format& format : kFormats) {
+    if (text.size() > format.at && text.substr(format.at).starts_with(format.begins))
+      return format.name;
+  }
+  return text.starts_with("<svg") || text.starts_with("<?xml") ? "SVG" : "";
 }
 
 }  // namespace tilegrad::io

@@ -8,11 +8,16 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "base/file.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::io {
+
+// The number of at most four bytes: the first of them the highest, or the lowest.
+std::uint32_t BigEndian(std::span<const std::uint8_t> bytes);
+std::uint32_t LittleEndian(std::span<const std::uint8_t> bytes);
 
 bool IsPng(std::span<const std::uint8_t> bytes);
 // Like stb_image after any number of filler bytes.
@@ -21,7 +26,8 @@ bool IsJpeg(std::span<const std::uint8_t> bytes);
 // OK for anything that is neither PNG nor JPEG. PNG: every chunk lies in the file, its checksum is
 // right, and the end chunk is there. JPEG: every segment lies in the file, and the end marker is
 // there, and Huffman tables have a size that stb_image can take, and there are at most 100 scans.
-// Errors name `name` and the byte.
+// Errors name `name` and the byte, or the sides where those of a PNG are not within
+// [1, kMaxImageSide].
 Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
 
 // Both sides within [1, kMaxImageSide].
@@ -36,5 +42,9 @@ std::optional<Bytes> WithFullPalette(std::span<const std::uint8_t> bytes);
 // in the file, and their colours in the palette. Expects a header that stb_image takes.
 Status CheckRawPixels(std::span<const std::uint8_t> bytes, int width, int height,
                       const std::string& name);
+
+// "GIF" and the like, by its first bytes: a format that is not read, whatever the file is called.
+// Empty for others.
+std::string_view UnreadImageFormat(std::span<const std::uint8_t> bytes);
 
 }  // namespace tilegrad::io

@@ -13,10 +13,8 @@
 #include "base/shortage.h"
 #include "io/guarded_process.h"
 #include "io/image_check.h"
-#include "io/image_header.h"
 #include "io/orientation.h"
-#include "io/pnm_reader.h"
-#include "io/sgi_reader.h"
+#include "io/plain_images.h"
 #include "io/webp_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -27,7 +25,6 @@
 #define STBI_NO_PIC
 #define STBI_NO_PNM
 #define STBI_NO_PSD
-#define STBI_MAX_DIMENSIONS 16384
 // Cleared: what a broken file leaves out is black, not what was in memory before.
 #define STBI_MALLOC(size) std::calloc(1, size)
 #define STBI_REALLOC(block, size) std::realloc(block, size)
@@ -55,8 +52,6 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   const auto length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
-    const auto size = ImageHeaderSize(bytes);
-    if (size) TILEGRAD_TRY(CheckImageSize(size->width, size->height, name));
     if (const std::string_view format = UnreadImageFormat(bytes); !format.empty()) {
       return DataLoss("{}: an image in {}, which is not read; save it as PNG or JPEG", name,
                       format);

@@ -18,13 +18,6 @@ ByteSpan Part(ByteSpan bytes, std::size_t at, std::size_t count) {
   return at <= bytes.size() && count <= bytes.size() - at ? bytes.subspan(at, count) : ByteSpan();
 }
 
-std::uint32_t Number(ByteSpan bytes, bool big_endian) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < bytes.size(); ++i)
-    value = value << 8 | bytes[big_endian ? i : bytes.size() - 1 - i];
-  return value;
-}
-
 bool Is(ByteSpan bytes, std::string_view text) {
   return bytes.size() == text.size() && std::equal(bytes.begin(), bytes.end(), text.begin(),
                                                    [](int a, char c) { return a == (c & 0xff); });
@@ -37,7 +30,8 @@ int OrientationOfTiff(ByteSpan tiff) {
   const bool big = Is(Part(tiff, 0, 4), std::string_view("MM\0\x2a", 4));
   if (!big && !Is(Part(tiff, 0, 4), std::string_view("II\x2a\0", 4))) return 1;
   const auto at = [&](std::size_t offset, std::size_t size) {
-    return Number(Part(tiff, offset, size), big);
+    const ByteSpan number = Part(tiff, offset, size);
+    return big ? BigEndian(number) : LittleEndian(number);
   };
   const std::size_t folder = at(4, 4), count = at(folder, 2);
   for (std::size_t i = 0; i < count; ++i) {
@@ -62,7 +56,7 @@ int OrientationOfJpeg(ByteSpan bytes) {
       ++at;
       continue;
     }
-    const std::size_t length = Number(bytes.subspan(at + 2, 2), true);
+    const std::size_t length = BigEndian(bytes.subspan(at + 2, 2));
     if (marker == kStartOfScan || length < 2) return 1;
     const ByteSpan content = Part(bytes, at + 4, length - 2);
     if (marker == kApp1 && Is(Part(content, 0, kExif.size()), kExif))
@@ -75,7 +69,7 @@ int OrientationOfJpeg(ByteSpan bytes) {
 int OrientationOfPng(ByteSpan bytes) {
   constexpr std::size_t kSignature = 8, kFrame = 12;
   for (std::size_t at = kSignature; at + kFrame <= bytes.size();) {
-    const std::size_t length = Number(bytes.subspan(at, 4), true);
+    const std::size_t length = BigEndian(bytes.subspan(at, 4));
     const ByteSpan type = bytes.subspan(at + 4, 4);
     if (Is(type, "eXIf")) return OrientationOfTiff(Part(bytes, at + 8, length));
     if (Is(type, "IEND")) return 1;
@@ -90,7 +84,7 @@ int OrientationOfWebp(ByteSpan bytes) {
   constexpr std::size_t kHeader = 12, kFrame = 8;
   constexpr std::string_view kExif("Exif\0\0", 6);
   for (std::size_t at = kHeader; at + kFrame <= bytes.size();) {
-    const std::size_t length = Number(bytes.subspan(at + 4, 4), false);
+    const std::size_t length = LittleEndian(bytes.subspan(at + 4, 4));
     ByteSpan content = Part(bytes, at + kFrame, length);
     if (Is(bytes.subspan(at, 4), "EXIF")) {
       if (Is(Part(content, 0, kExif.size()), kExif)) content = content.subspan(kExif.size());

@@ -45,9 +45,9 @@ MUTANTS = [
            "hn::Mul(rest2, hn::Mul(g, g))", "hn::Mul(rest2, g)", ["nn_adam"]),
     # Readers.
     Mutant("a PNG's checksums are not looked at", "src/io/image_check.cc",
-           "if (crc != BigEndian32(", "if (false && crc != BigEndian32(", ["io_formats"]),
-    Mutant("PNM rounds down", "src/io/pnm_reader.cc", "* 255 + most / 2) / most", "* 255) / most", ["io_formats"]),
-    Mutant("SGI images stand on their heads", "src/io/sgi_reader.cc",
+           "if (crc != BigEndian(", "if (false && crc != BigEndian(", ["io_formats"]),
+    Mutant("PNM rounds down", "src/io/plain_images.cc", "* 255 + most / 2) / most", "* 255) / most", ["io_formats"]),
+    Mutant("SGI images stand on their heads", "src/io/plain_images.cc",
            "const std::size_t y = height - 1 - row % height", "const std::size_t y = row % height", ["io_sgi"]),
     Mutant("indices of an OBJ count from 1 backwards, too", "src/io/obj_statements.cc",
            ": Count(kind) + index;", ": Count(kind) + index - (index < -1);", ["io_obj"]),
