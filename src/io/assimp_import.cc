@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/assimp_import.h"
-
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
@@ -15,6 +13,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "io/imported_scene.h"
 
 namespace tilegrad::io {
 namespace {

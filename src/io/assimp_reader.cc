@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "io/archive.h"
-#include "io/assimp_import.h"
 #include "io/fbx_wrapping.h"
 #include "io/image_file.h"
+#include "io/imported_scene.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"

@@ -32,6 +32,9 @@ struct CameraView {
   LensDistortion lens = {};  // straight unless the options ask for others
 };
 
+// An error, unless it is straight, that says what to do.
+Status CheckStraight(const LensDistortion& lens);
+
 struct CameraFileOptions {
   ImageSize size = {};  // where the file does not say; 0 x 0: then it must
   PixelCentre opencv_centre = PixelCentre::kInteger;  // of K in OpenCV's JSON

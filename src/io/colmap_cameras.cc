@@ -14,7 +14,6 @@
 #include "base/text.h"
 #include "io/camera_file.h"
 #include "io/text_scan.h"
-#include "io/transforms_lens.h"
 
 namespace tilegrad::io {
 

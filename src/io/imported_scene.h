@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "io/guarded_process.h"
 
 namespace tilegrad::io {
 
@@ -53,12 +54,20 @@ struct ImportedScene {
   std::vector<std::string> warnings;
 };
 
+// Questions that an importer has about other files (MTL, ...): one of these and the name.
+inline constexpr char kAskExists = 'E', kAskContent = 'C';
+
+// The only place where Assimp runs (assimp_import.cc). Its importers crash, hang and take memory
+// without end on damaged files, so this is called in a process of its own. It never frees what it
+// made: the process ends next.
+Result<ImportedScene> ImportByAssimp(const std::string& name, const Bytes& file, AskParent ask);
+
 // A scene, or why there is none, as bytes of one version of this program.
 Bytes EncodeScene(const Result<ImportedScene>& scene);
 
-// Decodes untrusted bytes: every count is checked against what is left
-// before anything is allocated, every index against what it points into. Whether numbers are finite
-// is left to Validate (scene/mesh.h). Errors: that of the encoded Result, or kDataLoss.
+// Decodes untrusted bytes: every count is checked against what is left before anything is
+// allocated, every index against what it points into. Whether numbers are finite is left to
+// Validate (scene/mesh.h). Errors: that of the encoded Result, or kDataLoss.
 Result<ImportedScene> DecodeScene(std::span<const std::uint8_t> bytes);
 
 }  // namespace tilegrad::io

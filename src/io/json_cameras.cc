@@ -12,7 +12,6 @@
 #include "io/camera_file.h"
 #include "io/json_frame.h"
 #include "io/nerf_frames.h"
-#include "io/transforms_lens.h"
 
 namespace tilegrad::io {
 namespace {

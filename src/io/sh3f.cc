@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "io/text_scan.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::io {
@@ -76,28 +77,11 @@ std::string Get(const Properties& properties, const std::string& key) {
   return it == properties.end() ? "" : it->second;
 }
 
-// White-space separated numbers; what is none ends the list.
-std::vector<float> Numbers(const std::string& text) {
+// Numbers with white space between; what is none ends the list.
+std::vector<float> Numbers(std::string_view text) {
   std::vector<float> out;
-  const char* at = text.data();
-  const char* end = at + text.size();
-  while (at < end) {
-    if (*at == ' ') {
-      ++at;
-      continue;
-    }
-    float value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc()) break;
-    out.push_back(value);
-    at = next;
-  }
+  for (float value = 0; ParseNumber(NextToken(text), value);) out.push_back(value);
   return out;
-}
-
-float NumberOr0(const std::string& text) {
-  const auto numbers = Numbers(text);
-  return numbers.empty() ? 0 : numbers[0];
 }
 
 FurnitureEntry MakeEntry(const Properties& p, const std::string& suffix) {
@@ -107,8 +91,6 @@ FurnitureEntry MakeEntry(const Properties& p, const std::string& suffix) {
   e.creator = Get(p, "creator" + suffix);
   e.model = Get(p, "model" + suffix);
   if (e.model.starts_with('/')) e.model.erase(0, 1);
-  e.size_cm = {NumberOr0(Get(p, "width" + suffix)), NumberOr0(Get(p, "height" + suffix)),
-               NumberOr0(Get(p, "depth" + suffix))};
   const auto rotation = Numbers(Get(p, "modelRotation" + suffix));
   if (rotation.size() == 9) {
     e.rotation.emplace();

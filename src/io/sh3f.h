@@ -15,8 +15,7 @@ namespace tilegrad::io {
 
 struct FurnitureEntry {
   std::string id, name, creator;
-  std::string model;                 // path of the OBJ in the archive, without a leading slash
-  glm::vec3 size_cm = glm::vec3(0);  // width (x), height (y), depth (z); 0 where not given
+  std::string model;  // path of the OBJ in the archive, without a leading slash
   // Row-major, to be applied to positions: afterwards y is up and the front faces +z.
   std::optional<std::array<float, 9>> rotation;
 };

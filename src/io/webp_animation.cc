@@ -11,7 +11,7 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr int kLongest = 65535;             // milliseconds, loops: 16 bits in the file
+constexpr int kLongest = 65535;             // milliseconds: 16 bits in the file
 constexpr std::size_t kMostFrames = 16384;  // all of them together last less than 2^31 ms
 
 Status InRange(const char* name, int value, int low, int high) {
@@ -84,7 +84,6 @@ class Encoder {
     WebPAnimEncoderOptions animation;
     if (!WebPAnimEncoderOptionsInit(&animation) || !WebPConfigInit(&config_))
       return InternalError("libwebp is of another version than the program was built with");
-    animation.anim_params.loop_count = options_.loops;
     config_.quality = static_cast<float>(options_.quality);
     encoder_.reset(WebPAnimEncoderNew(width, height, &animation));
     return encoder_ ? Status() : IoError("not enough memory for {} x {} pixels", width, height);
@@ -115,7 +114,6 @@ Result<Bytes> EncodeWebpAnimation(std::span<const ImageU8> frames,
                                   const AnimationOptions& options) {
   TILEGRAD_TRY(CheckFrames(frames));
   TILEGRAD_TRY(InRange("milliseconds a frame", options.frame_ms, 1, kLongest));
-  TILEGRAD_TRY(InRange("number of loops", options.loops, 0, kLongest));
   TILEGRAD_TRY(InRange("quality", options.quality, 0, 100));
   return Encoder(options).Encode(frames);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Animations that every browser shows: WebP, by libwebp.
+// Animations that every browser shows, again and again: WebP, by libwebp.
 #pragma once
 
 #include <span>
@@ -12,7 +12,6 @@ namespace tilegrad::io {
 
 struct AnimationOptions {
   int frame_ms = 83;  // how long each frame stands, 1 to 65535; 83: twelve a second
-  int loops = 0;      // how often it is shown, 0 to 65535; 0: for ever
   int quality = 75;   // of the lossy coder, 0 to 100
   Watch watch = {};   // asked at each frame
 };

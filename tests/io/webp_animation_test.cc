@@ -56,11 +56,10 @@ Decoded Decode(const Bytes& bytes) {
 TEST(WebpAnimation, DecodesToItsFrames) {
   for (const int channels : {3, 4}) {
     const std::vector<ImageU8> frames = MovingSquare(12, channels);
-    const auto bytes = Ok(EncodeWebpAnimation(frames, {.frame_ms = 50, .loops = 3, .quality = 90}));
+    const auto bytes = Ok(EncodeWebpAnimation(frames, {.frame_ms = 50, .quality = 90}));
     const Decoded back = Decode(*bytes);
     EXPECT_EQ(back.info.canvas_width, 48u);
     EXPECT_EQ(back.info.canvas_height, 32u);
-    EXPECT_EQ(back.info.loop_count, 3u);
     ASSERT_EQ(back.frames.size(), frames.size());
     for (std::size_t i = 0; i < frames.size(); ++i) {
       EXPECT_EQ(back.ends[i], 50 * static_cast<int>(i + 1));
@@ -87,7 +86,6 @@ TEST(WebpAnimation, RefusesWhatCannotBe) {
   std::vector<ImageU8> frames = MovingSquare(3, 3);
   ExpectMessage(EncodeWebpAnimation({}).status(), "needs 1 to 16384 frames, got 0");
   ExpectMessage(EncodeWebpAnimation(frames, {.frame_ms = 0}).status(), "milliseconds", "got 0");
-  ExpectMessage(EncodeWebpAnimation(frames, {.loops = -1}).status(), "loops", "got -1");
   ExpectMessage(EncodeWebpAnimation(frames, {.quality = 101}).status(), "quality", "got 101");
   const ImageU8 wide(16384, 1, 3), grey(48, 32, 1);
   ExpectMessage(EncodeWebpAnimation({&wide, 1}).status(), "width", "16383");
