@@ -67,7 +67,7 @@ Result<FitScene> SphereScene(const FitJob& job, const Sphere& sphere) {
 // side: ragged things fall into thousands of charts. Returns that side.
 Result<int> UnwrapRagged(int side, Mesh* mesh) {
   for (const int most = 4 * side;; side *= 2) {
-    const Status done = Unwrap({.width = side, .height = side}, mesh).status();
+    const Status done = Unwrap({.width = side, .height = side}, mesh);
     if (done.ok()) return side;
     if (2 * side > most) return done;
   }

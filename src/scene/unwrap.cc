@@ -74,7 +74,7 @@ class Unwrapping {
     ChooseLabels();
   }
 
-  Result<UnwrapQuality> Run(std::vector<glm::vec2>* uvs) {
+  Status Run(std::vector<glm::vec2>* uvs) {
     double area = 0;
     for (std::size_t f = 0; f < areas_.size(); ++f) area += areas_[f] * Cosine(f, labels_[f]);
     if (!(area > 0)) return InvalidArgument("the mesh has no area to unwrap");
@@ -85,7 +85,7 @@ class Unwrapping {
       if (i % 10 == 0) MakeCharts();
       if (!Place()) continue;
       Write(uvs);
-      return Quality();
+      return {};
     }
     return InvalidArgument("a texture of {} x {} has no room for {} charts: give it more texels",
                            options_.width, options_.height, charts_.size());
@@ -254,29 +254,6 @@ class Unwrapping {
     }
   }
 
-  UnwrapQuality Quality() const {
-    UnwrapQuality q;
-    q.charts = static_cast<int>(charts_.size());
-    q.texels_per_unit = scale_;
-    double area = 0, flat = 0, length = 0, seams = 0;
-    for (std::size_t f = 0; f < labels_.size(); ++f) {
-      area += areas_[f];
-      flat += areas_[f] * Cosine(f, labels_[f]);
-      q.most_stretch = std::max(q.most_stretch, 1 / Cosine(f, labels_[f]));
-    }
-    q.mean_stretch = area / flat;
-    q.used = flat * scale_ * scale_ / options_.width / options_.height;
-    for (const Edge& e : BuildTopology(mesh_.faces, mesh_.positions.size()).edges) {
-      const double l = glm::distance(At(e.a), At(e.b));
-      length += l;
-      if (e.face1 >= 0 && chart_of_[static_cast<std::size_t>(e.face0)] !=
-                              chart_of_[static_cast<std::size_t>(e.face1)])
-        seams += l;
-    }
-    q.seams = length > 0 ? seams / length : 0;
-    return q;
-  }
-
   static constexpr double kPreferred = 0.5;  // cosine below which a face keeps its own axis
   static constexpr double kBorder = 1e-9;    // texels^2: a centre on an edge is in no face
 
@@ -295,7 +272,7 @@ class Unwrapping {
 
 }  // namespace
 
-Result<UnwrapQuality> Unwrap(const UnwrapOptions& options, Mesh* mesh) {
+Status Unwrap(const UnwrapOptions& options, Mesh* mesh) {
   constexpr int kLeast = 16, kMost = 1 << 14;
   if (options.width < kLeast || options.height < kLeast || options.width > kMost ||
       options.height > kMost || options.gutter < 0 || options.gutter > kLeast) {

@@ -13,16 +13,6 @@ struct UnwrapOptions {
   int gutter = 2;                 // texels of each chart's own around it
 };
 
-// How good texture coordinates are.
-struct UnwrapQuality {
-  int charts = 0;
-  double texels_per_unit = 0;  // of length, along a chart's axes
-  double used = 0;             // of the texture's area, by faces
-  double mean_stretch = 1;     // area on the surface for area in the texture, by area: 1 or more
-  double most_stretch = 1;     // of a face; at most 1 / kLeastCosine
-  double seams = 0;            // length of edges between charts, over all edges' length
-};
-
 // Faces lie in a chart whose axis (one of +-x, +-y, +-z) is within the angle of this cosine of
 // their normal.
 inline constexpr double kLeastCosine = 0.25;
@@ -32,6 +22,6 @@ inline constexpr double kLeastCosine = 0.25;
 // that a rough surface does not fall apart. Charts keep their proportions, and are as large as
 // fits, on shelves by height (first fit). A pure function. An error: sizes out of range; more
 // charts than the texture has room for.
-Result<UnwrapQuality> Unwrap(const UnwrapOptions& options, Mesh* mesh);
+Status Unwrap(const UnwrapOptions& options, Mesh* mesh);
 
 }  // namespace tilegrad

@@ -4,6 +4,19 @@
 #include <algorithm>
 
 namespace tilegrad {
+namespace {
+
+// turn(row) of each row of the rotation.
+template <class Turn>
+Camera WithRows(Camera camera, Turn turn) {
+  for (float* row : {camera.rotation, camera.rotation + 3, camera.rotation + 6}) {
+    const glm::vec3 turned = turn(glm::vec3(row[0], row[1], row[2]));
+    std::copy_n(&turned[0], 3, row);
+  }
+  return camera;
+}
+
+}  // namespace
 
 glm::vec3 Upright(UpAxis up, glm::vec3 v) {
   if (up == UpAxis::kZ) return {v.x, v.z, -v.y};
@@ -26,31 +39,15 @@ void TurnUpright(UpAxis up, Mesh* mesh) {
 
 // The rows of a rotation are directions in the world.
 Camera UprightCamera(UpAxis up, Camera camera) {
-  for (int i = 0; i < 3; ++i) {
-    float* r = camera.rotation + 3 * i;
-    const glm::vec3 turned = Upright(up, {r[0], r[1], r[2]});
-    for (int k = 0; k < 3; ++k) r[k] = turned[k];
-  }
-  return camera;
+  return WithRows(camera, [&](glm::vec3 row) { return Upright(up, row); });
 }
 
 // A row r of the rotation meets Upright(v) as the row R^T r meets v.
 Camera CameraOfFile(UpAxis up, Camera camera) {
-  for (int i = 0; i < 3; ++i) {
-    float* r = camera.rotation + 3 * i;
-    const float x = r[0], y = r[1], z = r[2];
-    if (up == UpAxis::kZ) {
-      r[0] = x;
-      r[1] = -z;
-      r[2] = y;
-    }
-    if (up == UpAxis::kX) {
-      r[0] = y;
-      r[1] = -x;
-      r[2] = z;
-    }
-  }
-  return camera;
+  return WithRows(camera, [&](glm::vec3 r) {
+    if (up == UpAxis::kZ) return glm::vec3(r.x, -r.z, r.y);
+    return up == UpAxis::kX ? glm::vec3(r.y, -r.x, r.z) : r;
+  });
 }
 
 }  // namespace tilegrad
