@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/trainer.h"
 
+#include <cmath>
+#include <limits>
+#include <memory>
+
 #include "base/error.h"
-#include "train/portioned_update.h"
+#include "base/text.h"
+#include "train/ranks/gradient_sums.h"
+#include "train/ranks/value_sums.h"
 #include "train/run/machine.h"
 #include "train/run/run_files.h"
 
@@ -11,6 +17,130 @@ namespace {
 
 constexpr std::int64_t kEnd = -1;     // the order after the last step
 constexpr std::int64_t kGather = -2;  // the order to bring moments to rank 0
+
+// Of an update that says nothing of the step's loss; one that is not finite would be an error.
+constexpr double kNoLoss = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kBeforeTerms = 3;  // numbers: loss, images, stream seconds
+
+// An update by portions of the batch, on one process or many ranks: the same bits.
+class PortionedUpdate {
+ public:
+  // `crew`: of all ranks, or null. InvalidArgument where the task or the number of ranks do not
+  // allow so many portions.
+  static Result<std::unique_ptr<PortionedUpdate>> Make(nn::Context& context, Task& task,
+                                                       std::int64_t portions, Crew* crew) {
+    Transport* const ranks = crew ? &crew->ranks() : nullptr;
+    if (ranks && ranks->size() > portions) {
+      return InvalidArgument(
+          "{} ranks cannot share {} of a batch: set schedule.portions to a power of two that is "
+          "not smaller, or start fewer ranks",
+          ranks->size(), Count(portions, "portion"));
+    }
+    if (context.dtype() != nn::DType::kF32) return InternalError("portions are summed in F32");
+    TILEGRAD_ASSIGN(auto statistics, task.Statistics());
+    const GradientSums::Shape shape{.portions = portions, .ranks = ranks};
+    auto sums = std::make_unique<GradientSums>(context, shape, std::move(statistics));
+    return std::unique_ptr<PortionedUpdate>(
+        new PortionedUpdate(task, crew, shape, std::move(sums)));
+  }
+
+  // Task::Backward of this rank's portions, the means of all, Task::Update. `values` are those of
+  // the whole batch on rank 0; elsewhere they mean nothing.
+  Status Run(const UpdateIndex& at, StepValues* values) {
+    sums_->BeginUpdate();
+    value_sums_.BeginUpdate();
+    Status status = Backward(at);
+    if (status.ok()) status = Finish(values);
+    if (!status.ok()) {
+      sums_->GiveUp();
+      return status;
+    }
+    return Update(at, values);
+  }
+
+  // Moments of optimisers that are spread over ranks come to rank 0. Every rank calls it where
+  // HasMoments, which is the same on all.
+  bool HasMoments() const { return sums_->share() && sums_->share()->HasMoments(); }
+  void GatherMoments() { sums_->share()->GatherMoments(); }
+
+ private:
+  PortionedUpdate(Task& task, Crew* crew, const GradientSums::Shape& shape,
+                  std::unique_ptr<GradientSums> sums)
+      : task_(task),
+        crew_(crew),
+        portions_(shape.portions),
+        sums_(std::move(sums)),
+        value_sums_(shape.portions, shape.ranks) {}
+
+  Status Update(UpdateIndex at, StepValues* values) {
+    WeightShare* const share = sums_->share();
+    at.share = share;
+    const Status status = task_.Update(at, sums_->means());
+    TILEGRAD_TRY(alarm_);
+    TILEGRAD_TRY(status);
+    if (!share) return {};
+    if (!share->finished()) return InternalError("Task::Update gave no share to its optimizer");
+    values->wait_seconds += share->seconds_waited();
+    return {};
+  }
+
+  Status Backward(UpdateIndex at) {
+    at.listener = sums_.get();
+    for (std::size_t i = 0; i < sums_->portions().size(); ++i) {
+      at.portion = {sums_->portions()[i], portions_};
+      portion_.Clear();
+      portion_.loss = kNoLoss;
+      sums_->BeginPortion(i);
+      TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion_));
+      sums_->EndPortion(gradients);
+      AddValues();
+    }
+    return {};
+  }
+
+  void AddValues() {
+    numbers_ = {portion_.loss, static_cast<double>(portion_.images), portion_.stream_seconds};
+    for (const LossTerm& term : portion_.terms) numbers_.push_back(term.value);
+    value_sums_.Add(numbers_);
+  }
+
+  Status Finish(StepValues* values) {
+    const auto all_is_well = [this] {
+      if (crew_ && crew_->leads()) alarm_ = crew_->Alarm();
+      return alarm_.ok();
+    };
+    if (!sums_->Finish(all_is_well)) return alarm_;
+    const std::span<const double> numbers = value_sums_.Finish(all_is_well);
+    TILEGRAD_TRY(alarm_);
+    if (crew_) {
+      values->wait_seconds += sums_->seconds_waited();
+      values->summed_numbers += static_cast<double>(sums_->numbers());
+    }
+    if (!numbers.empty()) TakeValues(numbers, values);
+    return {};
+  }
+
+  void TakeValues(std::span<const double> sums, StepValues* values) const {
+    const auto count = static_cast<double>(portions_);
+    if (std::isfinite(sums[0])) values->loss = sums[0] / count;
+    values->images += static_cast<std::int64_t>(sums[1]);
+    values->stream_seconds += sums[2];
+    for (std::size_t i = 0; i < portion_.terms.size(); ++i) {
+      values->terms.push_back(portion_.terms[i]);
+      values->terms.back().value = sums[kBeforeTerms + i] / count;
+    }
+    values->also.insert(values->also.end(), portion_.also.begin(), portion_.also.end());
+  }
+
+  Task& task_;
+  Crew* crew_;
+  std::int64_t portions_;
+  std::unique_ptr<GradientSums> sums_;
+  ValueSums value_sums_;
+  Status alarm_;                 // of another rank, in the middle of an update
+  StepValues portion_;           // of the last portion
+  std::vector<double> numbers_;  // of it: loss, images, stream seconds, terms
+};
 
 class Training : public RunWork {
  public:
@@ -51,7 +181,8 @@ class Training : public RunWork {
     TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
     TILEGRAD_TRY(context.TakeStatus());
     if (!job_.crew && config_.schedule.portions == 1) return {};
-    TILEGRAD_ASSIGN(portioned_, PortionedUpdate::Make(context, task_, config_.schedule, job_.crew));
+    TILEGRAD_ASSIGN(portioned_,
+                    PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.crew));
     return {};
   }
 
@@ -73,8 +204,7 @@ class Training : public RunWork {
         portioned_->GatherMoments();
         continue;
       }
-      values.terms.clear();
-      values.also.clear();
+      values.Clear();
       const Status done = Updates(step, &values);
       if (!done.ok()) job_.crew->RaiseAlarm(done.Within(fmt::format("step {}", step)));
       outcome.last_step = step + 1;

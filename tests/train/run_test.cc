@@ -17,7 +17,6 @@
 #include "train/run/header.h"
 #include "train/run/log.h"
 #include "train/run/step_values.h"
-#include "train/run/tensorboard.h"
 
 namespace tilegrad::train::run_test {
 

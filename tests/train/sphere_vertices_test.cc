@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // N3MR's vertex parameterisation: values worked out by hand, independent numbers, differences.
-#include "train/models/sphere_vertices.h"
+#include "train/models/sphere_model.h"
 
 #include <gtest/gtest.h>
 

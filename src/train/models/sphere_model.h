@@ -21,7 +21,7 @@ struct SphereConfig {
   std::int64_t smoothing = 4;  // rounds of diffusion over the sphere that offsets go through
   bool symmetric = true;  // offsets are the mean of themselves and their mirror image at x = 0, so
                           // every prediction is symmetric there
-  bool n3mr_vertices = false;  // sphere_vertices.h instead of offsets; radius is 1/4, and the two
+  bool n3mr_vertices = false;  // SphereVertices instead of offsets; radius is 1/4, and the two
                                // keys above do not apply
 };
 
@@ -77,5 +77,16 @@ nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent = kPredicti
 // Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
 // is at 1/2 - u (scene/sphere_uv.h): column i has W/2 - 1 - i.
 nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width);
+
+// Vertices as N3MR's training code parameterises them (and SoftRas's after it): each coordinate
+// keeps its sign and moves between 0 and the side of a cube, then a centroid moves within it.
+// With s = `sphere` [V,3], of unit radius, bias [B,V,3] and centroid [B,1,3]:
+//
+//   u = sign(s) sigmoid(logit(|s| / 2) + bias),   c = tanh(0.1 centroid),
+//   v = max(u, 0) (1 - c) - max(-u, 0) (1 + c) + c
+//
+// Returns v / 2 [B,V,3], within (-1/2, 1/2); s / 4 where bias and centroid are 0. As published, a
+// coordinate where s is 0 has u = 0 whatever its bias, without a gradient.
+nn::Var SphereVertices(const nn::Var& bias, const nn::Var& centroid, const nn::Tensor& sphere);
 
 }  // namespace tilegrad::train

@@ -34,7 +34,7 @@ struct TextureNetworkConfig {
   bool lookup = false;
   bool cubes = false;  // in evaluation textures are as N3MR's cubes show them (face_cubes.h)
   std::int64_t lookup_width = 16;   // channels of the decoder and of the layers behind it, then
-  std::int64_t palette = 0;         // paints of an object (palette.h), with `lookup`; 0: none
+  std::int64_t palette = 0;         // paints of an object (PaletteColors), with `lookup`; 0: none
   double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)
 };
 

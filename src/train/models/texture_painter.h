@@ -10,7 +10,7 @@ namespace tilegrad::train {
 struct TexturePainterShape {
   int image_size = 64, texture_size = 128;  // pixels and texels a side
   std::int64_t width = 16;                  // channels of the maps that come in, and of the layers
-  std::int64_t palette = 0;                 // paints of an object (palette.h); 0: none
+  std::int64_t palette = 0;                 // paints of an object (PaletteColors); 0: none
 };
 
 class TexturePainter {
@@ -44,5 +44,15 @@ class TexturePainter {
   PictureLookup coarse_, fine_;  // of the picture's size, and of the texture's
   nn::Sequential layers_;
 };
+
+// Colours of what a picture does not show, or shows in the dark: most of an object is of a few
+// paints, and what is lit tells the colour of each.
+//
+// Each texel is of some paint, in shares `kinds` [M, K, h, w] that sum to 1 over K. The colour of a
+// paint is the mean of what `seen` (PictureLookup::Look, [M, 12, h, w]) shows of it without the
+// predicted light, where it is covered, faces the camera and is lit; where nothing is, that of
+// `guess` [M, 3, h, w]. Returns the colours of all texels, [M, 3, h, w]; gradients go to `kinds`
+// and `guess`.
+nn::Var PaletteColors(const nn::Var& kinds, const nn::Tensor& seen, const nn::Var& guess);
 
 }  // namespace tilegrad::train

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "base/error.h"
 #include "train/data/stream/textured_meshes.h"
@@ -149,6 +150,22 @@ Json ExampleJson(const Example& example) {
           {"truth", MeshJson(example.truth)}};
 }
 
+// The means of a stretch of entries that have the same values.
+LogEntry MeanEntry(std::span<const LogEntry> stretch) {
+  LogEntry mean = stretch.back();
+  for (std::size_t v = 0; v < mean.values.size(); ++v) {
+    double sum = 0;
+    int count = 0;
+    for (const LogEntry& entry : stretch) {
+      if (v >= entry.values.size() || entry.values[v].first != mean.values[v].first) continue;
+      sum += entry.values[v].second;
+      ++count;
+    }
+    mean.values[v].second = sum / count;
+  }
+  return mean;
+}
+
 }  // namespace
 
 Json MeshJson(const Mesh& mesh) {
@@ -169,6 +186,16 @@ Result<Json> CentredMeshJson(Mesh mesh) {
   if (mesh.faces.empty()) return Json();
   TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule().half_extent)));
   return MeshJson(mesh);
+}
+
+std::vector<LogEntry> Thin(const std::vector<LogEntry>& log, std::size_t count) {
+  if (log.size() <= count) return log;
+  std::vector<LogEntry> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t begin = i * log.size() / count, end = (i + 1) * log.size() / count;
+    out.push_back(MeanEntry(std::span(log).subspan(begin, end - begin)));
+  }
+  return out;
 }
 
 Json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels) {

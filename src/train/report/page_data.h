@@ -18,12 +18,14 @@ nlohmann::ordered_json MeshJson(const Mesh& mesh);
 // The same in the middle of a cube of side 0.9. An error for a mesh without extent.
 Result<nlohmann::ordered_json> CentredMeshJson(Mesh mesh);
 
+// At most `count` entries: means over equal stretches, at the step of each stretch's last entry.
+std::vector<LogEntry> Thin(const std::vector<LogEntry>& log, std::size_t count);
+
 // {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each value
 // of the log but the clock's.
 nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels);
 
-// {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}], "camera": {...},
-// "models": [...]}: a chart for each value of the log but the clock's.
+// The same, with {"camera": {...}, "generated", "models": [...]}.
 nlohmann::ordered_json PageData(const ReportFacts& facts);
 
 }  // namespace tilegrad::train

@@ -11,9 +11,22 @@
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/report/sections.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
+
+// run.json, config.toml, metrics.jsonl; errors name the file and the key or line.
+Result<RunFacts> ReadRun(const Path& run) {
+  RunFacts facts;
+  facts.folder = run;
+  TILEGRAD_ASSIGN(facts.header, ReadHeader(run));
+  const Path config = run / kTrainSettings;
+  TILEGRAD_ASSIGN(facts.config_text, ReadText(config));
+  TILEGRAD_ASSIGN(facts.config, ParseConfig(facts.config_text, config.string()));
+  TILEGRAD_ASSIGN(facts.log, ReadLog(run));
+  return facts;
+}
 
 Result<std::string> Page(const ReportFacts& facts) {
   TILEGRAD_ASSIGN(const std::string models, ModelsHtml(facts));

@@ -4,11 +4,24 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "train/report/run_facts.h"
+#include "base/file.h"
+#include "train/config.h"
+#include "train/run/header.h"
+#include "train/run/log.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {
+
+// What a run's folder says about it.
+struct RunFacts {
+  Path folder;
+  RunHeader header;
+  TrainConfig config;
+  std::string config_text;  // config.toml as it is
+  std::vector<LogEntry> log;
+};
 
 // Everything that a report tells about, gathered from the run and its task.
 struct ReportFacts {

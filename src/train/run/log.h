@@ -3,10 +3,17 @@
 // as TensorBoard events.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
 #include "base/file.h"
-#include "train/run/tensorboard.h"
 
 namespace tilegrad::train {
+
+using Scalars = std::vector<std::pair<std::string, double>>;  // tag, value
 
 struct LogEntry {
   std::int64_t step = 0;  // steps done
@@ -28,5 +35,16 @@ class RunLog {
   explicit RunLog(const Path& run) : run_(run) {}
   Path run_;
 };
+
+// TensorBoard event files: TFRecord framing around protocol-buffer events that hold scalars. The
+// few fields needed are encoded by hand; TensorFlow's crc32c masking as in
+// tensorflow/core/lib/io/record_writer.
+
+// The bytes of one record; a file is a version record followed by any number of scalar records.
+std::string TensorboardVersionRecord(double wall_time);
+std::string TensorboardScalarsRecord(double wall_time, std::int64_t step, const Scalars& scalars);
+
+// Castagnoli's CRC.
+std::uint32_t Crc32c(std::string_view bytes);
 
 }  // namespace tilegrad::train

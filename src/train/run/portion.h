@@ -4,9 +4,10 @@
 // bits come out whoever computes them: one process one after the other, or many at once.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
-#include "tilegrad/status.h"
+#include "base/error.h"
 
 namespace tilegrad::train {
 
@@ -27,6 +28,13 @@ inline Slots SlotsOf(std::int64_t step, std::int64_t batch, const Portion& porti
 }
 
 // InvalidArgument unless `portions` is a power of two that divides schedule.batch.
-Status CheckPortions(std::int64_t batch, std::int64_t portions);
+inline Status CheckPortions(std::int64_t batch, std::int64_t portions) {
+  if (!std::has_single_bit(static_cast<std::uint64_t>(portions)))
+    return InvalidArgument("schedule.portions is {}, but must be a power of two", portions);
+  if (batch % portions == 0) return {};
+  return InvalidArgument(
+      "schedule.batch is {}, which schedule.portions = {} does not divide: take a multiple of {}",
+      batch, portions, portions);
+}
 
 }  // namespace tilegrad::train

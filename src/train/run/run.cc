@@ -185,10 +185,7 @@ Status Session::Draw() {
 
 Status Session::OneStep() {
   const Schedule& s = plan_.schedule;
-  values_.terms.clear();
-  values_.also.clear();
-  values_.images = 0;
-  values_.stream_seconds = values_.wait_seconds = values_.summed_numbers = 0;
+  values_.Clear();
   TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
   ++done_;
   images_ += values_.images;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "train/run/tensorboard.h"
+#include "train/run/log.h"
 
 namespace tilegrad::train {
 
@@ -28,6 +28,12 @@ struct StepValues {
   double wait_seconds = 0;    // for gradients of other ranks, after its own were there
   double summed_numbers = 0;  // with other ranks, in all updates of the step
 
+  void Clear() {  // all but the loss, which a step may leave as it was
+    terms.clear();
+    also.clear();
+    images = 0;
+    stream_seconds = wait_seconds = summed_numbers = 0;
+  }
   // The loss, and its terms without their weights: "loss 2.5690  iou 0.246  color 0.111".
   std::string ForConsole() const;
   // "iou 0.5 x 1, color nan x 1".

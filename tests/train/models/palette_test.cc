@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/models/palette.h"
-
 #include <gtest/gtest.h>
 
 #include <vector>
 
 #include "nn/nn.h"
+#include "train/models/texture_painter.h"
 
 namespace tilegrad::train::palette_test {
 

@@ -1,20 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "train/metrics/metrics.h"
+
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
 #include "base/rng.h"
-#include "train/metrics/metrics.h"
+#include "train/metrics/nearest_point.h"
 
 namespace tilegrad::train {
+
 namespace {
+
+struct OneWay {
+  double mean = 0, share = 0;  // of the distances; within the threshold
+};
+
+OneWay Measure(std::span<const glm::vec3> from, const NearestPoint& to, double threshold) {
+  OneWay out;
+  for (const glm::vec3& point : from) {
+    const double distance = std::sqrt(to.Find(glm::dvec3(point)).squared);
+    out.mean += distance;
+    out.share += distance <= threshold;
+  }
+  const double n = static_cast<double>(from.size());
+  return {out.mean / n, out.share / n};
+}
 
 glm::dvec3 Corner(const Mesh& mesh, const Face& face, std::size_t k) {
   return glm::dvec3(mesh.positions[static_cast<std::size_t>(face[k])]);
 }
 
 }  // namespace
+
+double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b) {
+  assert(a.size() == b.size());
+  std::size_t both = 0, either = 0;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    both += a[i] != 0 && b[i] != 0;
+    either += a[i] != 0 || b[i] != 0;
+  }
+  return either == 0 ? 1.0 : static_cast<double>(both) / static_cast<double>(either);
+}
 
 Result<std::vector<SurfaceSample>> SampleFaces(std::span<const double> areas, int count,
                                                std::uint64_t seed) {
@@ -55,6 +84,18 @@ Result<std::vector<glm::vec3>> SampleSurface(const Mesh& mesh, int count, std::u
                         s.weights[2] * Corner(mesh, face, 2));
   }
   return points;
+}
+
+SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<const glm::vec3> truth,
+                             double threshold) {
+  if (predicted.empty() || truth.empty()) return {};
+  const OneWay forth = Measure(predicted, NearestPoint(truth), threshold);
+  const OneWay back = Measure(truth, NearestPoint(predicted), threshold);
+  const double sum = forth.share + back.share;
+  return {.chamfer = 0.5 * (forth.mean + back.mean),
+          .precision = forth.share,
+          .recall = back.share,
+          .f_score = sum > 0 ? 2 * forth.share * back.share / sum : 0};
 }
 
 }  // namespace tilegrad::train
