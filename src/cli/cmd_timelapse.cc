@@ -14,7 +14,7 @@
 #include "io/mesh_file.h"
 #include "io/webp_animation.h"
 #include "render/picture/mesh_pictures.h"
-#include "scene/unlit.h"
+#include "scene/mesh.h"
 #include "train/data/dataset.h"
 
 namespace tilegrad::cli {

@@ -9,7 +9,6 @@
 #include "fit/scene.h"
 #include "scene/shapes.h"
 #include "scene/sphere_uv.h"
-#include "scene/unlit.h"
 
 namespace tilegrad::train {
 namespace {

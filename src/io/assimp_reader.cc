@@ -2,6 +2,7 @@
 // Meshes by Assimp, which runs in a process of its own; its result becomes a mesh here.
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstring>
 #include <glm/mat3x3.hpp>
 #include <optional>
@@ -10,7 +11,6 @@
 
 #include "base/error.h"
 #include "io/archive.h"
-#include "io/fbx_wrapping.h"
 #include "io/image_file.h"
 #include "io/imported_scene.h"
 #include "io/mesh_colors.h"
@@ -237,7 +237,46 @@ void WarnOfPaint(const Bytes& threemf, const std::string& place,
   warnings->emplace_back("colours of single triangles and colour groups left out");
 }
 
+constexpr std::string_view kName = "WrapMode";  // and U or V
+
+// Behind the name in a text: `", "enum", "", "",1` to the end of the line.
+int TextValue(std::string_view rest) {
+  rest = rest.substr(0, rest.find_first_of("\r\n"));
+  const std::size_t comma = rest.rfind(',');
+  if (comma == std::string_view::npos) return 0;
+  rest.remove_prefix(std::min(rest.find_first_not_of(" \t", comma + 1), rest.size()));
+  int value = 0;
+  std::from_chars(rest.data(), rest.data() + rest.size(), value);
+  return value;
+}
+
+// Behind the name in a binary: three texts, S with 32 bits of length, then I and the value.
+int BinaryValue(std::string_view rest) {
+  const auto number = [&]() {
+    std::uint32_t value = 0;
+    std::memcpy(&value, rest.data() + 1, sizeof(value));
+    return value;
+  };
+  constexpr std::size_t kHead = 1 + sizeof(std::uint32_t);
+  for (int text = 0; text < 3; ++text) {
+    if (rest.size() < kHead || rest[0] != 'S' || number() > rest.size() - kHead) return 0;
+    rest.remove_prefix(kHead + number());
+  }
+  return rest.size() < kHead || rest[0] != 'I' ? 0 : static_cast<int>(number());
+}
+
 }  // namespace
+
+bool HasClampedFbxTexture(std::span<const std::uint8_t> file) {
+  const std::string_view all = TextOf(file);
+  for (std::size_t at = all.find(kName); at < all.size(); at = all.find(kName, at + 1)) {
+    std::string_view rest = all.substr(at + kName.size());
+    if (!rest.starts_with('U') && !rest.starts_with('V')) continue;
+    rest.remove_prefix(1);
+    if ((rest.starts_with('"') ? TextValue(rest) : BinaryValue(rest)) != 0) return true;
+  }
+  return false;
+}
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
                                 const Bytes& file, const GuardLimits& limits) {

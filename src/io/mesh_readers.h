@@ -31,6 +31,11 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
                                 const Bytes& file, const GuardLimits& limits);
 
+// What Assimp does not tell of an FBX file, text or binary: whether some texture does not repeat;
+// its WrapModeU or WrapModeV is not 0. Of damaged files anything, but nothing outside of `file` is
+// read.
+bool HasClampedFbxTexture(std::span<const std::uint8_t> file);
+
 // The ending of a file name in lower case, with its point.
 std::string MeshEnding(const std::string& name);
 

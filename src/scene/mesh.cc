@@ -72,6 +72,17 @@ Status CheckMaterials(const Mesh& mesh) {
   return {};
 }
 
+template <class T>
+void Keep(std::vector<T>* values, const std::vector<char>& keep_face, std::size_t per_face) {
+  if (values->empty()) return;
+  std::size_t to = 0;
+  for (std::size_t f = 0; f < keep_face.size(); ++f) {
+    if (!keep_face[f]) continue;
+    for (std::size_t k = 0; k < per_face; ++k) (*values)[to++] = (*values)[f * per_face + k];
+  }
+  values->resize(to);
+}
+
 }  // namespace
 
 Status Validate(const Mesh& mesh) {
@@ -115,6 +126,21 @@ Status NormalizeToBox(Mesh& mesh, float half_extent) {
   for (glm::vec3& p : mesh.positions)
     p = glm::vec3((glm::dvec3(p) - centre) * (half_extent / largest));
   return {};
+}
+
+bool KeepFaces(const std::vector<char>& keep, Mesh* mesh) {
+  if (std::all_of(keep.begin(), keep.end(), [](char k) { return k == 0; })) return false;
+  Keep(&mesh->faces, keep, 1);
+  Keep(&mesh->face_materials, keep, 1);
+  Keep(&mesh->corner_uvs, keep, 3);
+  Keep(&mesh->corner_colors, keep, 3);
+  Keep(&mesh->corner_normals, keep, 3);
+  return true;
+}
+
+void SetUnlit(Mesh& mesh, const std::string& name) {
+  if (mesh.materials.empty()) mesh.materials = {{.name = name, .base_color = glm::vec4(1)}};
+  for (Material& material : mesh.materials) material.unlit = true;
 }
 
 }  // namespace tilegrad

@@ -74,4 +74,13 @@ Bounds MeshBounds(const Mesh& mesh);
 // `half_extent` (datasets: 0.45). An error for an empty mesh or one without extent.
 Status NormalizeToBox(Mesh& mesh, float half_extent);
 
+// Leaves the faces whose entry of `keep` (one for each face) is not 0, with what their corners
+// have. Vertices, materials and textures stay. Returns false and changes nothing if none is to be
+// kept.
+bool KeepFaces(const std::vector<char>& keep, Mesh* mesh);
+
+// The colours hold their light already, as those that were learned from images do: materials become
+// unlit, so that no viewer shades them again. A mesh without materials gets a white one, `name`.
+void SetUnlit(Mesh& mesh, const std::string& name);
+
 }  // namespace tilegrad

@@ -26,30 +26,8 @@ struct WeakPerspectiveT {
 };
 using WeakPerspective = WeakPerspectiveT<double>;
 
-// Row-major. T of the templates below: float, double, std::complex<double>.
-template <class T>
-std::array<T, 9> RotationOf(const std::array<T, 4>& quaternion);
-// Unit, w >= 0. The rotation's rows are orthonormal, its determinant 1.
+// Row-major -> unit, w >= 0. The rotation's rows are orthonormal, its determinant 1.
 std::array<double, 4> QuaternionOf(const Mat3Array& rotation);
-
-// x, y and depth of a point.
-template <class T>
-std::array<T, 3> ProjectWeakly(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point);
-// Its adjoint: adds to *d_camera and *d_point what d_image [2] (x and y) is by them.
-template <class T>
-void ProjectWeaklyAdjoint(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point,
-                          const std::array<T, 2>& d_image, WeakPerspectiveT<T>* d_camera,
-                          std::array<T, 3>* d_point);
-
-// The pinhole camera at `distance` (world units, > 0) that sees the plane through the origin in the
-// same way; image units are pixels. A point at depth z of an object is seen at 1 / (1 + z /
-// distance) of its offset from `translation`.
-template <class T>
-CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance);
-// Its adjoint: d_pinhole entry by entry, as the renderer gives it. Overwrites *d_camera.
-template <class T>
-void PinholeOfAdjoint(const WeakPerspectiveT<T>& camera, T distance, const CameraT<T>& d_pinhole,
-                      WeakPerspectiveT<T>* d_camera);
 
 // Of a pinhole camera, as it sees the surroundings of `centre`. InvalidArgument if that is not in
 // front of it, or if focal lengths differ by more than a hundredth.

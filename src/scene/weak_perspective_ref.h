@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The formulas of weak_perspective.h, as templates over the number type.
+// What cameras of weak_perspective.h do, as templates over the number type: float, double,
+// std::complex<double>.
 #pragma once
 
 #include <cmath>
@@ -48,6 +49,7 @@ inline constexpr int kAxisSigns[3] = {1, -1, -1};
 
 }  // namespace weak_ref
 
+// Row-major.
 template <class T>
 std::array<T, 9> RotationOf(const std::array<T, 4>& quaternion) {
   const auto [w, x, y, z] = weak_ref::UnitQuaternion(quaternion);
@@ -57,6 +59,7 @@ std::array<T, 9> RotationOf(const std::array<T, 4>& quaternion) {
           two * (x * z - w * y),       two * (y * z + w * x),       one - two * (x * x + y * y)};
 }
 
+// x, y and depth of a point.
 template <class T>
 std::array<T, 3> ProjectWeakly(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point) {
   const std::array<T, 3> p = weak_ref::Rotate(RotationOf(camera.quaternion), point);
@@ -64,6 +67,7 @@ std::array<T, 3> ProjectWeakly(const WeakPerspectiveT<T>& camera, const std::arr
           p[2]};
 }
 
+// Its adjoint: adds to *d_camera and *d_point what d_image [2] (x and y) is by them.
 template <class T>
 void ProjectWeaklyAdjoint(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point,
                           const std::array<T, 2>& d_image, WeakPerspectiveT<T>* d_camera,
@@ -82,6 +86,9 @@ void ProjectWeaklyAdjoint(const WeakPerspectiveT<T>& camera, const std::array<T,
   weak_ref::AddRotationAdjoint(camera.quaternion, d_rotation, &d_camera->quaternion);
 }
 
+// The pinhole camera at `distance` (world units, > 0) that sees the plane through the origin in the
+// same way; image units are pixels. A point at depth z of an object is seen at 1 / (1 + z /
+// distance) of its offset from `translation`.
 template <class T>
 CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance) {
   const std::array<T, 9> r = RotationOf(camera.quaternion);
@@ -94,6 +101,7 @@ CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance) {
   return out;
 }
 
+// Its adjoint: d_pinhole entry by entry, as the renderer gives it. Overwrites *d_camera.
 template <class T>
 void PinholeOfAdjoint(const WeakPerspectiveT<T>& camera, T distance, const CameraT<T>& d_pinhole,
                       WeakPerspectiveT<T>* d_camera) {

@@ -13,42 +13,46 @@
 #include "base/parallel.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
+#include "train/config.h"
 #include "train/data/dataset.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
-
-class Model;
-class Task;
 
 class Predictor {
  public:
   // `path`: a run folder (its newest whole checkpoint is taken) or one checkpoint. Errors name the
   // file and what is wrong.
   static Result<Predictor> Load(const Path& path, const Workers& workers);
-  ~Predictor();
-  Predictor(Predictor&&) noexcept;
-  Predictor& operator=(Predictor&&) noexcept;
 
   // Newer checkpoints of the run folder that could not be read.
-  const std::vector<std::string>& warnings() const;
-  const Path& checkpoint() const;  // the file
-  int image_size() const;          // pixels
-  std::int64_t step() const;       // steps that it has learned for
+  const std::vector<std::string>& warnings() const { return all_->found.warnings; }
+  const Path& checkpoint() const { return all_->found.file; }
+  int image_size() const { return static_cast<int>(info().image_size); }  // pixels
+  std::int64_t step() const { return info().step; }  // steps that it has learned for
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
-  std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"
-  const Mesh& template_mesh() const;  // Model::template_mesh
-  Task& task() const;                 // with the configuration of the run
-  Model& model() const;               // as the task loads it
+  std::string description() const;  // "quick network, 3,214,902 parameters, step 3000"
+  const Mesh& template_mesh() const { return all_->model->template_mesh(); }
+  Task& task() const { return *all_->config.task; }  // with the configuration of the run
+  Model& model() const { return *all_->model; }      // as the task loads it
 
   // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes with
   // smooth normals; unlit: their colours hold the light of the training images.
   Result<std::vector<Mesh>> Predict(std::span<const std::uint8_t> images) const;
 
  private:
-  Predictor();
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  Predictor() = default;
+  const CheckpointInfo& info() const { return all_->found.checkpoint.info; }
+
+  struct Loaded {  // each refers to those before it
+    explicit Loaded(const Workers& workers) : context(workers) {}
+    nn::Context context;
+    FoundCheckpoint found;  // without its tensors
+    TrainConfig config;
+    std::unique_ptr<Model> model;
+  };
+  std::unique_ptr<Loaded> all_;
 };
 
 }  // namespace tilegrad::train

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "io/archive.h"
-#include "io/fbx_wrapping.h"
+#include "io/mesh_readers.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"

@@ -10,8 +10,6 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kCameraNumbers = 16;
-
 Renderer& RendererOf(SceneRenderer& r, float) { return r.renderer; }
 RendererT<double>& RendererOf(SceneRenderer& r, double) { return r.renderer64; }
 
@@ -20,17 +18,6 @@ enum Slot { kPositions, kColors, kTextures, kLights, kShininess, kSh, kCameras, 
 
 std::array<nn::Var, kSlots> SlotsOf(const SceneVars& v) {
   return {v.positions, v.colors, v.textures, v.light_directions, v.shininess, v.sh, v.cameras};
-}
-
-// Calls visit(number of a camera, number of its row of SceneVars::cameras).
-template <class Camera, class Row, class Visit>
-void ForEachCameraNumber(Camera& camera, Row& row, const Visit& visit) {
-  for (std::size_t i = 0; i < 9; ++i) visit(camera.rotation[i], row[i]);
-  for (std::size_t i = 0; i < 3; ++i) visit(camera.translation[i], row[9 + i]);
-  visit(camera.fx, row[12]);
-  visit(camera.fy, row[13]);
-  visit(camera.cx, row[14]);
-  visit(camera.cy, row[15]);
 }
 
 template <class T>
@@ -93,13 +80,9 @@ Status BatchRender<T>::Check() const {
                            images);
   }
   const std::int64_t vertices = inputs_[kPositions].shape()[1];
-  const nn::Shape expected[kSlots] = {{meshes, vertices, 3},
-                                      {meshes, vertices, 3},
-                                      {},
-                                      {images, 3},
-                                      {images},
-                                      {images, 9},
-                                      {images, static_cast<std::int64_t>(kCameraNumbers)}};
+  const nn::Shape expected[kSlots] = {
+      {meshes, vertices, 3}, {meshes, vertices, 3},   {}, {images, 3}, {images},
+      {images, 9},           {images, kCameraNumbers}};
   static constexpr const char* kNames[kSlots] = {
       "positions", "colors", "textures", "light_directions", "shininess", "sh", "cameras"};
   for (std::size_t s = 0; s < kSlots; ++s) {

@@ -25,6 +25,18 @@ struct SceneVars {
                                // RenderJob's, whose near planes are kept
 };
 
+// Calls visit(number of a camera, number of its row of SceneVars::cameras).
+inline constexpr std::int64_t kCameraNumbers = 16;
+template <class Camera, class Row, class Visit>
+void ForEachCameraNumber(Camera&& camera, Row& row, const Visit& visit) {
+  for (std::size_t i = 0; i < 9; ++i) visit(camera.rotation[i], row[i]);
+  for (std::size_t i = 0; i < 3; ++i) visit(camera.translation[i], row[9 + i]);
+  visit(camera.fx, row[12]);
+  visit(camera.fy, row[13]);
+  visit(camera.cx, row[14]);
+  visit(camera.cy, row[15]);
+}
+
 // What is the same for all meshes, and no tensor.
 struct RenderJob {
   std::span<const std::int32_t> faces{};  // [F,3]; must outlive the tape

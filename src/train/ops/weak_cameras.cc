@@ -5,11 +5,12 @@
 
 #include "base/error.h"
 #include "scene/weak_perspective_ref.h"
+#include "train/ops/render_op.h"
 
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kRow = kWeakNumbers, kPinholeRow = 16;
+constexpr std::size_t kRow = kWeakNumbers;
 
 template <class T>
 WeakPerspectiveT<T> CameraAt(const T* row) {
@@ -71,35 +72,16 @@ struct Projection {
 };
 
 template <class T>
-void PutPinhole(const CameraT<T>& camera, T* row) {
-  std::copy_n(camera.rotation, 9, row);
-  std::copy_n(camera.translation, 3, row + 9);
-  row[12] = camera.fx;
-  row[13] = camera.fy;
-  row[14] = camera.cx;
-  row[15] = camera.cy;
-}
-
-template <class T>
-CameraT<T> PinholeAt(const T* row) {
-  CameraT<T> camera;
-  std::copy_n(row, 9, camera.rotation);
-  std::copy_n(row + 9, 3, camera.translation);
-  camera.fx = row[12];
-  camera.fy = row[13];
-  camera.cx = row[14];
-  camera.cy = row[15];
-  return camera;
-}
-
-template <class T>
 void PinholesBackward(const nn::Tensor& cameras, int size, const T* d, T* d_cameras) {
   const auto batch = static_cast<std::size_t>(cameras.shape()[0]);
   const T half = T(size) / T(2);
   for (std::size_t b = 0; b < batch; ++b) {
     WeakPerspectiveT<T> d_camera;
     const auto camera = InPixels(CameraAt(cameras.span<T>().data() + kRow * b), size);
-    PinholeOfAdjoint(camera, T(kPinholeDistance), PinholeAt(d + kPinholeRow * b), &d_camera);
+    CameraT<T> d_pinhole;
+    const T* const row = d + kCameraNumbers * b;
+    ForEachCameraNumber(d_pinhole, row, [](T& to, T from) { to = from; });
+    PinholeOfAdjoint(camera, T(kPinholeDistance), d_pinhole, &d_camera);
     d_camera.scale *= half;
     for (T& t : d_camera.translation) t *= half;
     PutCamera(d_camera, d_cameras + kRow * b);
@@ -136,13 +118,15 @@ nn::Var PinholeCameras(const nn::Var& cameras, int size) {
   if (!cameras.valid()) return cameras;
   nn::Context& context = cameras.context();
   const std::int64_t batch = cameras.shape()[0];
-  nn::Tensor out = context.Empty({batch, 16}, cameras.dtype());
+  nn::Tensor out = context.Empty({batch, kCameraNumbers}, cameras.dtype());
   const nn::Tensor& at = cameras.value();
   nn::WithFloatType(cameras.dtype(), [&]<class T>(T) {
-    for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b)
-      PutPinhole(
-          PinholeOf(InPixels(CameraAt(at.span<T>().data() + kRow * b), size), T(kPinholeDistance)),
-          out.data<T>() + kPinholeRow * b);
+    for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b) {
+      const auto camera = InPixels(CameraAt(at.span<T>().data() + kRow * b), size);
+      T* const row = out.data<T>() + kCameraNumbers * b;
+      ForEachCameraNumber(PinholeOf(camera, T(kPinholeDistance)), row,
+                          [](T from, T& to) { to = from; });
+    }
   });
   auto backward = [at, size, &context](std::span<const nn::Tensor> d) {
     nn::Tensor d_cameras = context.Empty(at.shape(), at.dtype());

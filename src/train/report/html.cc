@@ -10,17 +10,6 @@
 namespace tilegrad::train {
 namespace {
 
-std::string ReplaceAll(std::string_view text, char from, std::string_view to) {
-  std::string out;
-  for (const char c : text) {
-    if (c == from)
-      out += to;
-    else
-      out += c;
-  }
-  return out;
-}
-
 // Scripts put texts on the page as they are: marks of writing direction have to be visible by then.
 nlohmann::ordered_json Shown(nlohmann::ordered_json json) {
   if (json.is_string()) return EscapeControls(json.get_ref<const std::string&>());
@@ -55,9 +44,11 @@ std::string Base64(std::span<const std::uint8_t> bytes) {
 }
 
 std::string ScriptJson(const nlohmann::ordered_json& json) {
-  return ReplaceAll(
-      Shown(json).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace), '<',
-      "\\u003c");
+  const auto replace = nlohmann::ordered_json::error_handler_t::replace;
+  std::string out = Shown(json).dump(-1, ' ', false, replace);
+  for (std::size_t at = out.find('<'); at != std::string::npos; at = out.find('<', at))
+    out.replace(at, 1, "\\u003c");
+  return out;
 }
 
 Result<std::string> PngAddress(const ImageU8& image) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/run/machine.h"
 
-#include <sstream>
+#include <fstream>
 
-#include "base/file.h"
 #include "base/parallel.h"
 #include "base/simd_target.h"
 #include "tilegrad/version.h"
@@ -11,21 +10,13 @@
 namespace tilegrad::train {
 namespace {
 
-// /proc files have no size: read line by line.
 std::string CpuName() {
-  std::FILE* file = std::fopen("/proc/cpuinfo", "r");
-  if (file == nullptr) return "unknown";
-  std::string name = "unknown";
-  for (char line[512]; std::fgets(line, sizeof(line), file) != nullptr;) {
-    const std::string text(line);
-    if (!text.starts_with("model name")) continue;
-    const auto begin = text.find_first_not_of(": \t", text.find(':'));
-    if (begin != std::string::npos)
-      name = text.substr(begin, text.find_last_not_of('\n') - begin + 1);
-    break;
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const auto begin = line.find_first_not_of(": \t", line.find(':'));
+    if (line.starts_with("model name") && begin != std::string::npos) return line.substr(begin);
   }
-  std::fclose(file);
-  return name;
+  return "unknown";
 }
 
 }  // namespace

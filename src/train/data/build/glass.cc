@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/build/glass.h"
 
-#include "scene/keep_faces.h"
+#include "scene/mesh.h"
 
 namespace tilegrad::train {
 

@@ -14,7 +14,6 @@
 #include "base/text.h"
 #include "io/sh3f.h"
 #include "io/text_scan.h"
-#include "scene/keep_faces.h"
 #include "scene/mesh.h"
 #include "scene/shapes.h"
 #include "train/data/sources/package_textures.h"
