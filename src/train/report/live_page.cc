@@ -2,7 +2,6 @@
 #include "train/report/live_page.h"
 
 #include <algorithm>
-#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -31,19 +30,10 @@ constexpr int kRest = 20;  // times what writing took
 constexpr std::chrono::seconds kStale{10};
 constexpr std::size_t kMostMeshes = 60, kMostPictures = 300;
 
-// Files "BEGINNING00001500.ENDING" of a folder.
-Files FilesOfSteps(const Path& folder, const std::string& beginning, const std::string& ending) {
-  Files files;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::string stem = entry.path().stem().string();
-    if (entry.path().extension() != ending || !stem.starts_with(beginning)) continue;
-    std::int64_t step = -1;
-    const char* const end = stem.data() + stem.size();
-    const auto [at, bad] = std::from_chars(stem.data() + beginning.size(), end, step);
-    if (bad == std::errc() && at == end && step >= 0) files[step] = entry.path();
-  }
-  return files;
+// As FilesOfSteps; nothing where the folder cannot be read.
+Files FilesIn(const Path& folder, std::string_view beginning, std::string_view ending) {
+  auto files = FilesOfSteps(folder, beginning, ending);
+  return files.ok() ? std::move(*files) : Files();
 }
 
 // At most so many, the first and the last among them.
@@ -70,8 +60,8 @@ double Seconds(std::chrono::system_clock::duration since) {
 }
 
 Json PictureList(const Path& run) {
-  Files files = FilesOfSteps(run / "samples", "step_", ".png");
-  files.merge(FilesOfSteps(run / "timelapse", "", ".png"));
+  Files files = FilesIn(run / "samples", "step_", ".png");
+  files.merge(FilesIn(run / "timelapse", "", ".png"));
   Json out = Json::array();
   for (const auto& [step, file] : Spread(files, kMostPictures))
     out.push_back({{"step", step}, {"file", file.lexically_relative(run).generic_string()}});
@@ -161,12 +151,12 @@ Result<Json> LivePage::State() const {
 
 // `step`: the last one that was logged.
 Files LivePage::Meshes(std::int64_t step) const {
-  Files files = FilesOfSteps(source_.run / "timelapse", "", ".glb");
+  Files files = FilesIn(source_.run / "timelapse", "", ".glb");
   const Path result = source_.run / "mesh.glb";
   const bool newest = files.empty() || WrittenAt(result) >= WrittenAt(files.rbegin()->second);
   if (IsFile(result) && newest) files[step] = result;
   if (!files.empty() || source_.data.empty()) return Spread(files, kMostMeshes);
-  files = FilesOfSteps(source_.run / "checkpoints", "step_", ".safetensors");
+  files = FilesIn(source_.run / "checkpoints", "step_", ".safetensors");
   if (!files.empty()) files.erase(files.begin(), std::prev(files.end()));
   return files;
 }
@@ -174,7 +164,7 @@ Files LivePage::Meshes(std::int64_t step) const {
 // Those that are new; scripts of others go.
 Json LivePage::WriteMeshes(const Files& files) {
   Json out = Json::array();
-  Files old = FilesOfSteps(folder_, "mesh_", ".js");
+  Files old = FilesIn(folder_, "mesh_", ".js");
   for (const auto& [step, source] : files) {
     const Path script = folder_ / fmt::format("mesh_{:08}.js", step);
     if (broken_.contains(source)) continue;

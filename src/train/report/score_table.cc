@@ -2,6 +2,7 @@
 // The evaluation as a table: a row a class, the methods side by side for each measure.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -98,54 +99,60 @@ std::string NotesHtml(const ReportFacts& facts) {
   return out;
 }
 
-// Table 3 of the paper: a line a method.
-std::string PhotographsHtml(const Evaluation& evaluation) {
-  if (!IsOfPhotographs(evaluation)) return "";
-  std::string lines;
-  for (const auto& row : evaluation.rows) {
-    const std::string pck = row.mean.pck ? fmt::format("{:.3f}", *row.mean.pck) : "–";
-    lines += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"number\">{:.4f}</td>"
-        "<td class=\"number\">{:.3f}</td><td class=\"number\">{}</td></tr>\n",
-        EscapeHtml(row.method), row.mean.texture_l1.value_or(0), row.mean.mask_loss.value_or(0),
-        pck);
-  }
+// A table of errors beside the scores: `columns`, a line a method, what they are.
+std::string SideTable(const char* label, std::span<const char* const> columns,
+                      const std::string& lines, const char* note) {
+  std::string head = "<th scope=\"col\">method</th>";
+  for (const char* column : columns)
+    head += fmt::format("<th scope=\"col\" class=\"number\">{}</th>", column);
   return fmt::format(
-      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Photographs\">"
-      "<table class=\"scores\">\n<thead><tr><th scope=\"col\">method</th>"
-      "<th scope=\"col\" class=\"number\">texture L1</th>"
-      "<th scope=\"col\" class=\"number\">2D IoU loss</th>"
-      "<th scope=\"col\" class=\"number\">PCK@0.1</th></tr></thead>\n"
-      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">Lower is better for the first two, "
-      "higher for PCK: the share of keypoints within a tenth of the box's longer side.</p>\n",
-      lines);
+      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{}\">"
+      "<table class=\"scores\">\n<thead><tr>{}</tr></thead>\n"
+      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">{}</p>\n",
+      label, head, lines, note);
 }
 
-// Texture and light, of tasks that predict them: a line a method.
-std::string LightHtml(const Evaluation& evaluation) {
-  const auto cell = [](const std::optional<double>& value, int digits) {
-    return fmt::format("<td class=\"number\">{}</td>",
+struct SideCell {
+  std::optional<double> value;
+  int digits;
+};
+
+std::string SideLine(const std::string& method, std::initializer_list<SideCell> cells) {
+  std::string out = fmt::format("<tr><th scope=\"row\">{}</th>", EscapeHtml(method));
+  for (const auto& [value, digits] : cells) {
+    out += fmt::format("<td class=\"number\">{}</td>",
                        value ? fmt::format("{:.{}f}", *value, digits) : "–");
-  };
+  }
+  return out + "</tr>\n";
+}
+
+// Table 3 of the paper.
+std::string PhotographsHtml(const Evaluation& evaluation) {
   std::string lines;
   for (const auto& row : evaluation.rows) {
-    if (!row.mean.texture_l1) continue;
-    lines += fmt::format("<tr><th scope=\"row\">{}</th>{}{}{}</tr>\n", EscapeHtml(row.method),
-                         cell(row.mean.texture_l1, 4), cell(row.mean.light_angle, 1),
-                         cell(row.mean.lit_l1, 4));
+    lines += SideLine(row.method, {{row.mean.texture_l1.value_or(0), 4},
+                                   {row.mean.mask_loss.value_or(0), 3},
+                                   {row.mean.pck, 3}});
   }
-  if (lines.empty() || IsOfPhotographs(evaluation)) return "";
-  return fmt::format(
-      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Texture and light\">"
-      "<table class=\"scores\">\n<thead><tr><th scope=\"col\">method</th>"
-      "<th scope=\"col\" class=\"number\">texture L1</th>"
-      "<th scope=\"col\" class=\"number\">light, °</th>"
-      "<th scope=\"col\" class=\"number\">texture + light L1</th></tr></thead>\n"
-      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">L1: mean colour difference over all "
-      "pixels "
-      "of the input view, on a scale of 0 to 1. Light: angle between the predicted and the true "
-      "direction. Lower is better.</p>\n",
-      lines);
+  static constexpr const char* kColumns[] = {"texture L1", "2D IoU loss", "PCK@0.1"};
+  return SideTable("Photographs", kColumns, lines,
+                   "Lower is better for the first two, higher for PCK: the share of keypoints "
+                   "within a tenth of the box's longer side.");
+}
+
+// Texture and light, of tasks that predict them.
+std::string LightHtml(const Evaluation& evaluation) {
+  std::string lines;
+  for (const auto& [method, classes, mean] : evaluation.rows) {
+    if (!mean.texture_l1) continue;
+    lines += SideLine(method, {{mean.texture_l1, 4}, {mean.light_angle, 1}, {mean.lit_l1, 4}});
+  }
+  if (lines.empty()) return "";
+  static constexpr const char* kColumns[] = {"texture L1", "light, °", "texture + light L1"};
+  return SideTable("Texture and light", kColumns, lines,
+                   "L1: mean colour difference over all pixels of the input view, on a scale of 0 "
+                   "to 1. Light: angle between the predicted and the true direction. Lower is "
+                   "better.");
 }
 
 }  // namespace
@@ -174,9 +181,9 @@ std::string ScoresHtml(const ReportFacts& facts) {
   return fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Scores\"><table "
       "class=\"scores\">\n{}<tbody>\n{}</tbody>\n<tfoot>\n{}</tfoot>\n</table></div>\n"
-      "<p class=\"note\">{}</p>{}{}",
-      HeadHtml(evaluation), lines, mean, NotesHtml(facts), LightHtml(evaluation),
-      PhotographsHtml(evaluation));
+      "<p class=\"note\">{}</p>{}",
+      HeadHtml(evaluation), lines, mean, NotesHtml(facts),
+      IsOfPhotographs(evaluation) ? PhotographsHtml(evaluation) : LightHtml(evaluation));
 }
 
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -46,16 +47,6 @@ std::string ChecksumOf(const nn::TensorFile& file) {
     hash.AddBytes(t.value.raw(), t.value.bytes());
   }
   return hash.Text();
-}
-
-// The number in "step_00000012.safetensors"; nothing for files that people put beside them.
-std::optional<std::int64_t> StepOf(const Path& file) {
-  const std::string name = file.filename().string();
-  if (!name.starts_with(kStepPrefix) || !name.ends_with(kStepSuffix)) return std::nullopt;
-  std::int64_t step = 0;
-  const char* end = name.data() + name.size() - kStepSuffix.size();
-  const auto [at, error] = std::from_chars(name.data() + kStepPrefix.size(), end, step);
-  return error == std::errc() && at == end && step >= 0 ? std::optional(step) : std::nullopt;
 }
 
 }  // namespace
@@ -131,20 +122,9 @@ Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
   return Checkpoint{{*step, *image_size, m.at("config"), *seconds}, std::move(file->tensors)};
 }
 
-// As ListCheckpoints. An error where the folder is there and cannot be read: that is not a run
-// without checkpoints.
+// As ListCheckpoints.
 Result<std::vector<Path>> FindFiles(const Path& run) {
-  std::vector<std::pair<std::int64_t, Path>> found;
-  std::error_code error;
-  for (std::filesystem::directory_iterator at(Folder(run), error), end; !error && at != end;
-       at.increment(error)) {
-    if (const auto step = StepOf(at->path())) found.emplace_back(*step, at->path());
-  }
-  if (error && error != std::errc::no_such_file_or_directory) {
-    return IoError("{}: cannot list its files: {}; nothing was changed", Folder(run).string(),
-                   error.message());
-  }
-  std::sort(found.begin(), found.end());
+  TILEGRAD_ASSIGN(auto found, FilesOfSteps(Folder(run), kStepPrefix, kStepSuffix));
   std::vector<Path> files;
   for (auto& [step, path] : found) files.push_back(std::move(path));
   return files;

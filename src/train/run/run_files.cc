@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <string>
 
 #include "base/error.h"
@@ -48,6 +49,24 @@ void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
 }
 
 }  // namespace
+
+Result<std::map<std::int64_t, Path>> FilesOfSteps(const Path& folder, std::string_view beginning,
+                                                  std::string_view ending) {
+  std::map<std::int64_t, Path> files;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (!name.starts_with(beginning) || !name.ends_with(ending)) continue;
+    std::int64_t step = -1;
+    const char* const last = name.data() + name.size() - ending.size();
+    const auto [rest, bad] = std::from_chars(name.data() + beginning.size(), last, step);
+    if (bad == std::errc() && rest == last && step >= 0) files[step] = at->path();
+  }
+  if (!error || error == std::errc::no_such_file_or_directory) return files;
+  return IoError("{}: cannot list its files: {}; nothing was changed", folder.string(),
+                 error.message());
+}
 
 Result<bool> HoldsRun(const Path& folder) {
   for (const char* name : {kTrainSettings, kFitSettings}) {

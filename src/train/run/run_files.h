@@ -3,7 +3,10 @@
 // asking, and a run that starts anew takes them away first.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/file.h"
@@ -12,6 +15,12 @@ namespace tilegrad::train {
 
 inline constexpr const char* kTrainSettings = "config.toml";  // of a training
 inline constexpr const char* kFitSettings = "fit.txt";        // of a fit
+
+// Files BEGINNING00001500ENDING of a folder by their step; files that people put beside them are
+// not. An error where the folder is there and cannot be read: that is not a folder without such
+// files.
+Result<std::map<std::int64_t, Path>> FilesOfSteps(const Path& folder, std::string_view beginning,
+                                                  std::string_view ending);
 
 // Whether it holds a run, which may have done no step yet: settings, or checkpoints.
 Result<bool> HoldsRun(const Path& folder);
