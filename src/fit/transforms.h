@@ -12,7 +12,7 @@ namespace tilegrad::train {
 
 struct TransformsFrame {
   Path image, mask;           // whole paths; mask is empty where there is none
-  bool stored_order = false;  // pixels are counted as the image stores them (io/orientation.h)
+  bool stored_order = false;  // pixels are counted as the image stores them (io/image_file.h)
   io::NerfFrame camera;
   double angle_long = 0;  // radians along the longer side, where no focal length is known; else 0
 };

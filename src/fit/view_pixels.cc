@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
-#include "io/orientation.h"
 #include "train/data/cutout.h"
 
 namespace tilegrad::train {

@@ -66,9 +66,11 @@ struct Header {
 constexpr std::uint64_t kChannelMagic =
     0x746c67642d626f78;  // any number that no other file begins with
 
-bool WriteAt(int fd, std::span<const std::uint8_t> bytes, std::size_t at) {
+// All of `bytes` by pread or pwrite, from a place of the file on.
+template <class Byte, class Call>
+bool AllAt(Call call, int fd, std::span<Byte> bytes, std::size_t at) {
   while (!bytes.empty()) {
-    const ssize_t n = ::pwrite(fd, bytes.data(), bytes.size(), static_cast<off_t>(at));
+    const ssize_t n = call(fd, bytes.data(), bytes.size(), static_cast<off_t>(at));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return false;
     at += static_cast<std::size_t>(n);
@@ -76,16 +78,11 @@ bool WriteAt(int fd, std::span<const std::uint8_t> bytes, std::size_t at) {
   }
   return true;
 }
-
+bool WriteAt(int fd, std::span<const std::uint8_t> bytes, std::size_t at) {
+  return AllAt(::pwrite, fd, bytes, at);
+}
 bool ReadAt(int fd, std::span<std::uint8_t> bytes, std::size_t at) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), static_cast<off_t>(at));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    at += static_cast<std::size_t>(n);
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
+  return AllAt(::pread, fd, bytes, at);
 }
 
 // Above the standard streams, which the child replaces: a program may run with those closed.

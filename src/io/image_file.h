@@ -14,7 +14,16 @@ namespace tilegrad::io {
 // Pixels; a larger header is refused before any memory is taken.
 inline constexpr int kMaxImageSide = 16384;
 
-// Programs that ignore the tag of orientation (orientation.h) count pixels as they are stored.
+// Which way up an image is: cameras store the sensor's rows and say in a tag (Exif 2.32, 4.6.4, tag
+// 274) how to turn them.
+// 1 to 8, of a JPEG's Exif segment, a PNG's eXIf or a WebP's EXIF chunk; 1, upright, where there is
+// none or it makes no sense. `bytes` may be anything.
+int OrientationOf(std::span<const std::uint8_t> bytes);
+
+// The image turned and mirrored so that it is upright. `orientation` is 1 to 8.
+ImageU8 Upright(ImageU8 image, int orientation);
+
+// Programs that ignore the tag of orientation count pixels as they are stored.
 enum class PixelOrder { kUpright, kStored };
 
 // 1 to 4 channels as in the file (16-bit files are reduced to 8; CMYK becomes RGB). `name` stands
@@ -24,7 +33,7 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
                             PixelOrder order = PixelOrder::kUpright);
 Result<ImageU8> LoadImage(const Path& path, PixelOrder order = PixelOrder::kUpright);
 
-// As its file stores it, and how that is to be turned (orientation.h).
+// As its file stores it, and how that is to be turned.
 struct StoredImage {
   ImageU8 image;
   int orientation = 1;

@@ -2,7 +2,6 @@
 #include "io/mesh_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -18,6 +17,7 @@
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
+#include "io/text_scan.h"
 #include "scene/shapes.h"
 #include "scene/triangulate.h"
 
@@ -25,35 +25,25 @@ namespace tilegrad::io {
 namespace {
 
 struct Format {
-  std::string_view ending;
+  std::string_view endings;  // each between spaces
   Result<LoadedMesh> (*read)(const FileSource& source, const std::string& name);
 };
 // Assimp's importers run in a process of their own; the list holds those that read a sound file
 // right (tests/io/assimp_formats_test.cc).
-constexpr std::array<Format, 18> kFormats = {{{".glb", ReadGltf},
-                                              {".gltf", ReadGltf},
-                                              {".obj", ReadObj},
-                                              {".ply", ReadPly},
-                                              {".off", ReadOff},
-                                              {".ac", ReadAc3d},
-                                              {".acc", ReadAc3d},
-                                              {".stl", ReadByAssimp},
-                                              {".3ds", ReadByAssimp},
-                                              {".dae", ReadByAssimp},
-                                              {".fbx", ReadByAssimp},
-                                              {".3mf", ReadByAssimp},
-                                              {".x", ReadByAssimp},
-                                              {".x3d", ReadByAssimp},
-                                              {".ase", ReadByAssimp},
-                                              {".lwo", ReadByAssimp},
-                                              {".ms3d", ReadByAssimp},
-                                              {".md2", ReadByAssimp}}};
+constexpr Format kFormats[] = {
+    {" .glb .gltf ", ReadGltf},
+    {" .obj ", ReadObj},
+    {" .ply ", ReadPly},
+    {" .off ", ReadOff},
+    {" .ac .acc ", ReadAc3d},
+    {" .stl .3ds .dae .fbx .3mf .x .x3d .ase .lwo .ms3d .md2 ", ReadByAssimp}};
 
 const Format* FindFormat(const std::string& name) {
-  const std::string ending = MeshEnding(name);
-  const auto* found = std::find_if(kFormats.begin(), kFormats.end(),
-                                   [&](const Format& f) { return f.ending == ending; });
-  return found == kFormats.end() ? nullptr : found;
+  const std::string ending = " " + MeshEnding(name) + " ";
+  const auto* found = std::find_if(std::begin(kFormats), std::end(kFormats), [&](const Format& f) {
+    return f.endings.find(ending) != std::string_view::npos;
+  });
+  return found == std::end(kFormats) ? nullptr : found;
 }
 
 std::string Folder(const std::string& name) {
@@ -336,9 +326,9 @@ std::string MeshEnding(const std::string& name) {
 
 std::string MeshFileEndings() {
   std::string list;
-  for (const Format& format : kFormats) {
-    list += list.empty() ? "" : ", ";
-    list += format.ending;
+  for (auto [rest, read] : kFormats) {
+    for (auto ending = NextToken(rest); !ending.empty(); ending = NextToken(rest))
+      list.append(list.empty() ? "" : ", ").append(ending);
   }
   return list;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/light_frame.h"
 
+#include <algorithm>
 #include <numbers>
 
 namespace tilegrad {
@@ -62,10 +63,10 @@ std::array<float, 3> DirectionToWorld(const std::array<float, 3>& direction, con
 
 std::array<float, 9> HarmonicsToWorld(const std::array<float, 9>& sh, const Camera& camera) {
   std::array<double, 9> in;
-  for (std::size_t i = 0; i < 9; ++i) in[i] = sh[i];
-  const std::array<double, 9> turned = HarmonicsToWorld(in, camera);
+  std::copy(sh.begin(), sh.end(), in.begin());
   std::array<float, 9> out;
-  for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(turned[i]);
+  std::ranges::transform(HarmonicsToWorld(in, camera), out.begin(),
+                         [](double x) { return static_cast<float>(x); });
   return out;
 }
 

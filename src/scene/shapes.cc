@@ -240,14 +240,13 @@ void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 off
   for (glm::vec3& n : mesh.corner_normals) turn(n);
   if (!mirrored) return;
   // A mirror turns faces inside out: restore counter-clockwise order, corners' attributes with it.
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    std::swap(mesh.faces[f][1], mesh.faces[f][2]);
-    if (!mesh.corner_uvs.empty()) std::swap(mesh.corner_uvs[3 * f + 1], mesh.corner_uvs[3 * f + 2]);
-    if (!mesh.corner_colors.empty())
-      std::swap(mesh.corner_colors[3 * f + 1], mesh.corner_colors[3 * f + 2]);
-    if (!mesh.corner_normals.empty())
-      std::swap(mesh.corner_normals[3 * f + 1], mesh.corner_normals[3 * f + 2]);
-  }
+  for (Face& face : mesh.faces) std::swap(face[1], face[2]);
+  const auto turn_corners = [](auto& values) {
+    for (std::size_t i = 0; i < values.size(); i += 3) std::swap(values[i + 1], values[i + 2]);
+  };
+  turn_corners(mesh.corner_uvs);
+  turn_corners(mesh.corner_colors);
+  turn_corners(mesh.corner_normals);
 }
 
 std::vector<glm::vec3> SmoothNormals(const Mesh& mesh) {

@@ -6,7 +6,6 @@
 #include <array>
 
 #include "io/image_file.h"
-#include "io/orientation.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::image_people_test {

@@ -2,6 +2,7 @@
 #include "train/models/photograph_network.h"
 
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "base/error.h"
 #include "nn/nn.h"
@@ -17,13 +18,10 @@ constexpr double kLeastReach = 0.12;     // a hull that is flat or thin is fille
 constexpr double kKeypointNearness = 8;  // of a keypoint's weights: exp(-(this * distance)^2)
 constexpr std::int64_t kWeakCameraNumbers = 7;
 
-double Determinant(const KeypointPlace& a, const KeypointPlace& b, const KeypointPlace& c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
+glm::dvec3 VectorOf(const KeypointPlace& p) { return {p[0], p[1], p[2]}; }
 
-KeypointPlace Minus(const KeypointPlace& a, const KeypointPlace& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+double Determinant(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  return glm::dot(a, glm::cross(b, c));
 }
 
 KeypointPlace Middle(const std::vector<KeypointPlace>& points) {
@@ -49,13 +47,12 @@ double HullReach(const std::vector<KeypointPlace>& points, const KeypointPlace& 
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = i + 1; j < points.size(); ++j) {
       for (std::size_t k = j + 1; k < points.size(); ++k) {
-        const KeypointPlace a = Minus(points[i], centre), u = Minus(points[j], points[i]),
-                            v = Minus(points[k], points[i]);
-        const KeypointPlace back = {-direction[0], -direction[1], -direction[2]};
-        // a + s u + r v = t direction, by Cramer's rule
+        const glm::dvec3 p = VectorOf(points[i]), u = VectorOf(points[j]) - p,
+                         v = VectorOf(points[k]) - p, back = -VectorOf(direction);
+        // p - centre + s u + r v = t direction, by Cramer's rule
         const double all = Determinant(u, v, back);
         if (std::abs(all) < 1e-12) continue;
-        const KeypointPlace to = {-a[0], -a[1], -a[2]};
+        const glm::dvec3 to = -(p - VectorOf(centre));
         const double s = Determinant(to, v, back) / all, r = Determinant(u, to, back) / all,
                      t = Determinant(u, v, to) / all;
         if (s >= -1e-9 && r >= -1e-9 && s + r <= 1 + 1e-9) reach = std::max(reach, t);

@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "base/aligned.h"
-#include "train/ranks/bucket_layout.h"
-#include "train/ranks/portion_tree.h"
+#include "train/ranks/division.h"
 #include "train/ranks/transport.h"
 
 namespace tilegrad::train {

@@ -11,9 +11,8 @@
 #include "base/aligned.h"
 #include "nn/tape.h"
 #include "nn/tensor.h"
-#include "train/ranks/bucket_layout.h"
+#include "train/ranks/division.h"
 #include "train/ranks/exchange.h"
-#include "train/ranks/portion_tree.h"
 #include "train/ranks/weight_share.h"
 
 namespace tilegrad::train {

@@ -3,7 +3,10 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <vector>
 
+#include "base/file.h"
 #include "tilegrad/status.h"
 #include "train/ranks/transport.h"
 
@@ -21,5 +24,21 @@ Result<std::unique_ptr<Transport>> ConnectRanks();
 // the rank is kept to its own, unless more workers were asked for than those have cores for. To be
 // called before there are threads and data.
 int PlaceRank(int asked);
+
+// Where a rank works, on machines of several NUMA nodes: memory belongs to the node whose core
+// first touches it, so a rank keeps to one node, or to as few as it needs.
+
+using Cores = std::vector<int>;  // by the kernel's numbers
+
+// The cores of each node, as /sys/devices/system/node says; empty where it does not.
+std::vector<Cores> NumaNodes(const Path& folder = "/sys/devices/system/node");
+
+struct RankPlace {
+  Cores cores;      // of whole nodes
+  int workers = 0;  // that these cores have for each of the ranks on them, at least 1
+};
+// Of rank `local` of `ranks` on one machine: neighbours share a node where there are more ranks
+// than nodes, and have several where there are fewer.
+RankPlace PlaceOf(std::span<const Cores> nodes, int local, int ranks);
 
 }  // namespace tilegrad::train

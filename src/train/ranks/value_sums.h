@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "train/ranks/portion_tree.h"
+#include "train/ranks/division.h"
 #include "train/ranks/transport.h"
 
 namespace tilegrad::train {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "nn/optim.h"
-#include "train/ranks/bucket_layout.h"
+#include "train/ranks/division.h"
 #include "train/ranks/exchange.h"
 
 namespace tilegrad::train {

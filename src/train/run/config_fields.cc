@@ -191,11 +191,6 @@ std::string TomlText(const Target& target) {
   return whole ? text + ".0" : text;
 }
 
-std::string TableOf(const ConfigField& field) {
-  const auto dot = field.key.rfind('.');
-  return dot == std::string::npos ? "" : field.key.substr(0, dot);
-}
-
 std::string FieldLine(const ConfigField& field) {
   const std::string setting = fmt::format("{} = {}", LastPart(field.key), TomlText(field.target));
   return fmt::format("{:<36}  # {}\n", setting, field.help);
@@ -271,7 +266,7 @@ Status CheckFields(const ConfigFields& fields) {
 std::string WriteFields(const ConfigFields& fields) {
   std::vector<std::pair<std::string, std::string>> tables = {{"", ""}};  // name, lines
   for (const ConfigField& field : fields) {
-    const std::string table = TableOf(field);
+    const std::string table(TablePart(field.key));
     auto at = std::find_if(tables.begin(), tables.end(),
                            [&](const auto& known) { return known.first == table; });
     if (at == tables.end()) at = tables.insert(at, {table, ""});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Machines of several NUMA nodes as the kernel would describe them.
-#include "train/ranks/placement.h"
+#include "train/ranks/launch.h"
 
 #include <gtest/gtest.h>
 #include <sched.h>
