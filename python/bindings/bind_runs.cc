@@ -13,7 +13,7 @@
 #include "fit/bare_frames.h"
 #include "fit/poses/start_cameras.h"
 #include "fit/run.h"
-#include "train/named_configs.h"
+#include "train/config.h"
 #include "train/trainer.h"
 
 namespace tilegrad::python {

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "train/named_configs.h"
+#include "train/config.h"
 
 namespace tilegrad::cli {
 namespace {

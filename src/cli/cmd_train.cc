@@ -11,7 +11,7 @@
 #include "cli/live_option.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
-#include "train/named_configs.h"
+#include "train/config.h"
 #include "train/trainer.h"
 
 namespace tilegrad::cli {

@@ -16,7 +16,7 @@
 #include "base/text.h"
 #include "cli/render_job.h"
 #include "tilegrad/version.h"
-#include "train/named_configs.h"
+#include "train/config.h"
 
 namespace tilegrad::cli {
 namespace {

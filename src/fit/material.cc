@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "io/glb_writer.h"
-#include "scene/harmonics.h"
+#include "scene/light_frame.h"
 
 namespace tilegrad::train {
 namespace {

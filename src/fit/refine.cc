@@ -14,7 +14,7 @@
 #include "fit/input.h"
 #include "fit/score.h"
 #include "scene/camera_conventions.h"
-#include "scene/subdivide.h"
+#include "scene/shapes.h"
 #include "train/data/batches.h"
 #include "train/models/sphere_model.h"
 

@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "fit/run.h"
-#include "train/report/assets.h"
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/run/log.h"

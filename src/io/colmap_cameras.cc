@@ -16,7 +16,6 @@
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
-
 namespace {
 
 using Bend = LensDistortion::Model;

@@ -33,7 +33,6 @@
 #include "base/shortage.h"
 
 namespace tilegrad::io {
-
 namespace {
 
 // Between parent and child: questions and notes go over a packet socket, contents through a memory

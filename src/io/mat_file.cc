@@ -8,7 +8,6 @@
 #include "base/error.h"
 
 namespace tilegrad::io {
-
 namespace {
 
 const char* KindName(MatKind kind) {

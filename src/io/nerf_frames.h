@@ -10,7 +10,6 @@
 // takes none from there. null is as good as nothing, 0 is a number.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,8 +31,6 @@ struct NerfFrame {
 
 // Errors name the file, the frame and the key. At least one frame.
 Result<std::vector<NerfFrame>> ReadNerfFrames(const Path& file);
-// Of the file's parsed text, an object.
-Result<std::vector<NerfFrame>> NerfFramesOf(const nlohmann::json& top, const Path& file);
 
 // The camera of an image of this many pixels, which the frame's numbers are meant for.
 Result<Camera64> CameraOf(const NerfFrame& frame, ImageSize size);

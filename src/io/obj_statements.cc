@@ -17,7 +17,6 @@
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
-
 namespace {
 
 // Walks over statements: comments and empty lines are left out, lines that end with a backslash are

@@ -8,7 +8,6 @@
 #include "io/image_check.h"
 
 namespace tilegrad::io {
-
 namespace {
 
 using ByteSpan = std::span<const std::uint8_t>;

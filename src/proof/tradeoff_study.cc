@@ -9,7 +9,7 @@
 #include "proof/tradeoff.h"
 #include "scene/camera.h"
 #include "scene/shapes.h"
-#include "train/named_configs.h"
+#include "train/config.h"
 #include "train/predictor.h"
 #include "train/report/log_plot.h"
 #include "train/trainer.h"

@@ -3,6 +3,7 @@
 // from outside, y up, with positions and faces only; colour them with SetColor.
 #pragma once
 
+#include "base/function_ref.h"
 #include "scene/mesh.h"
 
 namespace tilegrad {
@@ -36,5 +37,14 @@ void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 off
 // Per-vertex unit normals: the area-weighted sum of the adjacent faces' normals; (0, 0, 1) where
 // that is zero.
 std::vector<glm::vec3> SmoothNormals(const Mesh& mesh);
+
+// `middle(a, b)` makes the vertex between a < b, once for each edge in order of first use, and
+// returns its index. Face (a, b, c) becomes those at a, b and c, then the one in the middle.
+std::vector<Face> SplitFaces(const std::vector<Face>& faces,
+                             FunctionRef<std::int32_t(std::int32_t a, std::int32_t b)> middle);
+
+// `mesh` with every face divided; new positions, vertex colours and texture coordinates are the
+// means of their edge's ends. A single material and its textures stay; other arrays are left out.
+Mesh Subdivided(const Mesh& mesh);
 
 }  // namespace tilegrad

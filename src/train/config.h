@@ -10,6 +10,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,5 +38,19 @@ Result<TrainConfig> ParseConfig(std::string_view text,
 Status ApplyOverrides(const std::vector<std::string>& assignments, TrainConfig* config);
 // Complete, with a comment on each key; reading it back gives the same configuration.
 std::string WriteConfig(const TrainConfig& config);
+
+// Of configs/, compiled in: a program that was installed, or moved, knows them.
+struct NamedConfig {
+  std::string_view name, text;  // "quick", and the file that has it
+};
+// Sorted by name.
+std::span<const NamedConfig> NamedConfigs();
+// NotFound lists the names.
+Result<NamedConfig> ConfigNamed(std::string_view name);
+
+// The file of that path; if there is none, the configuration of that name. So "quick" is found
+// wherever the program runs, and a file "quick" in the current folder goes before it. Errors as of
+// ReadConfig; NotFound lists the names.
+Result<TrainConfig> FindConfig(const std::string& path_or_name);
 
 }  // namespace tilegrad::train

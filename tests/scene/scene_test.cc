@@ -8,7 +8,6 @@
 
 #include "scene/camera.h"
 #include "scene/shapes.h"
-#include "scene/subdivide.h"
 #include "scene/topology.h"
 #include "scene/triangulate.h"
 

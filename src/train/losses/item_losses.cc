@@ -17,7 +17,6 @@
 #include "train/losses/smoothness.h"
 
 namespace tilegrad::train {
-
 namespace {
 
 // `value` as a scalar Var whose gradient with respect to `input` is `gradient`, computed beforehand

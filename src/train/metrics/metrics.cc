@@ -11,7 +11,6 @@
 #include "train/metrics/nearest_point.h"
 
 namespace tilegrad::train {
-
 namespace {
 
 struct OneWay {

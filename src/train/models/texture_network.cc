@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "scene/harmonics.h"
+#include "scene/light_frame.h"
 
 namespace tilegrad::train {
 namespace {

@@ -2,7 +2,6 @@
 #include "train/ranks/division.h"
 
 namespace tilegrad::train {
-
 namespace {
 
 constexpr std::size_t kMostBuckets = 4000;  // Address::number counts them

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Means over the portions of a batch, of gradients and running statistics: those of this process
-// are summed as they come, those of other ranks meanwhile, all in the order of one tree.
+// Sums over the portions of a batch, those of this process and of other ranks, in the order of one
+// tree: of gradients and running statistics, and of losses.
 #pragma once
 
 #include <functional>
@@ -13,10 +13,13 @@
 #include "nn/tensor.h"
 #include "train/ranks/division.h"
 #include "train/ranks/exchange.h"
+#include "train/ranks/transport.h"
 #include "train/ranks/weight_share.h"
 
 namespace tilegrad::train {
 
+// Means of gradients and running statistics: those of this process are summed as they come, those
+// of other ranks meanwhile.
 class GradientSums : public nn::GradientListener {
  public:
   struct Shape {
@@ -81,6 +84,30 @@ class GradientSums : public nn::GradientListener {
   double seconds_waited_ = 0;
   std::unique_ptr<Exchange> exchange_;  // with other ranks
   std::unique_ptr<WeightShare> share_;
+};
+
+// Of a few numbers of double precision, as losses are. Rank 0 gets those of all.
+class ValueSums {
+ public:
+  ValueSums(std::int64_t portions, Transport* ranks);
+
+  void BeginUpdate() {
+    subtree_ = 0;
+    leaf_ = 0;
+  }
+  // Of each portion of this rank in turn; as many numbers every time, on every rank.
+  void Add(std::span<const double> numbers);
+  // On rank 0 the sums of all portions, else nothing. `meanwhile` as for Await; after a false the
+  // result means nothing.
+  std::span<const double> Finish(const std::function<bool()>& meanwhile);
+
+ private:
+  Transport* ranks_;  // null: this is the only one
+  std::vector<Subtree> subtrees_, scratch_;
+  std::vector<std::size_t> own_;                    // of subtrees_
+  std::vector<std::vector<double>> rows_, levels_;  // of subtrees_; of the one in the making
+  std::size_t subtree_ = 0;                         // in own_: where the next portion belongs
+  std::int64_t leaf_ = 0;                           // which of its leaves
 };
 
 }  // namespace tilegrad::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text that is safe to put into a page.
+// Pages: their files, and text that is safe to put into them.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,11 @@
 #include "tilegrad/status.h"
 
 namespace tilegrad::train {
+
+// Compiled in: report.html with {{placeholders}}, report.css, report.js.
+extern const std::string_view kReportHtml, kReportCss, kReportJs;
+// What all pages draw with, the live page, and that of a fit.
+extern const std::string_view kPartsJs, kLiveHtml, kLiveJs, kFitHtml;
 
 // 3214902 as "3,214,902".
 std::string WithCommas(std::int64_t number);

@@ -9,7 +9,6 @@
 #include "io/mesh_file.h"
 #include "train/config.h"
 #include "train/predictor.h"
-#include "train/report/assets.h"
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/run/checkpoint.h"

@@ -7,7 +7,6 @@
 #include "base/file.h"
 #include "io/image_file.h"
 #include "train/predictor.h"
-#include "train/report/assets.h"
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/report/sections.h"

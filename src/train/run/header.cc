@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/run/header.h"
 
+#include <fstream>
 #include <limits>
 
+#include "base/parallel.h"
+#include "base/simd_target.h"
+#include "tilegrad/version.h"
 #include "train/json_fields.h"
 
 namespace tilegrad::train {
@@ -15,6 +19,15 @@ std::vector<std::pair<std::string, std::string>> TextsIn(const nlohmann::json& j
   for (const auto& [name, value] : json[key].items())
     out.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
   return out;
+}
+
+std::string CpuName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const auto begin = line.find_first_not_of(": \t", line.find(':'));
+    if (line.starts_with("model name") && begin != std::string::npos) return line.substr(begin);
+  }
+  return "unknown";
 }
 
 }  // namespace
@@ -47,6 +60,19 @@ Result<RunHeader> ReadHeader(const Path& run) {
   for (const auto& [key, value] : TextsIn(json, "machine")) header.machine.emplace_back(key, value);
   for (const auto& [name, label] : TextsIn(json, "labels")) header.labels.emplace(name, label);
   return header;
+}
+
+std::vector<std::pair<std::string, std::string>> DescribeMachine() {
+#if defined(__clang__)
+  const std::string compiler = "clang " __clang_version__;
+#else
+  const std::string compiler = "g++ " __VERSION__;
+#endif
+  return {{"version", TILEGRAD_VERSION},
+          {"compiler", compiler},
+          {"cpu", CpuName()},
+          {"cores", std::to_string(AvailableCores())},
+          {"simd", ActiveTarget()}};
 }
 
 }  // namespace tilegrad::train

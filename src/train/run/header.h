@@ -28,4 +28,8 @@ Status WriteHeader(const Path& run, const RunHeader& header);
 // Errors name the file and the key or line.
 Result<RunHeader> ReadHeader(const Path& run);
 
+// What a result depends on besides configuration and data, as name and value: version, compiler,
+// CPU, cores, SIMD target.
+std::vector<std::pair<std::string, std::string>> DescribeMachine();
+
 }  // namespace tilegrad::train

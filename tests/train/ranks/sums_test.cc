@@ -9,7 +9,6 @@
 #include "train/ranks/gradient_sums.h"
 #include "train/ranks/messages.h"
 #include "train/ranks/share.h"
-#include "train/ranks/value_sums.h"
 #include "train/ranks/weight_share.h"
 
 namespace tilegrad::train::sums_test {

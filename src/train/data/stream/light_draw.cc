@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "scene/harmonics.h"
+#include "scene/light_frame.h"
 
 namespace tilegrad::train {
 namespace {

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "train/metrics/neighbours.h"
 #include "train/metrics/set_scores.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/watch.h"

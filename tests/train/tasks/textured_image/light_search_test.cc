@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "scene/camera.h"
-#include "scene/harmonics.h"
+#include "scene/light_frame.h"
 #include "train/tasks/textured_image/step.h"
 
 namespace tilegrad::train::light_search_test {
