@@ -58,8 +58,8 @@ py::dict LoadMesh(const Path& path, std::size_t max_bytes) {
 void SaveMesh(const Path& path, const py::dict& dict) {
   const Mesh mesh = MeshFromDict("save_mesh", dict);
   const auto o = py::cast<std::array<double, 3>>(dict["origin"]);
-  const glm::dvec3 origin(o[0], o[1], o[2]);
-  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh, origin).Within(path.string()); }));
+  const io::GlbOptions options{.origin = {o[0], o[1], o[2]}};
+  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh, options).Within(path.string()); }));
 }
 
 constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};

@@ -281,7 +281,7 @@ Status SaveResult(const train::Predictor& predictor, std::span<const std::uint8_
   if (!lit) return io::SaveGlb(glb, *mesh);
   for (Material& material : mesh->materials) material.unlit = false;
   const auto& model = *predictor.model().textured();
-  return io::SaveLitGlb(glb, *mesh, SunOf(*lit, model.config().light));
+  return io::SaveGlb(glb, *mesh, {.sun = SunOf(*lit, model.config().light)});
 }
 
 // Before anything is predicted.

@@ -114,7 +114,7 @@ Status SaveFittedGlb(const Path& file, const FitScene& scene) {
   FitScene shown = scene;
   Multiply(shown.texture.pixels, main->facing);
   Multiply(shown.colors, main->facing);
-  return io::SaveLitGlb(file, MeshOfScene(shown), main->direction);
+  return io::SaveGlb(file, MeshOfScene(shown), {.sun = main->direction});
 }
 
 }  // namespace tilegrad::train

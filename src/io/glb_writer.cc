@@ -272,7 +272,9 @@ Status CheckLinearColors(const Mesh& mesh) {
 
 // A node whose z axis points to the sun: lights shine along -z. Illuminance pi of a white surface
 // is what looks white.
-void AddSun(GlbBuilder& glb, const glm::dvec3& sun) {
+Status AddSun(GlbBuilder& glb, const glm::dvec3& sun) {
+  if (!(glm::length(sun) > 0) || !std::isfinite(glm::length(sun)))
+    return InvalidArgument("the direction of the sun is ({}, {}, {})", sun.x, sun.y, sun.z);
   const glm::dvec3 to = sun / glm::length(sun);
   // Half-way quaternion from (0, 0, 1); from behind half a turn about x.
   glm::dvec4 q(-to.y, to.x, 0, 1 + to.z);
@@ -284,6 +286,7 @@ void AddSun(GlbBuilder& glb, const glm::dvec3& sun) {
                                {"rotation", {q.x, q.y, q.z, q.w}},
                                {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
   glb.json["scenes"][0]["nodes"].push_back(1);
+  return {};
 }
 
 Status AddScene(GlbBuilder& glb, const Mesh& mesh, const glm::dvec3& origin) {
@@ -309,28 +312,15 @@ Status AddScene(GlbBuilder& glb, const Mesh& mesh, const glm::dvec3& origin) {
 
 }  // namespace
 
-Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
+Result<Bytes> EncodeGlb(const Mesh& mesh, const GlbOptions& options) {
   GlbBuilder glb;
-  TILEGRAD_TRY(AddScene(glb, mesh, origin));
+  TILEGRAD_TRY(AddScene(glb, mesh, options.origin));
+  if (options.sun) TILEGRAD_TRY(AddSun(glb, *options.sun));
   return AssembleGlb(glb);
 }
 
-Result<Bytes> EncodeLitGlb(const Mesh& mesh, const glm::dvec3& sun) {
-  if (!(glm::length(sun) > 0) || !std::isfinite(glm::length(sun)))
-    return InvalidArgument("the direction of the sun is ({}, {}, {})", sun.x, sun.y, sun.z);
-  GlbBuilder glb;
-  TILEGRAD_TRY(AddScene(glb, mesh, glm::dvec3(0)));
-  AddSun(glb, sun);
-  return AssembleGlb(glb);
-}
-
-Status SaveLitGlb(const Path& path, const Mesh& mesh, const glm::dvec3& sun) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeLitGlb(mesh, sun));
-  return WriteFileAtomic(path, bytes);
-}
-
-Status SaveGlb(const Path& path, const Mesh& mesh, const glm::dvec3& origin) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh, origin));
+Status SaveGlb(const Path& path, const Mesh& mesh, const GlbOptions& options) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh, options));
   return WriteFileAtomic(path, bytes);
 }
 

@@ -167,18 +167,15 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   return image;
 }
 
-Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::string& name,
-                            PixelOrder order) {
+// As stored.
+Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::string& name) {
   if (bytes.size() > std::size_t{1} << 30)
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   if (IsPnm(bytes)) return DecodePnm(bytes, name);
   if (IsSgi(bytes)) return DecodeSgi(bytes, name);
   TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
   const auto padded = WithFullPalette(bytes);
-  TILEGRAD_ASSIGN(ImageU8 image,
-                  Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name));
-  return order == PixelOrder::kStored ? std::move(image)
-                                      : Upright(std::move(image), OrientationOf(bytes));
+  return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
 }
 
 }  // namespace
@@ -208,25 +205,23 @@ ImageU8 Upright(ImageU8 image, int orientation) {
   return out;
 }
 
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name,
-                            PixelOrder order) {
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
   if (GuardedMustStop()) return Cancelled("{}: stopped", name);
-  return DecodeBytes(bytes, name, order);
+  TILEGRAD_ASSIGN(ImageU8 image, DecodeBytes(bytes, name));
+  return Upright(std::move(image), OrientationOf(bytes));
 }
 
 Result<StoredImage> LoadStoredImage(const Path& path) {
   const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
-  TILEGRAD_ASSIGN(ImageU8 image, IsWebp(bytes)
-                                     ? DecodeWebp(bytes, path.string())
-                                     : DecodeBytes(bytes, path.string(), PixelOrder::kStored));
+  const auto decode = IsWebp(bytes) ? DecodeWebp : DecodeBytes;
+  TILEGRAD_ASSIGN(ImageU8 image, decode(bytes, path.string()));
   return StoredImage{std::move(image), OrientationOf(bytes)};
 }
 
-Result<ImageU8> LoadImage(const Path& path, PixelOrder order) {
+Result<ImageU8> LoadImage(const Path& path) {
   TILEGRAD_ASSIGN(StoredImage stored, LoadStoredImage(path));
-  return order == PixelOrder::kStored ? std::move(stored.image)
-                                      : Upright(std::move(stored.image), stored.orientation);
+  return Upright(std::move(stored.image), stored.orientation);
 }
 
 ImageU8 ToColor(ImageU8 image) {

@@ -14,26 +14,21 @@ namespace tilegrad::io {
 // Pixels; a larger header is refused before any memory is taken.
 inline constexpr int kMaxImageSide = 16384;
 
-// Which way up an image is: cameras store the sensor's rows and say in a tag (Exif 2.32, 4.6.4, tag
-// 274) how to turn them.
-// 1 to 8, of a JPEG's Exif segment, a PNG's eXIf or a WebP's EXIF chunk; 1, upright, where there is
-// none or it makes no sense. `bytes` may be anything.
+// How to turn an image upright: cameras store the sensor's rows and say it in a tag (Exif 2.32,
+// 4.6.4, tag 274). 1 to 8, of a JPEG's Exif segment, a PNG's eXIf or a WebP's EXIF chunk; 1,
+// upright, where there is none or it makes no sense. `bytes` may be anything.
 int OrientationOf(std::span<const std::uint8_t> bytes);
 
 // The image turned and mirrored so that it is upright. `orientation` is 1 to 8.
 ImageU8 Upright(ImageU8 image, int orientation);
 
-// Programs that ignore the tag of orientation count pixels as they are stored.
-enum class PixelOrder { kUpright, kStored };
-
 // 1 to 4 channels as in the file (16-bit files are reduced to 8; CMYK becomes RGB). `name` stands
 // in error messages. DecodeImage, of what other files hold, reads no WebP, and is kCancelled where
 // they are not to be read on (StopGuardedBy).
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name,
-                            PixelOrder order = PixelOrder::kUpright);
-Result<ImageU8> LoadImage(const Path& path, PixelOrder order = PixelOrder::kUpright);
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
+Result<ImageU8> LoadImage(const Path& path);
 
-// As its file stores it, and how that is to be turned.
+// As its file stores it, in which programs count pixels that ignore the tag, and how to turn it.
 struct StoredImage {
   ImageU8 image;
   int orientation = 1;

@@ -15,7 +15,7 @@ namespace tilegrad::fuzz::mesh_targets {
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 
 void RoundTrip(const Mesh& mesh, const glm::dvec3& origin) {
-  const auto glb = io::EncodeGlb(mesh, origin);
+  const auto glb = io::EncodeGlb(mesh, {.origin = origin});
   Require(glb.ok(), "a mesh that was read can be written");
   const MemorySource source("again.glb", *glb);
   const auto again = io::LoadMesh(source, "again.glb");
@@ -79,8 +79,8 @@ std::vector<Bytes> GltfSeeds() {
       R"("buffers":[{"byteLength":44,"uri":"data:application/octet-stream;base64,)" +
       std::string(kTriangleBuffer) + R"("}]})";
   const Bytes png = *io::EncodePng(ImageU8(2, 2, 3, 7));
-  return {*io::EncodeGlb(SampleMesh()), *io::EncodeGlb(TexturedMesh(), {1e6, 0, 0}),
-          *io::EncodeLitGlb(SampleMesh(), {1, 1, 1}), ToBytes(json),
+  return {*io::EncodeGlb(SampleMesh()), *io::EncodeGlb(TexturedMesh(), {.origin = {1e6, 0, 0}}),
+          *io::EncodeGlb(SampleMesh(), {.sun = glm::dvec3(1, 1, 1)}), ToBytes(json),
           JoinFiles({json, std::string(png.begin(), png.end())})};
 }
 

@@ -138,7 +138,7 @@ TEST_F(GltfScene, LightsPointToTheSun) {
   triangle.faces = {{0, 1, 2}};
   for (const glm::dvec3& sun :
        {glm::dvec3(0, 0, 2), {0, 0, -1}, {1, 2, -3}, {-0.1, 0, -0.9}, {0, 1, 0}}) {
-    const auto bytes = Ok(io::EncodeLitGlb(triangle, sun));
+    const auto bytes = Ok(io::EncodeGlb(triangle, {.sun = sun}));
     std::uint32_t length = 0;
     std::memcpy(&length, bytes->data() + 12, 4);
     const json scene = json::parse(bytes->begin() + 20, bytes->begin() + 20 + length);
@@ -151,8 +151,8 @@ TEST_F(GltfScene, LightsPointToTheSun) {
     const auto loaded = Ok(io::LoadMesh(folder_ / "lit.glb"));
     EXPECT_EQ(loaded->mesh.positions.size(), 3u);
   }
-  EXPECT_FALSE(io::EncodeLitGlb(triangle, glm::dvec3(0)).ok());
-  EXPECT_FALSE(io::EncodeLitGlb({}, glm::dvec3(0, 1, 0)).ok());
+  EXPECT_FALSE(io::EncodeGlb(triangle, {.sun = glm::dvec3(0)}).ok());
+  EXPECT_FALSE(io::EncodeGlb({}, {.sun = glm::dvec3(0, 1, 0)}).ok());
 }
 
 }  // namespace tilegrad::gltf_scene_test

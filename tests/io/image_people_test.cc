@@ -49,31 +49,39 @@ Bytes LetterPng(const std::string& exif) {
   return ToBytes(text);
 }
 
-std::string Letters(const Bytes& png, PixelOrder order = PixelOrder::kUpright) {
-  const auto image = DecodeImage(png, "a.png", order);
-  if (!image.ok()) return image.status().message();
+std::string LettersOf(const ImageU8& image) {
   std::string out;
-  for (int y = 0; y < image->height; ++y) {
-    for (int x = 0; x < image->width; ++x) out += static_cast<char>(image->at(x, y)[0]);
-    out += y + 1 < image->height ? "/" : "";
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) out += static_cast<char>(image.at(x, y)[0]);
+    out += y + 1 < image.height ? "/" : "";
   }
   return out;
 }
 
+std::string Letters(const Bytes& png) {
+  const auto image = DecodeImage(png, "a.png");
+  return image.ok() ? LettersOf(*image) : image.status().message();
+}
+
+class Orientation : public TempFolderTest {};
+
 // As Exif 2.32 says where row 0 and column 0 of the stored image are to be seen.
-TEST(Orientation, AllEight) {
+TEST_F(Orientation, AllEight) {
   const std::array<const char*, 9> expected = {"",         "abc/def",  "cba/fed",
                                                "fed/cba",  "def/abc",  "ad/be/cf",
                                                "da/eb/fc", "fc/eb/da", "cf/be/ad"};
   for (int o = 1; o <= 8; ++o) {
     for (const bool big : {false, true}) {
       EXPECT_EQ(Letters(LetterPng(Tiff(big, o))), expected[o]) << o;
-      EXPECT_EQ(Letters(LetterPng(Tiff(big, o)), PixelOrder::kStored), "abc/def");
+      const auto stored = LoadStoredImage(Write("a.png", LetterPng(Tiff(big, o))));
+      ASSERT_TRUE(stored.ok()) << stored.status().message();
+      EXPECT_EQ(LettersOf(stored->image), "abc/def");
+      EXPECT_EQ(stored->orientation, o);
     }
   }
 }
 
-TEST(Orientation, NonsenseIsUpright) {
+TEST_F(Orientation, NonsenseIsUpright) {
   const std::string good = Tiff(true, 6);
   EXPECT_EQ(Letters(LetterPng("")), "abc/def");
   EXPECT_EQ(Letters(LetterPng(Tiff(true, 0))), "abc/def");
@@ -160,7 +168,7 @@ TEST(Jpeg, TurnedByItsExifSegment) {
     const auto image = Ok(DecodeImage(jpeg, "a.jpg"));
     EXPECT_EQ(image->width, 8);
     EXPECT_EQ(image->height, 16);
-    EXPECT_EQ(DecodeImage(jpeg, "a.jpg", PixelOrder::kStored).value().width, 16);
+    EXPECT_EQ(OrientationOf(jpeg), 6);
   }
   EXPECT_EQ(DecodeImage(FlatJpeg({200}).Make(xmp, 16), "a.jpg").value().width, 16);
 }

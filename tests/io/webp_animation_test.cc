@@ -147,10 +147,11 @@ TEST_F(WebpReader, IsTurnedAsItsTagSays) {
   const auto length = static_cast<std::uint32_t>(file.size() - 8);
   for (std::size_t i = 0; i < 4; ++i) file[4 + i] = static_cast<std::uint8_t>(length >> 8 * i);
   const Path path = Write("a.webp", file);
-  const auto upright = Ok(LoadImage(path)), stored = Ok(LoadImage(path, PixelOrder::kStored));
+  const auto upright = Ok(LoadImage(path));
+  const auto stored = Ok(LoadStoredImage(path));
   EXPECT_EQ(upright->width, 3);
-  EXPECT_EQ(stored->width, 5);
-  EXPECT_EQ(stored->pixels, Picture(3).pixels);
+  EXPECT_EQ(stored->image.width, 5);
+  EXPECT_EQ(stored->image.pixels, Picture(3).pixels);
 }
 
 TEST_F(WebpReader, RefusesWhatIsBrokenOrMoves) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/run/log.h"
 
-#include <array>
 #include <bit>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -42,17 +41,6 @@ bool Parse(std::string_view line, LogEntry* entry) {
   }
   return true;
 }
-
-constexpr std::array<std::uint32_t, 256> MakeCrcTable() {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < 256; ++i) {
-    std::uint32_t crc = i;
-    for (int k = 0; k < 8; ++k) crc = crc >> 1 ^ (crc & 1 ? 0x82F63B78u : 0u);
-    table[i] = crc;
-  }
-  return table;
-}
-constexpr auto kCrcTable = MakeCrcTable();
 
 std::uint32_t MaskedCrc(std::string_view bytes) {
   const std::uint32_t crc = Crc32c(bytes);
@@ -140,8 +128,10 @@ Status RunLog::Append(const LogEntry& entry) {
 
 std::uint32_t Crc32c(std::string_view bytes) {
   std::uint32_t crc = ~0u;
-  for (const char c : bytes)
-    crc = crc >> 8 ^ kCrcTable[(crc ^ static_cast<unsigned char>(c)) & 0xff];
+  for (const char c : bytes) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int k = 0; k < 8; ++k) crc = crc >> 1 ^ (crc & 1 ? 0x82F63B78u : 0u);
+  }
   return ~crc;
 }
 

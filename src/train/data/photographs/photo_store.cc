@@ -105,8 +105,8 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
 Status PhotoStore::LoadOne(std::size_t i, const StopFlag& stop) {
   const Photograph& photo = *photos_[i];
   // Masks and boxes count pixels as the file stores them.
-  TILEGRAD_ASSIGN(ImageU8 read, io::LoadImage(photo.image, io::PixelOrder::kStored));
-  const ImageU8 image = io::ToColor(std::move(read));
+  TILEGRAD_ASSIGN(io::StoredImage read, io::LoadStoredImage(photo.image));
+  const ImageU8 image = io::ToColor(std::move(read.image));
   if (image.width != photo.mask.width || image.height != photo.mask.height)
     return InvalidArgument("{}: {} x {} pixels, but its mask has {} x {}", photo.image.string(),
                            image.width, image.height, photo.mask.width, photo.mask.height);
