@@ -38,7 +38,7 @@ namespace {
 // Between parent and child: questions and notes go over a packet socket, contents through a memory
 // file, so that neither side can be made to block on writing to the other.
 
-inline constexpr std::size_t kMaxQuestionBytes = 4096;
+constexpr std::size_t kMaxQuestionBytes = 4096;
 
 class UniqueFd {
  public:

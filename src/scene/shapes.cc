@@ -93,6 +93,16 @@ void AppendMaterials(Mesh& mesh, const Mesh& other, std::size_t faces_before) {
   mesh.textures.insert(mesh.textures.end(), other.textures.begin(), other.textures.end());
 }
 
+// Colours of vertices as corner_colors; white where there are none.
+void ColorsToCorners(Mesh& mesh) {
+  if (!mesh.corner_colors.empty()) return;
+  for (const Face& face : mesh.faces) {
+    for (const std::int32_t v : face)
+      mesh.corner_colors.push_back(mesh.colors.empty() ? glm::vec4(1) : mesh.colors[v]);
+  }
+  mesh.colors.clear();
+}
+
 }  // namespace
 
 Mesh Icosphere(int level, float radius) {
@@ -176,15 +186,6 @@ Mesh UvSphere(float radius, int rings, int segments) {
 }
 
 void SetColor(Mesh& mesh, glm::vec4 color) { mesh.colors.assign(mesh.positions.size(), color); }
-
-void ColorsToCorners(Mesh& mesh) {
-  if (!mesh.corner_colors.empty()) return;
-  for (const Face& face : mesh.faces) {
-    for (const std::int32_t v : face)
-      mesh.corner_colors.push_back(mesh.colors.empty() ? glm::vec4(1) : mesh.colors[v]);
-  }
-  mesh.colors.clear();
-}
 
 void Append(Mesh& mesh, const Mesh& other) {
   const std::size_t v0 = mesh.positions.size(), v1 = other.positions.size();

@@ -25,8 +25,6 @@ Mesh UvSphere(float radius, int rings, int segments);
 
 // The same colour (0..1) for every vertex.
 void SetColor(Mesh& mesh, glm::vec4 color);
-// The same colours, as corner_colors; white if there are none.
-void ColorsToCorners(Mesh& mesh);
 // Adds `other` behind `mesh`: indices, materials and textures are renumbered. An array that only
 // one of the two has is filled for the other with a default (white, zero uv, geometric normal), so
 // the result is valid if both were.
