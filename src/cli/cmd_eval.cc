@@ -11,6 +11,7 @@
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/fingerprint.h"
+#include "train/models/sphere_model.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
 
@@ -28,16 +29,19 @@ struct EvalOptions {
   int refine = 0, oracle = 0;
 };
 
-// Refines on the calling thread: pictures are worked on side by side.
-train::PredictionChange RefineWith(int steps, int image_size) {
+// Refines on the calling thread: pictures are worked on side by side. What is refined has the size
+// of CameraRule's defaults, and gets back that of predictions.
+train::PredictionChange RefineWith(int steps, const train::Predictor& predictor) {
   if (steps == 0) return nullptr;
-  return
-      [steps, image_size](const Mesh& mesh, std::span<const std::uint8_t> image) -> Result<Mesh> {
-        TILEGRAD_ASSIGN(train::RefinedMesh refined,
-                        train::RefineMesh(mesh, train::TargetsOfPlanar(image, image_size),
-                                          {.steps = steps}, Workers(1)));
-        return std::move(refined.mesh);
-      };
+  const int size = predictor.image_size();
+  const float scale = static_cast<float>(predictor.half_extent()) / train::kPredictionHalfExtent;
+  return [=](const Mesh& mesh, std::span<const std::uint8_t> image) -> Result<Mesh> {
+    TILEGRAD_ASSIGN(
+        train::RefinedMesh refined,
+        train::RefineMesh(mesh, train::TargetsOfPlanar(image, size), {.steps = steps}, Workers(1)));
+    for (glm::vec3& p : refined.mesh.positions) p *= scale;
+    return std::move(refined.mesh);
+  };
 }
 
 // What is evaluated, and where that is written.
@@ -102,7 +106,7 @@ Status RunEvaluation(const EvalOptions& options) {
                                   *subject.predictor,
                                   kSplits.at(options.split),
                                   options.views_per_model,
-                                  RefineWith(options.refine, subject.predictor->image_size()),
+                                  RefineWith(options.refine, *subject.predictor),
                                   options.oracle,
                                   ranks.crew()};
   ProgressLine line;

@@ -17,6 +17,8 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   const CheckpointInfo& info = out.info();
   if (info.image_size < 1 || info.image_size > 4096)
     return DataLoss("{}: image size {} is not possible", path.string(), info.image_size);
+  if (!(info.half_extent > 0 && info.half_extent < 1e6))
+    return DataLoss("{}: half-extent {} is not possible", path.string(), info.half_extent);
   if (IsOfFit(info.config)) {
     return InvalidArgument("{}: is a fit, which predicts nothing; name a run of tilegrad train",
                            path.string());

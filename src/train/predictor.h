@@ -29,7 +29,8 @@ class Predictor {
   const std::vector<std::string>& warnings() const { return all_->found.warnings; }
   const Path& checkpoint() const { return all_->found.file; }
   int image_size() const { return static_cast<int>(info().image_size); }  // pixels
-  std::int64_t step() const { return info().step; }  // steps that it has learned for
+  double half_extent() const { return info().half_extent; }  // of predictions, world units
+  std::int64_t step() const { return info().step; }          // steps that it has learned for
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;  // "quick network, 3,214,902 parameters, step 3000"

@@ -314,6 +314,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
     TILEGRAD_TRY(start());
   }
   plan.image_size = config.task->image_size();
+  plan.half_extent = config.task->half_extent();
   auto outcome = ExecuteRun(plan, &training, context, progress, stop);
   if (job.crew && !job.crew->broken()) job.crew->Order(kEnd);
   return outcome;

@@ -112,7 +112,7 @@ Prediction MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const nn::Var code = all_.encoder.Forward(images, mode);
   Prediction out;
   out.movement = sphere_.Movement(all_.shape.Forward(code, mode));
-  out.positions = NormalizeMeshes(out.movement + sphere_.Positions());
+  out.positions = sphere_.Normalized(out.movement);
   out.colors = Colors(code, images, mode);
   return out;
 }

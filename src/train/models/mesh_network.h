@@ -37,7 +37,8 @@ class MeshNetwork {
               std::uint64_t seed);
 
   // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Movement, colours, and positions
-  // whose bounding box is centred, with the largest half-extent 0.45.
+  // whose bounding box is centred, with the largest half-extent
+  // SphereConfig::half_extent.
   Prediction Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }

@@ -85,6 +85,10 @@ nn::Var SphereModel::Movement(const nn::Var& raw) const {
 
 nn::Var SphereModel::Positions() const { return nn::Constant(context_, positions_); }
 
+nn::Var SphereModel::Normalized(const nn::Var& movement) const {
+  return NormalizeMeshes(movement + Positions(), config_.half_extent);
+}
+
 // With the batch last, so that lanes run over it.
 nn::Var SphereModel::Mapped(const nn::Var& raw) const {
   const std::int64_t batch = raw.shape()[0];

@@ -13,7 +13,7 @@
 
 namespace tilegrad::train {
 
-inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, as the truth
+inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, of CameraRule's defaults
 
 struct SphereConfig {
   std::int64_t level = 3;      // subdivisions of the icosahedron: 3 gives 642 vertices
@@ -23,6 +23,9 @@ struct SphereConfig {
                           // every prediction is symmetric there
   bool n3mr_vertices = false;  // SphereVertices instead of offsets; radius is 1/4, and the two
                                // keys above do not apply
+  // Of normalised shapes, world units: that of the dataset's objects (CameraRule). No key: it comes
+  // with the data, and with a checkpoint.
+  double half_extent = 0.45;
 };
 
 class SphereModel {
@@ -44,6 +47,8 @@ class SphereModel {
   // raw [B, numbers()] -> offsets [B, V, 3] from the sphere; those of 0 are 0.
   nn::Var Movement(const nn::Var& raw) const;
   nn::Var Positions() const;  // of the sphere, [V, 3]
+  // Movement [B, V, 3] to positions, NormalizeMeshes to SphereConfig::half_extent.
+  nn::Var Normalized(const nn::Var& movement) const;
 
   // To draw deformed spheres, with textures if they have any: faces, uvs and how they wrap. Refers
   // to the model.
@@ -72,7 +77,7 @@ class SphereModel {
 
 // positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per
 // mesh of [B, V, 3]. The gradient flows through the extremes. A mesh without extent stays finite.
-nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent = kPredictionHalfExtent);
+nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent);
 
 // Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
 // is at 1/2 - u (scene/sphere_uv.h): column i has W/2 - 1 - i.

@@ -166,8 +166,8 @@ Prediction TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const PictureCode::Encoded encoded = all_.code->Encode(images, mode);
   if (!encoded.latent.valid()) return out;
   out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));
-  out.positions = out.movement + sphere_.Positions();
-  if (config_.normalize) out.positions = NormalizeMeshes(out.positions);
+  out.positions =
+      config_.normalize ? sphere_.Normalized(out.movement) : out.movement + sphere_.Positions();
   if (config_.lookup) out.pose = all_.pose.Forward(encoded.latent, mode);
   Light(encoded, mode, &out);
   out.textures = Texture(encoded, out, mode);

@@ -54,8 +54,8 @@ class TextureNetwork {
                  const LightHeadShape& light, int image_size, std::uint64_t seed);
 
   // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Movement, positions (with
-  // `normalize` box centred, largest half-extent 0.45), textures, light, and with `lookup` the
-  // pose.
+  // `normalize` box centred, largest half-extent SphereConfig::half_extent), textures, light, and
+  // with `lookup` the pose.
   Prediction Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }

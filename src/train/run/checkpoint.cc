@@ -58,6 +58,7 @@ Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                        {"step", std::to_string(info.step)},
                        {"image_size", std::to_string(info.image_size)},
                        {"seconds", fmt::format("{}", info.seconds)},
+                       {"half_extent", fmt::format("{}", info.half_extent)},
                        {"config", info.config}}};
   file.metadata[kChecksum] = ChecksumOf(file);
   return nn::WriteSafetensors(
@@ -119,7 +120,9 @@ Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
         "{}: not a checkpoint of tilegrad: its metadata lacks step, image_size, seconds or config",
         path.string());
   }
-  return Checkpoint{{*step, *image_size, m.at("config"), *seconds}, std::move(file->tensors)};
+  CheckpointInfo info{*step, *image_size, m.at("config"), *seconds};
+  info.half_extent = Number<double>(m, "half_extent").value_or(info.half_extent);
+  return Checkpoint{std::move(info), std::move(file->tensors)};
 }
 
 // As ListCheckpoints.

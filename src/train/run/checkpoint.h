@@ -18,6 +18,8 @@ struct CheckpointInfo {
   std::int64_t image_size = 0;  // pixels
   std::string config;           // TOML of the run
   double seconds = 0;           // trained so far
+  // Of what it predicts, world units; earlier versions wrote none and trained at this size.
+  double half_extent = 0.45;
 };
 
 struct Checkpoint {

@@ -131,8 +131,8 @@ Status Session::Restore() {
 
 Status Session::Save() {
   if (saved_ == done_) return {};
-  TILEGRAD_TRY(SaveCheckpoint(plan_.folder, {done_, plan_.image_size, plan_.settings, Seconds()},
-                              work_.State()));
+  const CheckpointInfo info{done_, plan_.image_size, plan_.settings, Seconds(), plan_.half_extent};
+  TILEGRAD_TRY(SaveCheckpoint(plan_.folder, info, work_.State()));
   saved_ = done_;
   PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
   return {};

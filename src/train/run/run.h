@@ -19,6 +19,7 @@
 #include "nn/tensor.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
+#include "train/run/checkpoint.h"
 #include "train/run/schedule.h"
 #include "train/run/step_values.h"
 
@@ -39,6 +40,7 @@ struct RunPlan {
   std::string settings;         // text that every checkpoint keeps
   std::string pictures;         // how their names begin, in the folder: "samples/step_"
   std::int64_t image_size = 0;  // pixels; a run continues with the same
+  double half_extent = CheckpointInfo().half_extent;
   Schedule schedule{};
   ExistingRun existing = ExistingRun::kRefuse;
   // The setting that may differ from the run's own: its number of steps, "schedule.steps". Empty:

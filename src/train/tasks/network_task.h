@@ -13,6 +13,7 @@ namespace tilegrad::train {
 class NetworkTask : public Task {
  public:
   RunHeader Header() override;
+  double half_extent() const override { return lesson_.half_extent; }
   Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override;
 
   int Updates(std::int64_t /*step*/) const override {
@@ -38,10 +39,11 @@ class NetworkTask : public Task {
   nn::Context* context_ = nullptr;
   std::unique_ptr<Adversary> adversary_;  // made when the task starts; or none
   struct Lesson {
-    std::string source = {};  // of the data
-    int objects = 0;          // of an epoch
-    std::int64_t batch = 1;   // objects a step
-  } lesson_;                  // complete after Start
+    std::string source = {};                        // of the data
+    int objects = 0;                                // of an epoch
+    std::int64_t batch = 1;                         // objects a step
+    double half_extent = CameraRule().half_extent;  // of the data's objects
+  } lesson_;                                        // complete after Start
 };
 
 // The dataset of a run. An error if it has no training models.

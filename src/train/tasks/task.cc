@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/fingerprint.h"
-#include "train/models/sphere_model.h"
 #include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
@@ -14,9 +13,9 @@ Status Model::LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor
   return LoadPredictingWeights(network, state);
 }
 
-Status Model::SetTemplate(const Mesh& start) {
+Status Model::SetTemplate(const Mesh& start, double half_extent) {
   template_ = start;
-  return NormalizeToBox(template_, kPredictionHalfExtent);
+  return NormalizeToBox(template_, static_cast<float>(half_extent));
 }
 
 Result<std::string> Task::Fingerprint(const Path& data, const Workers& workers) const {

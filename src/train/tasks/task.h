@@ -80,8 +80,8 @@ class Model {
  protected:
   // Loads the weights that predict, and counts them. Errors say what does not fit in the state.
   Status LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state);
-  // Brought to the place and size of predictions.
-  Status SetTemplate(const Mesh& start);
+  // Brought to the place and size of predictions, whose largest half-extent is that.
+  Status SetTemplate(const Mesh& start, double half_extent);
 
   std::int64_t parameters_ = 0;
   Mesh template_;
@@ -153,6 +153,8 @@ class Task {
   virtual Status Start(const TaskStart& start) = 0;
   // Side of its images in pixels; a run continues with the same.
   virtual int image_size() const = 0;
+  // Of what it predicts, world units: that of the dataset's objects. After Start.
+  virtual double half_extent() const { return CameraRule().half_extent; }
   virtual RunHeader Header() = 0;  // without name, dataset folder and machine
   // What it learns from, train/data/fingerprint.h: ranks compare them. After Start.
   virtual Result<std::string> Fingerprint(const Path& data, const Workers& workers) const;

@@ -79,7 +79,7 @@ Status PhotographModel::Load(const std::vector<nn::NamedTensor>& state) {
   const nn::Var mean = network_.MeanShape();
   TILEGRAD_TRY(context_.TakeStatus());
   TILEGRAD_ASSIGN(const Mesh shape, MeshOf(network_.sphere(), {.positions = mean}, 0));
-  return SetTemplate(shape);
+  return SetTemplate(shape, kPredictionHalfExtent);
 }
 
 Status PhotographModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {

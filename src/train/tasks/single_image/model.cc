@@ -14,10 +14,10 @@ class SingleImageModel : public Model {
         image_size_(image_size),
         network_(context, config, image_size, /*seed=*/0) {}
 
-  Status Load(const std::vector<nn::NamedTensor>& state) {
+  Status Load(const std::vector<nn::NamedTensor>& state, double half_extent) {
     TILEGRAD_TRY(context_.TakeStatus());
     TILEGRAD_TRY(LoadWeights(network_.module(), state));
-    return SetTemplate(network_.sphere().mesh());
+    return SetTemplate(network_.sphere().mesh(), half_extent);
   }
   Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
 
@@ -46,8 +46,10 @@ Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,
                                                     const Checkpoint& checkpoint) {
   const std::int64_t size = checkpoint.info.image_size;
   if (size % 8 != 0) return DataLoss("image size {} is not possible", size);
-  auto model = std::make_unique<SingleImageModel>(context, config, static_cast<int>(size));
-  TILEGRAD_TRY(model->Load(checkpoint.tensors));
+  NetworkConfig sized = config;
+  sized.sphere.half_extent = checkpoint.info.half_extent;
+  auto model = std::make_unique<SingleImageModel>(context, sized, static_cast<int>(size));
+  TILEGRAD_TRY(model->Load(checkpoint.tensors, checkpoint.info.half_extent));
   return std::unique_ptr<Model>(std::move(model));
 }
 

@@ -7,7 +7,7 @@
 
 namespace tilegrad::train {
 
-// Predictions have the template's faces, positions with largest half-extent 0.45, centred, and
+// Predictions have the template's faces, positions of CheckpointInfo::half_extent, centred, and
 // vertex colours in [0, 1]; batch statistics are those of training (eval mode). Errors say what
 // does not fit in the checkpoint.
 Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,

@@ -54,7 +54,7 @@ class TemplateFitter {
   Prediction MeshesOf(const Unknowns& x) const {
     Prediction meshes;
     meshes.movement = shape_.Movement(x.raw);
-    meshes.positions = NormalizeMeshes(meshes.movement + shape_.Positions());
+    meshes.positions = shape_.Normalized(meshes.movement);
     meshes.colors = x.colors;
     return meshes;
   }
@@ -109,6 +109,7 @@ FitFunction FitTemplates(const SingleImageConfig& config, const DatasetInfo& inf
   SingleImageConfig ours = config;
   ours.render.rule = "dibr";
   ours.schedule.steps = steps;
+  ours.network.sphere.half_extent = info.camera.half_extent;
   const auto fitter = std::make_shared<TemplateFitter>(ours, info, workers);
   return [fitter](const ModelData& data) { return fitter->Fit(data); };
 }

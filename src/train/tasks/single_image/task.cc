@@ -77,6 +77,8 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(LoadImages(start));
   TILEGRAD_TRY(LoadMeshes(start));
   lesson_.source = dataset_->info().source;
+  lesson_.half_extent = dataset_->info().camera.half_extent;
+  config_.network.sphere.half_extent = lesson_.half_extent;
   lesson_.objects = train_.models;
   warn_ = start.warn;
   step_.emplace(*context_, config_, train_.size);

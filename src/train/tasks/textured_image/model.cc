@@ -19,7 +19,7 @@ TexturedModel::TexturedModel(nn::Context& context, const TexturedImageConfig& co
 Status TexturedModel::Load(const std::vector<nn::NamedTensor>& state) {
   TILEGRAD_TRY(context_.TakeStatus());
   TILEGRAD_TRY(LoadWeights(network_.module(), state));
-  return SetTemplate(network_.sphere().mesh());
+  return SetTemplate(network_.sphere().mesh(), config_.network.sphere.half_extent);
 }
 
 Status TexturedModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
@@ -62,7 +62,9 @@ Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
   TILEGRAD_TRY(CheckConfig(config));
   const std::int64_t size = checkpoint.info.image_size;
   TILEGRAD_TRY(CheckImageSize(config.network, static_cast<int>(size)));
-  auto model = std::make_unique<TexturedModel>(context, config, static_cast<int>(size));
+  TexturedImageConfig sized = config;
+  sized.network.sphere.half_extent = checkpoint.info.half_extent;
+  auto model = std::make_unique<TexturedModel>(context, sized, static_cast<int>(size));
   TILEGRAD_TRY(model->Load(checkpoint.tensors));
   return std::unique_ptr<Model>(std::move(model));
 }

@@ -40,7 +40,7 @@ class TexturedModel : public Model {
   TextureNetwork network_;
 };
 
-// Meshes have the template's faces, positions with largest half-extent 0.45, centred, and one
+// Meshes have the template's faces, positions of CheckpointInfo::half_extent, centred, and one
 // texture. Batch statistics are those of training. Errors say what does not fit in the checkpoint.
 Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
                                                  const TexturedImageConfig& config,

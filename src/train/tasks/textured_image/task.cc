@@ -63,6 +63,8 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckImageSize(config_.network, image_size()));
   const std::vector<int> train = dataset_->Select(Split::kTrain);
   lesson_.source = dataset_->info().source;
+  lesson_.half_extent = dataset_->info().camera.half_extent;
+  config_.network.sphere.half_extent = lesson_.half_extent;
   lesson_.objects = static_cast<int>(train.size());
   const Workers& workers = start.context.workers();
   TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes, workers,
