@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "base/error.h"
+#include "scene/creases.h"
 #include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
 #include "train/data/sources/installed.h"
@@ -16,10 +17,10 @@ namespace {
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-MeshSceneOptions SceneOptions() {
+MeshSceneOptions SceneOptions(NormalSource normals) {
   MeshSceneOptions options;
   options.color_space = ColorSpace::kSrgb;
-  options.normals = NormalSource::kFlat;
+  options.normals = normals;
   options.filter = Filter::kBilinear;
   options.blend = false;
   return options;
@@ -92,7 +93,9 @@ class Loader {
     }
     for (MeshTexture& texture : mesh.textures)
       texture.image = ShrunkImage(texture.image, request_.max_texture);
-    return std::make_unique<TexturedMesh>(std::move(mesh));
+    if (request_.crease <= 0) return std::make_unique<TexturedMesh>(std::move(mesh));
+    SplitAtCreases(request_.crease, &mesh);
+    return std::make_unique<TexturedMesh>(std::move(mesh), NormalSource::kSmooth);
   }
 
  private:
@@ -132,9 +135,9 @@ class Loader {
 
 }  // namespace
 
-TexturedMesh::TexturedMesh(Mesh mesh)
+TexturedMesh::TexturedMesh(Mesh mesh, NormalSource normals)
     : mesh_(std::make_unique<Mesh>(std::move(mesh))),
-      scene_(std::make_unique<MeshScene>(*mesh_, SceneOptions())) {}
+      scene_(std::make_unique<MeshScene>(*mesh_, SceneOptions(normals))) {}
 
 std::size_t TexturedMesh::bytes() const {
   std::size_t bytes = mesh_->positions.size() * sizeof(glm::vec3) +

@@ -14,11 +14,11 @@
 
 namespace tilegrad::train {
 
-// A mesh as the dataset shows it, with small textures, ready to be rendered: flat normals,
-// two-sided, opaque, in the numbers of the files.
+// A mesh as the dataset shows it, with small textures, ready to be rendered: two-sided, opaque, in
+// the numbers of the files.
 class TexturedMesh {
  public:
-  explicit TexturedMesh(Mesh mesh);
+  explicit TexturedMesh(Mesh mesh, NormalSource normals = NormalSource::kFlat);
   const Mesh& mesh() const { return *mesh_; }
   const Scene& scene() const { return scene_->scene(); }
   std::size_t bytes() const;
@@ -36,6 +36,9 @@ struct TexturedMeshRequest {
   int max_texture = 128;  // texels a side; larger textures are averaged down
   // More than 0: the coloured meshes of the dataset, clustered to at most so many faces.
   std::int64_t max_faces = 0;
+  // Degrees: normals are smooth across edges where faces meet at less (scene/creases.h), as
+  // renderers of models shade them; 0: flat.
+  double crease = 0;
 };
 
 // Of these models, in their order. Errors: a model that cannot be read, that is not there any more,
