@@ -12,6 +12,9 @@
 
 namespace tilegrad::train {
 
+// The row of tasks that predict light whose light is the same for all pictures.
+inline constexpr const char* kMeanLightRow = "mean light";
+
 inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
 
 struct Score {

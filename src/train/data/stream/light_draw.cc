@@ -13,8 +13,10 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+constexpr double kPi = std::numbers::pi, kRadians = kPi / 180;
 constexpr int kMeanDraws = 4096;
+constexpr const char *kHemisphere = "hemisphere", *kFront = "front", *kAbove = "above";
+constexpr double kAboveLow = 26, kAboveHigh = 64;  // degrees off the axis
 
 struct Word {
   std::string_view word;
@@ -39,10 +41,26 @@ std::array<float, 3> Unit(double x, double y, double z) {
 }
 
 // Spread evenly over a spherical cap around z.
-std::array<float, 3> DrawDirection(double spread, Rng& rng) {
+std::array<float, 3> DrawInCap(double spread, Rng& rng) {
   const double z = rng.Uniform(std::cos(spread * kPi / 180), 1), turn = rng.Uniform(0, 2 * kPi);
   const double side = std::sqrt(std::max(0.0, 1 - z * z));
   return Unit(side * std::cos(turn), side * std::sin(turn), z);
+}
+
+std::array<float, 3> DrawInFront(Rng& rng) {
+  const double x = rng.Uniform(-1, 1), y = rng.Uniform(-1, 1);
+  return Unit(x, y, rng.Uniform(1, 3));
+}
+
+std::array<float, 3> DrawAbove(Rng& rng) {
+  const double off = kRadians * rng.Uniform(kAboveLow, kAboveHigh), turn = rng.Uniform(0, kPi);
+  return Unit(std::sin(off) * std::cos(turn), std::sin(off) * std::sin(turn), std::cos(off));
+}
+
+std::array<float, 3> DrawDirection(const LightConfig& config, Rng& rng) {
+  if (config.from == kFront) return DrawInFront(rng);
+  if (config.from == kAbove) return DrawAbove(rng);
+  return DrawInCap(config.spread, rng);
 }
 
 }  // namespace
@@ -50,8 +68,12 @@ std::array<float, 3> DrawDirection(double spread, Rng& rng) {
 ConfigFields FieldsOf(LightConfig* c) {
   return {
       {"light.model", &c->model, 0, 0, "\"none\", \"lambert\", \"phong\" or \"harmonics\""},
+      {"light.from", &c->from, 0, 0,
+       "where lights come from: \"hemisphere\" of light.spread, \"front\" (the authors' test "
+       "code), \"above\" (the paper's figure)"},
       {"light.spread", &c->spread, 0, 180,
-       "degrees; lights come from that far around the camera; 90: the hemisphere facing it"},
+       "degrees; lights of \"hemisphere\" come from that far around the camera; 90: all that face "
+       "it"},
       {"light.ambient", &c->ambient, 0, 1, "of Lambert and Phong surfaces; the paper has none"},
       {"light.shininess_low", &c->shininess_low, 1, 1000, "of Phong surfaces, log-uniform"},
       {"light.shininess_high", &c->shininess_high, 1, 1000, "of Phong surfaces"},
@@ -67,6 +89,10 @@ Status CheckConfig(const LightConfig& c) {
         "light.model is \"{}\", but must be \"none\", \"lambert\", \"phong\" or \"harmonics\"",
         c.model);
   }
+  if (c.from != kHemisphere && c.from != kFront && c.from != kAbove) {
+    return InvalidArgument(
+        "light.from is \"{}\", but must be \"hemisphere\", \"front\" or \"above\"", c.from);
+  }
   if (c.shininess_low > c.shininess_high)
     return InvalidArgument("light.shininess_low is above light.shininess_high");
   if (c.sky_low > c.sky_high) return InvalidArgument("light.sky_low is above light.sky_high");
@@ -74,6 +100,11 @@ Status CheckConfig(const LightConfig& c) {
 }
 
 Lighting LightingOf(const LightConfig& config) { return Find(config.model)->lighting; }
+
+double WidestAngle(const LightConfig& config) {
+  if (config.from == kFront) return std::atan(std::sqrt(2.0)) / kRadians;
+  return config.from == kAbove ? kAboveHigh : config.spread;
+}
 
 Surface SurfaceUnder(const LightConfig& config) {
   Surface surface;
@@ -98,7 +129,7 @@ std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& directi
 
 DrawnLight DrawLight(const LightConfig& config, Rng& rng) {
   DrawnLight light;
-  light.direction = DrawDirection(config.spread, rng);
+  light.direction = DrawDirection(config, rng);
   light.shininess = static_cast<float>(
       config.shininess_low * std::pow(config.shininess_high / config.shininess_low, rng.Uniform()));
   light.sh = SkyAndLight(rng.Uniform(config.sky_low, config.sky_high), light.direction);

@@ -15,9 +15,12 @@ namespace tilegrad::train {
 
 struct LightConfig {
   std::string model = "lambert";  // or "none", "phong", "harmonics"
-  // Directions are spread evenly over the cap around the camera's axis with this half angle; 90:
-  // the hemisphere that faces the camera.
-  double spread = 90;  // degrees
+  // Where from. "hemisphere": spread evenly over the cap of half angle `spread` around the camera's
+  // axis. "front": as the paper's authors draw lights in their test code, (x, y, z) with x and y
+  // from [-1, 1] and z from [1, 3]. "above": as in the paper's figure of light, from [26, 64]
+  // degrees off the axis, all above it.
+  std::string from = "hemisphere";
+  double spread = 90;  // degrees; 90: the hemisphere that faces the camera
   double ambient = 0;  // of Lambert and Phong surfaces, beside the light; the paper has none
   double shininess_low = 3, shininess_high = 30;  // of Phong surfaces, drawn log-uniformly
   // Of harmonics: the share of the light that comes from everywhere; the rest has a direction.
@@ -32,6 +35,8 @@ ConfigFields FieldsOf(LightConfig* config);
 Status CheckConfig(const LightConfig& config);
 
 Lighting LightingOf(const LightConfig& config);
+// No light comes from farther off the camera's axis; degrees.
+double WidestAngle(const LightConfig& config);
 // k_d 1 and k_s 0.4, as in section 5.3, and the ambient light; without textures.
 Surface SurfaceUnder(const LightConfig& config);
 
@@ -41,7 +46,8 @@ struct DrawnLight {
   std::array<float, 9> sh = {};                // harmonics: sky + clamped cosine about `direction`
 };
 DrawnLight DrawLight(const LightConfig& config, Rng& rng);
-// The mean of many that are drawn; its direction is unit, too.
+// The mean of many that are drawn; its direction is unit, too. No other one is nearer to those that
+// are drawn, in the mean angle, by more than a tenth of a degree.
 DrawnLight MeanLight(const LightConfig& config);
 
 // sky + (1 - sky) max(0, n . direction), by its first three bands.

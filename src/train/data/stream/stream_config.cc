@@ -12,6 +12,8 @@ ConfigFields FieldsOf(StreamConfig* c) {
       {"stream.stretch", &c->stretch, 0, 2,
        "pieces of an object grow by up to exp(this) along each axis, or shrink"},
       {"stream.taper", &c->taper, 0, 2, "its top is wider by up to exp(this) than its foot"},
+      {"stream.fixed_camera", &c->fixed_camera, 0, 1,
+       "cameras are the dataset's but for their azimuth: the next eight keys mean nothing"},
       {"stream.elevation_low", &c->elevation_low, -90, 90,
        "degrees, of the view that the network sees; azimuths are of all the circle"},
       {"stream.elevation_high", &c->elevation_high, -90, 90, "degrees"},

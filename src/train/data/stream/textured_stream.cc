@@ -52,6 +52,8 @@ ConfigFields FieldsOf(TexturedStreamConfig* c) {
   fields.push_back({"stream.models", &c->meshes.folder, 0, 0,
                     "folder with the models of --source folder; \"\": the installed packages, or "
                     "else the dataset's coloured meshes"});
+  fields.push_back({"stream.crease", &c->meshes.crease, 0, 180,
+                    "degrees; light is smooth across edges of less; 0: every face is flat"});
   fields.push_back({"stream.mirrored", &c->mirrored, 0, 1,
                     "share of the objects shown mirrored, left to right"});
   return fields;
@@ -83,7 +85,7 @@ struct TexturedStream::Worker {
   void DrawColors(const Scene& scene, const Recolor& recolor);
   void SetViews(const Job& job, std::span<const TexturedView> views);
   void DrawViews(const Job& job, const Scene& object, std::span<TexturedView> views, Rng& rng);
-  Status Take(const Job& job);
+  Status Take(const Job& job, Appearance appearance);
 };
 
 // The object's textures, surfaces and colours, into this memory.
@@ -144,11 +146,10 @@ void TexturedStream::Worker::SetViews(const Job& job, std::span<const TexturedVi
 }
 
 // Pictures of `shown` into `rgba`.
-Status TexturedStream::Worker::Take(const Job& job) {
+Status TexturedStream::Worker::Take(const Job& job, Appearance appearance) {
   const auto samples = static_cast<int>(job.config.draw.samples);
   const RenderOptions options{.width = samples * job.size, .height = samples * job.size};
-  TILEGRAD_TRY(renderer.Render(shown, options, {.color = true, .alpha = false, .attributes = false},
-                               &frame));
+  TILEGRAD_TRY(renderer.Render(shown, options, OutputsOf(appearance), &frame));
   const std::size_t image =
       4 * static_cast<std::size_t>(job.size) * static_cast<std::size_t>(job.size);
   rgba.resize(image * shown.size());
@@ -210,7 +211,7 @@ Status TexturedStream::SetUp(int model, std::uint64_t position, std::size_t work
 Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appearance appearance) {
   Worker& w = *workers_[worker];
   const Lighting of_job = job_.dataset_light ? Lighting::kLambert : LightingOf(job_.light);
-  const Lighting lighting = appearance == Appearance::kTexture ? Lighting::kNone : of_job;
+  const Lighting lighting = IsLit(appearance) ? of_job : Lighting::kNone;
   w.shown = w.scenes;
   w.white = w.surfaces;
   for (Surface& surface : w.white) {
@@ -231,7 +232,7 @@ Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appeara
     scene.textures = {};
     scene.uvs = {};
   }
-  TILEGRAD_TRY(w.Take(job_));
+  TILEGRAD_TRY(w.Take(job_, appearance));
   return std::span<const float>(w.rgba);
 }
 

@@ -35,8 +35,14 @@ struct TexturedView {
   DrawnLight light;  // in the camera's axes
 };
 
-// How an object is shown.
-enum class Appearance { kLit, kTexture, kLight };  // light: on white
+// How an object is shown; light: on white; normals: instead of colours, unit, in world axes.
+enum class Appearance { kLit, kTexture, kLight, kNormals };
+constexpr bool IsLit(Appearance a) { return a == Appearance::kLit || a == Appearance::kLight; }
+// What AverageSamples needs.
+inline Outputs OutputsOf(Appearance appearance) {
+  const bool normals = appearance == Appearance::kNormals;
+  return {.color = !normals, .alpha = false, .attributes = false, .normals = normals};
+}
 
 class TexturedStream {
  public:

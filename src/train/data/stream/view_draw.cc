@@ -36,6 +36,8 @@ Light Turned(const Light& light, double azimuth, double elevation) {
 }  // namespace
 
 Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, std::size_t view, Rng& rng) {
+  if (config.fixed_camera)
+    return OrbitCamera(rule.lens, rng.Uniform(0, 360), rule.elevation, rule.distance);
   Lens lens = rule.lens;
   lens.fov_y = rng.Uniform(config.fov_low, config.fov_high);
   const double azimuth = rng.Uniform(0, 360);

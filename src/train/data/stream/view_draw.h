@@ -13,7 +13,8 @@
 namespace tilegrad::train {
 
 // View 0 is what the network sees; the others have a range of elevations of their own. Azimuth from
-// all the circle; the size of objects in the image is that of `rule`, within jitter.
+// all the circle; the size of objects in the image is that of `rule`, within jitter. With
+// fixed_camera only the azimuth is drawn, and all else is of `rule`.
 Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, std::size_t view, Rng& rng);
 
 // The key and the fill light of datasets, each turned about the vertical and up or down.

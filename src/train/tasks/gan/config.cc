@@ -37,9 +37,10 @@ ConfigFields FieldsOf(GanCriticConfig* c) {
 
 // Cameras never change.
 ConfigFields StreamFields(TexturedStreamConfig* c) {
-  return Without(FieldsOf(c), {"stream.elevation_low", "stream.elevation_high", "stream.around_low",
-                               "stream.around_high", "stream.fov_low", "stream.fov_high",
-                               "stream.roll", "stream.jitter"});
+  return Without(
+      FieldsOf(c),
+      {"stream.fixed_camera", "stream.elevation_low", "stream.elevation_high", "stream.around_low",
+       "stream.around_high", "stream.fov_low", "stream.fov_high", "stream.roll", "stream.jitter"});
 }
 
 }  // namespace

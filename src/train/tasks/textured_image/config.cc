@@ -64,7 +64,8 @@ TextureNetworkConfig NetworkOf(const TexturedImageConfig& config) {
 bool IsN3mr(const TexturedImageConfig& config) { return config.render.rule == "n3mr"; }
 
 LightHeadShape LightHeadOf(const LightConfig& config) {
-  return {LightingOf(config), config.shininess_low, config.shininess_high, config.spread <= 90};
+  return {LightingOf(config), config.shininess_low, config.shininess_high,
+          WidestAngle(config) <= 90};
 }
 
 ConfigFields FieldsOf(TexturedImageConfig* c) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
@@ -12,6 +13,7 @@
 #include "train/predictor.h"
 #include "train/ranks/share.h"
 #include "train/tasks/textured_image/held_out_views.h"
+#include "train/tasks/textured_image/light_search.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/object_pictures.h"
 #include "train/tasks/textured_image/step.h"
@@ -19,9 +21,30 @@
 namespace tilegrad::train {
 namespace {
 
-enum LightMethod { kWithoutLight, kMeanLight, kTexturedOurs, kLightMethods };
-constexpr const char* kMethodNames[kLightMethods] = {"without light", "mean light", "tilegrad"};
+// The light search's rows: what it is given besides the picture. Truths come first.
+struct SearchMethod {
+  const char* name;
+  bool true_shape, true_texture;
+};
+constexpr SearchMethod kSearches[] = {{"search, true shape and texture", true, true},
+                                      {"search, true shape", true, false},
+                                      {"search, true texture", false, true},
+                                      {"search", false, false}};
+
+enum LightMethod {
+  kWithoutLight,
+  kMeanLight,
+  kFirstSearch,
+  kTexturedOurs = kFirstSearch + static_cast<int>(std::size(kSearches)),
+  kLightMethods
+};
 using MethodScores = std::array<Score, kLightMethods>;
+
+const char* NameOf(int method) {
+  if (method == kWithoutLight) return "without light";
+  if (method == kMeanLight) return kMeanLightRow;
+  return method == kTexturedOurs ? "tilegrad" : kSearches[method - kFirstSearch].name;
+}
 
 // Over the colours of two pictures [4][size][size].
 double MeanDifference(std::span<const float> a, std::span<const float> b) {
@@ -37,6 +60,7 @@ class Judge {
   Judge(const TexturedImageConfig& config, int size)
       : lighting_(LightingOf(config.light)),
         mean_(MeanLight(config.light)),
+        search_(config.light),
         pictures_(config.light, size, static_cast<int>(config.stream.draw.samples)) {}
 
   struct View {
@@ -53,6 +77,7 @@ class Judge {
     for (Score& score : scores)
       score.texture_l1 = MeanDifference(texture, truth.Of(truth.texture, v));
     scores[kWithoutLight].lit_l1 = MeanDifference(texture, input);
+    if (lighting_ != Lighting::kNone) TILEGRAD_TRY(Search(at, texture, &scores));
     const std::pair<LightMethod, const DrawnLight*> lights[] = {{kMeanLight, &mean_},
                                                                 {kTexturedOurs, &object.light}};
     for (const auto& [method, light] : lights) {
@@ -60,15 +85,48 @@ class Judge {
       TILEGRAD_ASSIGN(const auto lit, pictures_.Draw(object.mesh, view, Appearance::kLit));
       scores[method].lit_l1 = MeanDifference(lit, input);
       if (lighting_ == Lighting::kNone) continue;
-      scores[method].light_angle = AngleBetween(DirectionOf(*light, lighting_),
-                                                DirectionOf(truth.views[v].light, lighting_));
+      scores[method].light_angle = ErrorOf(DirectionOf(*light, lighting_), at);
     }
     return scores;
   }
 
  private:
+  double ErrorOf(const std::array<float, 3>& direction, const View& at) const {
+    return AngleBetween(direction, DirectionOf(at.truth.views[at.index].light, lighting_));
+  }
+
+  // What is left to the network's light: that of a search in the same picture, which knows more or
+  // less of the object. `texture`: the predicted one, as it is seen.
+  Status Search(const View& at, std::span<const float> texture, MethodScores* scores) {
+    const auto& [object, truth, v] = at;
+    TILEGRAD_ASSIGN(const auto normals,
+                    pictures_.Draw(object.mesh, truth.views[v], Appearance::kNormals));
+    const std::span<const float> lit = truth.Of(truth.lit, v);
+    const std::size_t rgb = lit.size() / 4 * 3;
+    for (std::size_t m = 0; m < std::size(kSearches); ++m) {
+      const SearchMethod& method = kSearches[m];
+      const auto shape = method.true_shape ? truth.Of(truth.normals, v) : std::span(normals);
+      const auto paint = method.true_texture ? truth.Of(truth.texture, v) : texture;
+      const FoundLight found = search_.Find<float>(
+          {paint.first(rgb), shape.first(rgb), lit.first(rgb), lit.subspan(rgb)},
+          truth.views[v].camera.rotation);
+      Score& score = (*scores)[kFirstSearch + m];
+      if (method.true_texture) score.texture_l1 = 0;
+      score.light_angle = ErrorOf(Towards(found), at);
+    }
+    return {};
+  }
+
+  // The mean one where the picture shows nothing.
+  std::array<float, 3> Towards(const FoundLight& found) const {
+    const auto& d = found.direction;
+    if (d == std::array<double, 3>{}) return mean_.direction;
+    return {static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])};
+  }
+
   Lighting lighting_;
   DrawnLight mean_;
+  LightSearch search_;
   ObjectPictures pictures_;
 };
 
@@ -129,6 +187,7 @@ class TexturedEvaluator {
     std::vector<MethodScores> scores(objects.size());
     std::vector<Status> failures(objects.size());
     std::vector<std::uint8_t> unusable(objects.size());
+    const train::Score perfect = train::Compare(shape, shape);
     workers_.For(objects.size(), [&](std::size_t v, std::size_t worker) {
       auto compared = judges_[worker]->Compare({objects[v], truth, v});
       failures[v] = compared.status();
@@ -136,7 +195,8 @@ class TexturedEvaluator {
       const auto seed = static_cast<std::uint64_t>(held_out.models()[i]) * 4096 + v;
       const auto predicted = ShapeOf(objects[v].mesh, seed);
       unusable[v] = !predicted.ok();
-      AddShape(predicted.ok() ? Compare(*predicted, shape) : WorstScore(shape), &scores[v]);
+      AddShape(predicted.ok() ? train::Compare(*predicted, shape) : WorstScore(shape), perfect,
+               &scores[v]);
     });
     for (const Status& failure : failures) TILEGRAD_TRY(failure);
     for (const auto flag : unusable) unusable_[i] += flag;
@@ -148,11 +208,16 @@ class TexturedEvaluator {
     return {};
   }
 
-  static void AddShape(const train::Score& shape, MethodScores* scores) {
-    for (train::Score& score : *scores) {
-      score.iou = shape.iou;
-      score.f_score = shape.f_score;
-      score.carved_iou = shape.carved_iou;
+  static void AddShape(const train::Score& shape, const train::Score& perfect,
+                       MethodScores* scores) {
+    for (std::size_t m = 0; m < scores->size(); ++m) {
+      const bool search = m >= kFirstSearch && m < kTexturedOurs;
+      const bool true_shape = search && kSearches[m - kFirstSearch].true_shape;
+      const train::Score& from = true_shape ? perfect : shape;
+      train::Score& score = (*scores)[m];
+      score.iou = from.iou;
+      score.f_score = from.f_score;
+      score.carved_iou = from.carved_iou;
     }
   }
 
@@ -164,7 +229,7 @@ class TexturedEvaluator {
     for (int m = lit ? kWithoutLight : kTexturedOurs; m < kLightMethods; ++m) {
       std::vector<train::Score> of_method;
       for (const MethodScores& model : scores_) of_method.push_back(model[m]);
-      out_.rows.push_back(means.Row(kMethodNames[m], of_method));
+      out_.rows.push_back(means.Row(NameOf(m), of_method));
     }
     for (std::size_t i = 0; i < models.size(); ++i) {
       const ModelInfo& info = dataset_.models()[static_cast<std::size_t>(models[i])];

@@ -58,6 +58,8 @@ Status HeldOutViews::Fill(Views* out) {
   out->texture = Copied(pictures);
   TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kLight));
   out->light = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kNormals));
+  out->normals = Copied(pictures);
   return {};
 }
 

@@ -20,11 +20,11 @@ class HeldOutViews {
   static Result<HeldOutViews> Load(const Request& request, const Workers& workers,
                                    const ProgressSink& progress, const StopFlag& stop);
 
-  // Pictures of `count` views of models[i], [count][4][size][size] in [0, 1] each. The same model
+  // Pictures of `count` views of models[i], [count][4][size][size] each. The same model
   // of one dataset is always seen in the same views.
   struct Views {
     std::vector<TexturedView> views;
-    std::vector<float> lit, texture, light;
+    std::vector<float> lit, texture, light, normals;
     std::span<const float> Of(const std::vector<float>& pictures, std::size_t view) const {
       const std::size_t size = pictures.size() / views.size();
       return std::span(pictures).subspan(view * size, size);

@@ -128,7 +128,7 @@ class LightSearch::Attempts {
 LightSearch::LightSearch(const LightConfig& config)
     : config_(config),
       has_sky_(LightingOf(config) == Lighting::kSphericalHarmonics),
-      cosine_(std::cos(config.spread * std::numbers::pi / 180)) {
+      cosine_(std::cos(WidestAngle(config) * std::numbers::pi / 180)) {
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
   for (int k = 0; k < kDirections; ++k) {
     const double z = 1 - (1 - cosine_) * (k + 0.5) / kDirections;

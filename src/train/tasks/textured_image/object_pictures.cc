@@ -43,8 +43,7 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
   const MeshScene made(mesh, SceneOptions(surface));
   Scene scene = made.scene();
   scene.camera = ScaledCamera(view.camera, static_cast<float>(samples_));
-  const Lighting lighting =
-      appearance == Appearance::kTexture ? Lighting::kNone : LightingOf(light_);
+  const Lighting lighting = IsLit(appearance) ? LightingOf(light_) : Lighting::kNone;
   scene.shading = {.lighting = lighting, .two_sided = true, .clamp = true};
   Light light;
   light.direction = DirectionToWorld(view.light.direction, view.camera);
@@ -59,8 +58,7 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
     scene.face_surfaces = {};
   }
   const RenderOptions options{.width = samples_ * size_, .height = samples_ * size_};
-  TILEGRAD_TRY(renderer_.Render({&scene, 1}, options,
-                                {.color = true, .alpha = false, .attributes = false}, &frame_));
+  TILEGRAD_TRY(renderer_.Render({&scene, 1}, options, OutputsOf(appearance), &frame_));
   std::vector<float> out(4 * static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_));
   AverageSamples(frame_.images(), 0, samples_, out);
   return out;

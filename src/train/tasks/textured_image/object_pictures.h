@@ -16,8 +16,8 @@ class ObjectPictures {
  public:
   ObjectPictures(const LightConfig& light, int size, int samples);
 
-  // [4][size][size], planar, RGB over black and the covered share of each pixel, in [0, 1]. `mesh`
-  // is valid; its normals are smooth, as in training.
+  // [4][size][size], planar, RGB over black (or normals) and the covered share of each pixel.
+  // `mesh` is valid; its normals are smooth, as in training.
   Result<std::vector<float>> Draw(const Mesh& mesh, const TexturedView& view,
                                   Appearance appearance);
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <set>
 
 #include "render/picture/dataset_light.h"
 #include "render/picture/mesh_pictures.h"
@@ -148,6 +149,25 @@ TEST(ViewDraw, WithoutChanceItIsAnOrbit) {
   EXPECT_NEAR(camera.translation[1], 0, 1e-6f);
   EXPECT_FLOAT_EQ(camera.cx, 32);
   EXPECT_FLOAT_EQ(camera.fx, Camera(info.camera.View(0)).fx);
+}
+
+// The dataset's own camera, but for the azimuth.
+TEST(ViewDraw, FixedCamerasAreTheDatasets) {
+  StreamConfig config;
+  config.fixed_camera = true;
+  const DatasetInfo info = Info(64);
+  const Camera dataset = info.camera.View(0);
+  Rng rng(5);
+  std::set<float> azimuths;
+  for (std::size_t view = 0; view < 3; ++view) {
+    const Camera camera = DrawCamera(config, info.camera, view, rng);
+    EXPECT_EQ(camera.translation, dataset.translation);
+    EXPECT_EQ(camera.fx, dataset.fx);
+    EXPECT_EQ(camera.cy, dataset.cy);
+    EXPECT_NEAR(camera.rotation[4], dataset.rotation[4], 1e-6f);  // cosine of the elevation
+    azimuths.insert(camera.rotation[0]);
+  }
+  EXPECT_EQ(azimuths.size(), 3u);
 }
 
 // A square that faces the camera at the origin has the same size through any lens.
