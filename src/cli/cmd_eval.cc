@@ -11,6 +11,7 @@
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/fingerprint.h"
+#include "train/eval/paired.h"
 #include "train/models/sphere_model.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
@@ -27,6 +28,7 @@ struct EvalOptions {
   int views_per_model = 24;
   std::string split = "test";
   int refine = 0, oracle = 0;
+  std::string compare;  // a run whose scores are there; empty: none
 };
 
 // Refines on the calling thread: pictures are worked on side by side. What is refined has the size
@@ -49,6 +51,7 @@ struct Subject {
   Path run, data;
   std::vector<Path> files;  // that keep the figures; of the network alone on held-out models
   std::optional<train::Predictor> predictor;
+  std::optional<train::Evaluation> other;  // of EvalOptions::compare
 };
 
 Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out) {
@@ -57,7 +60,11 @@ Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out)
   if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0)
     out->files = {out->run / "eval.md", out->run / "eval.json"};
   TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
-  return {};
+  if (options.compare.empty()) return {};
+  TILEGRAD_ASSIGN(out->other, train::ReadEvaluation(options.compare));
+  if (out->other) return {};
+  return InvalidArgument("{0}: there is no eval.json in it; run tilegrad eval --run {0} first",
+                         options.compare);
 }
 
 // What ranks must have in common.
@@ -88,7 +95,13 @@ Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
   // Files first: printing may fail.
   if (!subject.files.empty()) TILEGRAD_TRY(train::WriteEvaluation(subject.run, evaluation));
   Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
-  PrintResult(train::EvaluationJson(evaluation));
+  nlohmann::ordered_json json = train::EvaluationJson(evaluation);
+  if (subject.other) {
+    TILEGRAD_ASSIGN(const auto comparison, train::ComparePaired(evaluation, *subject.other));
+    Print("\n{}", train::FormatComparison(comparison));
+    json["compared"] = train::ComparisonJson(comparison);
+  }
+  PrintResult(json);
   if (subject.files.empty()) return {};
   Print("written to {} and {}\n", subject.files[0].string(), subject.files[1].string());
   return {};
@@ -138,6 +151,10 @@ void AddEval(CommandList* list) {
                "steps of fitting the template to all views of each model, for a row that says how "
                "good predictions can be at best; 300 take a second a model or two",
                {Range{0, 100000}});
+  command->Add(
+      "--compare", &options->compare,
+      "folder of another run that was scored on the same models: each measure's difference "
+      "with its standard error, by pairs of models");
 }
 
 }  // namespace tilegrad::cli

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/eval/class_means.h"
 
+#include <utility>
+
 #include "train/eval/scores.h"
+#include "train/eval/standard_error.h"
 
 namespace tilegrad::train {
 
@@ -20,6 +23,7 @@ ClassMeans::ClassMeans(const Dataset& dataset, std::span<const int> models) {
 
 EvaluationRow ClassMeans::Row(const std::string& method, std::span<const Score> scores) const {
   EvaluationRow row{.method = method, .classes = {}, .mean = {}};
+  std::vector<std::vector<Score>> shapes_of_classes;
   for (const auto& [class_index, shapes] : members_) {
     std::vector<Score> of_class;
     for (const auto& [shape, indices] : shapes) {
@@ -28,8 +32,10 @@ EvaluationRow ClassMeans::Row(const std::string& method, std::span<const Score> 
       of_class.push_back(MeanScore(of_shape));
     }
     row.classes.push_back(MeanScore(of_class));
+    shapes_of_classes.push_back(std::move(of_class));
   }
   row.mean = MeanScore(row.classes);
+  row.error = StandardErrors(shapes_of_classes);
   return row;
 }
 

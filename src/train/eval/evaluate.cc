@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "base/error.h"
@@ -146,12 +147,16 @@ class Evaluator {
     return shape;
   }
 
-  double ColorL1(std::span<const std::uint8_t> images, const ModelData& truth) const {
+  // `sides` as PredictionPictures has them, or empty.
+  void AddColors(std::span<const std::uint8_t> images, std::span<const Side> sides,
+                 const ModelData& truth, Score* score) const {
     ColorDifference difference;
-    const std::size_t bytes = images.size() / color_views_.size();
+    const std::size_t bytes = images.size() / color_views_.size(),
+                      pixels = sides.size() / color_views_.size();
     for (std::size_t v = 0; v < color_views_.size(); ++v)
-      difference.Add(images.subspan(v * bytes, bytes), Image(truth, color_views_[v]));
-    return difference.Mean();
+      difference.Add(images.subspan(v * bytes, bytes), Image(truth, color_views_[v]),
+                     sides.subspan(v * pixels, pixels));
+    difference.To(score);
   }
 
   // Of the training model whose picture is nearest to each view.
@@ -161,27 +166,34 @@ class Evaluator {
       const auto match = train_.index.Nearest(Image(data, views_[i]), data_.info().image_size);
       const auto model = static_cast<std::size_t>(match.model);
       scores[i] = Compare(train_.shapes[model], truth);
-      scores[i].color_l1 = ColorL1(train_.color_images[model], data);
+      AddColors(train_.color_images[model], {}, data, &scores[i]);
     });
     return MeanScore(scores);
   }
 
-  Score ScorePrediction(Mesh mesh, std::uint64_t seed, std::size_t worker, const ModelData& data,
-                        const Shape& truth, std::uint8_t* unusable) const {
-    const auto images = pictures_[worker]->Draw(mesh);
-    const auto shape = ShapeOf(std::move(mesh), seed);
-    *unusable = !shape.ok() || !images.ok();
+  struct Origin {
+    std::uint64_t seed;       // of points on its surface
+    std::optional<int> view;  // that it was predicted from; none: from all
+    std::size_t worker = 0;
+  };
+  Score ScorePrediction(Mesh mesh, const Origin& from, const ModelData& data, const Shape& truth,
+                        std::uint8_t* unusable) const {
+    const auto pictures = pictures_[from.worker]->Draw(mesh, from.view);
+    const auto shape = ShapeOf(std::move(mesh), from.seed);
+    *unusable = !shape.ok() || !pictures.ok();
     if (*unusable) return WorstScore(truth);
     Score score = Compare(*shape, truth);
-    score.color_l1 = ColorL1(*images, data);
+    AddColors(pictures->rgba, pictures->sides, data, &score);
     return score;
   }
 
   Result<Score> ScoreOracle(int model, const ModelData& data, const Shape& truth) {
     TILEGRAD_ASSIGN(Mesh mesh, job_.oracle(data));
     std::uint8_t unusable = 0;
-    return ScorePrediction(std::move(mesh), static_cast<std::uint64_t>(model), 0, data, truth,
-                           &unusable);
+    const Origin from{static_cast<std::uint64_t>(model), std::nullopt};
+    Score score = ScorePrediction(std::move(mesh), from, data, truth, &unusable);
+    score.seen_color_l1 = score.hidden_color_l1 = std::nullopt;  // also where it is unusable
+    return score;
   }
 
   Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth,
@@ -193,8 +205,8 @@ class Evaluator {
     std::vector<Score> scores(meshes.size());
     std::vector<std::uint8_t> unusable(meshes.size(), 0);
     workers_.For(meshes.size(), [&](std::size_t i, std::size_t worker) {
-      const auto seed = static_cast<std::uint64_t>(model) * 4096 + i;
-      scores[i] = ScorePrediction(std::move(meshes[i]), seed, worker, data, truth, &unusable[i]);
+      const Origin from{static_cast<std::uint64_t>(model) * 4096 + i, views_[i], worker};
+      scores[i] = ScorePrediction(std::move(meshes[i]), from, data, truth, &unusable[i]);
     });
     for (const auto flag : unusable) *unusable_predictions += flag;
     return MeanScore(scores);
@@ -207,7 +219,7 @@ class Evaluator {
   void Fill(std::span<const int> held_out) {
     for (std::size_t i = 0; i < held_out.size(); ++i) {
       const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
-      out_.models.push_back({ClassOf(info), info.id, predicted_scores_[i]});
+      out_.models.push_back({ClassOf(info), info.id, predicted_scores_[i], info.shape});
       out_.unusable_predictions += unusable_[i];
     }
     const ClassMeans means(data_, held_out);

@@ -34,6 +34,12 @@ struct Score {
   // prediction covers, black beyond them, in views of the dataset; none: of a shape without
   // colours.
   std::optional<double> color_l1 = std::nullopt;
+  // The same where both are, each covering half of a pixel or more, of the colours of what covers
+  // it: how well it is painted, whatever its outline (1: nowhere are both). Then this over the
+  // faces of a prediction that are seen in the picture that it was made from, and over its other
+  // faces.
+  std::optional<double> shared_color_l1 = std::nullopt, seen_color_l1 = std::nullopt,
+                        hidden_color_l1 = std::nullopt;
   // Table 2 of the paper, of tasks that predict texture and light. Mean |difference| over all
   // pixels of the image, black beyond the object, and the channels, [0, 1]: of renders without
   // light, and with the predicted light against the true one; and the angle between the lights'
@@ -47,14 +53,20 @@ struct Score {
 
 struct EvaluationRow {
   std::string method;
-  std::vector<Score> classes;  // as Evaluation::classes
-  Score mean;                  // of the class means
+  std::vector<Score> classes;                 // as Evaluation::classes
+  Score mean;                                 // of the class means
+  std::optional<Score> error = std::nullopt;  // standard errors of `mean` (standard_error.h)
 };
 
 struct ModelScore {
   std::string class_name, id;  // as the dataset has them
   Score score;                 // mean over its views
+  std::string shape = {};      // as ModelInfo::shape
 };
+// As ShapeOf(ModelInfo).
+inline const std::string& ShapeOf(const ModelScore& model) {
+  return model.shape.empty() ? model.id : model.shape;
+}
 
 struct Evaluation {
   std::string predictor, split;
@@ -78,7 +90,7 @@ bool IsOfPhotographs(const Evaluation& evaluation);
 // Score::main in words: "3D IoU", "accuracy", "keypoints within 0.1" or "2D IoU".
 const char* MainMeasure(const Evaluation& evaluation);
 // The table with methods as rows and classes as columns, each cell "IoU / F-score", or the
-// accuracy, in percent.
+// accuracy, in percent; means with their standard errors.
 std::string FormatTable(const Evaluation& evaluation);
 std::string FormatMarkdown(const Evaluation& evaluation);
 // <run>/eval.json and <run>/eval.md, each whole or not at all.

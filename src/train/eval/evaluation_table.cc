@@ -7,16 +7,29 @@
 #include "base/json_text.h"
 #include "base/text.h"
 #include "train/eval/evaluation.h"
+#include "train/eval/measures.h"
 
 namespace tilegrad::train {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Cell(const Score& score) {
-  if (score.accuracy || score.mask_loss) return fmt::format("{:.1f}", 100 * score.main());
-  return score.f_score ? fmt::format("{:.1f} / {:.1f}", 100 * score.iou, 100 * *score.f_score)
-                       : fmt::format("{:.1f} / -", 100 * score.iou);
+// "50.1", "50.1 ± 1.2", or "-".
+std::string NumberText(const ScoreMeasure& measure, const Score& score,
+                       const std::optional<Score>& error) {
+  const auto value = measure.Of(score), off = error ? measure.Of(*error) : std::nullopt;
+  if (!value) return "-";
+  const std::string number = fmt::format("{:.{}f}", measure.factor * *value, measure.digits);
+  if (!off) return number;
+  return fmt::format("{} ± {:.{}f}", number, measure.factor * *off, measure.digits);
+}
+
+// `error`: standard errors, if they are to be told.
+std::string Cell(const Score& score, const std::optional<Score>& error = std::nullopt) {
+  const auto number = [&](const char* key) { return NumberText(MeasureOf(key), score, error); };
+  if (score.accuracy) return number("accuracy");
+  if (score.mask_loss) return fmt::format("{:.1f}", 100 * score.main());
+  return number("iou") + " / " + number("f_score");
 }
 
 bool HasAny(const Evaluation& evaluation, std::optional<double> Score::*measure) {
@@ -24,38 +37,42 @@ bool HasAny(const Evaluation& evaluation, std::optional<double> Score::*measure)
                      [&](const EvaluationRow& row) { return (row.mean.*measure).has_value(); });
 }
 
-// Of the mean over classes, where a row has it.
-struct Column {
-  std::optional<double> Score::*measure;
-  const char* heading;
-  double factor;
-  int digits;
-};
-constexpr Column kColumns[] = {{&Score::carved_iou, "carved IoU", 100, 1},
-                               {&Score::color_l1, "colour L1", 1, 3},
-                               {&Score::texture_l1, "texture L1", 1, 4},
-                               {&Score::light_angle, "light, degrees", 1, 1},
-                               {&Score::lit_l1, "texture + light L1", 1, 4},
-                               {&Score::mask_loss, "2D IoU loss", 1, 3},
-                               {&Score::pck, "PCK@0.1", 1, 3}};
+// Those that have columns of their own, of means over classes.
+std::vector<const ScoreMeasure*> ColumnsOf(const Evaluation& evaluation) {
+  std::vector<const ScoreMeasure*> out;
+  for (const ScoreMeasure& measure : kMeasures) {
+    if (measure.column && HasAny(evaluation, measure.value)) out.push_back(&measure);
+  }
+  return out;
+}
+
+// The error of a row's light over that of a constant one.
+std::optional<double> LightOfConstant(const Evaluation& evaluation, const EvaluationRow& row) {
+  for (const EvaluationRow& constant : evaluation.rows) {
+    const auto of_constant = constant.mean.light_angle, own = row.mean.light_angle;
+    if (constant.method == kMeanLightRow && own && of_constant) return *own / *of_constant;
+  }
+  return std::nullopt;
+}
 
 // Heading, then a line a method: the cells of the table as text.
 std::vector<std::vector<std::string>> Cells(const Evaluation& evaluation) {
   std::vector<std::vector<std::string>> cells = {{"method"}};
   for (const auto& name : evaluation.classes) cells[0].push_back(name);
   cells[0].push_back("mean");
-  for (const Column& column : kColumns) {
-    if (HasAny(evaluation, column.measure)) cells[0].emplace_back(column.heading);
-  }
+  const std::vector<const ScoreMeasure*> columns = ColumnsOf(evaluation);
+  for (const ScoreMeasure* column : columns) cells[0].emplace_back(column->heading);
+  const bool constant = LightOfConstant(evaluation, evaluation.rows.back()).has_value();
+  if (constant) cells[0].emplace_back("light / constant");
   for (const auto& row : evaluation.rows) {
     auto& line = cells.emplace_back(1, row.method);
     for (const auto& score : row.classes) line.push_back(Cell(score));
-    line.push_back(Cell(row.mean));
-    for (const Column& column : kColumns) {
-      if (!HasAny(evaluation, column.measure)) continue;
-      const std::optional<double>& value = row.mean.*column.measure;
-      line.push_back(value ? fmt::format("{:.{}f}", column.factor * *value, column.digits) : "-");
-    }
+    line.push_back(Cell(row.mean, row.error));
+    for (const ScoreMeasure* column : columns)
+      line.push_back(NumberText(*column, row.mean, row.error));
+    if (!constant) continue;
+    const auto ratio = LightOfConstant(evaluation, row);
+    line.push_back(ratio ? fmt::format("{:.2f}", *ratio) : "-");
   }
   return cells;
 }
@@ -111,6 +128,10 @@ constexpr const char* kPhotographNotes =
     "keypoints. "
     "All but \"predicted camera\" are seen through the annotated cameras.";
 
+constexpr const char* kErrorNote =
+    " ±: standard error of the mean over held-out models, of which a class has few: differences "
+    "between runs on the same models are known better (eval --compare).";
+
 std::string Notes(const Evaluation& evaluation) {
   if (Classifies(evaluation)) return ClassifierNotes(evaluation);
   if (IsOfPhotographs(evaluation)) return kPhotographNotes;
@@ -138,12 +159,19 @@ std::string Notes(const Evaluation& evaluation) {
         "object "
         "or its prediction covers, of 1.";
   }
+  if (HasAny(evaluation, &Score::shared_color_l1)) {
+    notes +=
+        " Where both are: the same over the pixels that both cover; then apart for the sides of a "
+        "prediction that its picture shows, and for the others.";
+  }
   if (HasAny(evaluation, &Score::texture_l1)) {
     notes +=
         " Texture L1 and texture + light L1: mean difference of colour over all pixels of the "
         "input's view, without light and with it, of 1. Light: angle between its direction and the "
         "true one.";
   }
+  const auto has_error = [](const EvaluationRow& row) { return row.error.has_value(); };
+  if (std::ranges::any_of(evaluation.rows, has_error)) notes += kErrorNote;
   if (evaluation.unusable_predictions > 0) {
     notes += fmt::format(" {} predictions without extent or area score 0.",
                          evaluation.unusable_predictions);
@@ -154,14 +182,18 @@ std::string Notes(const Evaluation& evaluation) {
 Json ToJson(const Score& score) {
   if (score.accuracy) return {{"accuracy", *score.accuracy}};
   Json json = {{"iou", score.iou}, {"f_score", nullptr}};
-  if (score.f_score) json["f_score"] = *score.f_score;
-  if (score.carved_iou) json["carved_iou"] = *score.carved_iou;
-  if (score.color_l1) json["color_l1"] = *score.color_l1;
-  if (score.texture_l1) json["texture_l1"] = *score.texture_l1;
-  if (score.lit_l1) json["lit_l1"] = *score.lit_l1;
-  if (score.light_angle) json["light_angle"] = *score.light_angle;
-  if (score.mask_loss) json["mask_loss"] = *score.mask_loss;
-  if (score.pck) json["pck"] = *score.pck;
+  for (const ScoreMeasure& measure : kMeasures) {
+    if (const auto number = measure.Of(score)) json[measure.key] = *number;
+  }
+  return json;
+}
+
+Json ToJson(const Evaluation& evaluation, const EvaluationRow& row) {
+  Json classes = Json::array();
+  for (const auto& score : row.classes) classes.push_back(ToJson(score));
+  Json json = {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}};
+  if (row.error) json["error"] = ToJson(*row.error);
+  if (const auto ratio = LightOfConstant(evaluation, row)) json["light_of_constant"] = *ratio;
   return json;
 }
 
@@ -221,16 +253,12 @@ nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
                {"class_models", evaluation.class_models},
                {"rows", Json::array()},
                {"models", Json::array()}};
-  for (const auto& row : evaluation.rows) {
-    Json classes = Json::array();
-    for (const auto& score : row.classes) classes.push_back(ToJson(score));
-    json["rows"].push_back(
-        {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}});
-  }
+  for (const auto& row : evaluation.rows) json["rows"].push_back(ToJson(evaluation, row));
   for (const ModelScore& model : evaluation.models) {
     Json entry = ToJson(model.score);
     entry["class"] = model.class_name;
     entry["id"] = model.id;
+    if (!model.shape.empty()) entry["shape"] = model.shape;
     json["models"].push_back(std::move(entry));
   }
   return json;

@@ -4,6 +4,7 @@
 
 #include "base/file.h"
 #include "train/eval/evaluation.h"
+#include "train/eval/measures.h"
 #include "train/json_fields.h"
 
 namespace tilegrad::train {
@@ -19,20 +20,12 @@ Result<const ParsedJson*> Array(const ParsedJson& json, const char* key, const s
 Result<Score> ReadScore(const ParsedJson& json, const std::string& place) {
   Score score;
   JsonFields fields(json, place);
-  const auto read = [&](const char* key, std::optional<double>* out) {
-    if (json.is_object() && json.contains(key) && !json[key].is_null())
-      fields.Read(key, &out->emplace());
-  };
-  read("accuracy", &score.accuracy);
+  for (const ScoreMeasure& measure : kMeasures) {
+    if (measure.value && json.is_object() && json.contains(measure.key) &&
+        !json[measure.key].is_null())
+      fields.Read(measure.key, &(score.*measure.value).emplace());
+  }
   if (!score.accuracy) fields.Read("iou", &score.iou);
-  read("f_score", &score.f_score);
-  read("carved_iou", &score.carved_iou);
-  read("color_l1", &score.color_l1);
-  read("texture_l1", &score.texture_l1);
-  read("lit_l1", &score.lit_l1);
-  read("light_angle", &score.light_angle);
-  read("mask_loss", &score.mask_loss);
-  read("pck", &score.pck);
   if (!fields.status().ok()) return fields.status();
   return score;
 }
@@ -51,6 +44,8 @@ Result<EvaluationRow> ReadRow(const ParsedJson& json, std::size_t classes,
     row.classes.push_back(score);
   }
   TILEGRAD_ASSIGN(row.mean, ReadScore(json.value("mean", ParsedJson()), place + ": \"mean\""));
+  if (!json.contains("error")) return row;  // not in those of earlier versions, or unknown
+  TILEGRAD_ASSIGN(row.error, ReadScore(json["error"], place + ": \"error\""));
   return row;
 }
 
@@ -86,6 +81,7 @@ Status ReadModelScores(const ParsedJson& json, const std::string& place, Evaluat
     JsonFields fields(item, entry);
     fields.Read("class", &model.class_name);
     fields.Read("id", &model.id);
+    if (item.is_object() && item.contains("shape")) fields.Read("shape", &model.shape);
     if (!fields.status().ok()) return fields.status();
   }
   return {};

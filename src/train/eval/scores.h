@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,22 +31,46 @@ Score WorstScore(const Shape& truth);
 // The mean; a measure that is not there in one is not there in the mean.
 Score MeanScore(std::span<const Score> scores);
 
-// Score::color_l1 of planar RGBA bytes, [4][pixels] each: sum and count of one picture, added.
+// What is known of a pixel of a prediction: whether the picture that it was made from shows this
+// part of it.
+enum class Side : std::uint8_t { kUnknown, kSeen, kHidden };
+
+// The colour measures of a Score, over pictures that are added one by one.
 struct ColorDifference {
-  double sum = 0;
-  std::size_t count = 0;
-  void Add(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
-  double Mean() const { return count == 0 ? 0 : sum / static_cast<double>(count); }
+  struct Sum {
+    double sum = 0;
+    std::size_t count = 0;
+    void Add(double difference) {
+      sum += difference;
+      ++count;
+    }
+    double Mean(double of_nothing) const {
+      return count == 0 ? of_nothing : sum / static_cast<double>(count);
+    }
+  };
+  bool has_sides = false;
+  Sum either, shared, seen, hidden;
+
+  // Planar RGBA bytes, [4][pixels] each; sides [pixels] of a, or empty.
+  void Add(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
+           std::span<const Side> sides = {});
+  void To(Score* score) const;
 };
 
 // Pictures of predictions as a dataset has them of its models: unlit, RGB over black.
 class PredictionPictures {
  public:
   PredictionPictures(const DatasetInfo& info, std::vector<int> views);
-  // [views][4][size][size].
-  Result<std::vector<std::uint8_t>> Draw(const Mesh& mesh);
+  struct Pictures {
+    std::vector<std::uint8_t> rgba;  // [views][4][size][size]
+    std::vector<Side> sides;         // [views][size][size], at centres of pixels
+  };
+  // `from`: the view that the mesh was predicted from; none: no sides.
+  Result<Pictures> Draw(const Mesh& mesh, std::optional<int> from = std::nullopt);
 
  private:
+  Result<std::vector<bool>> FacesSeenFrom(int view, std::size_t faces, Scene scene);
+
   const DatasetInfo& info_;
   std::vector<int> views_;
   std::unique_ptr<Workers> alone_;

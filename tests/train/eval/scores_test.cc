@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+
 #include "scene/shapes.h"
 #include "train/eval/retrieval.h"
 
@@ -47,9 +50,36 @@ TEST(Scores, ColoursCountWhereEitherCovers) {
   const std::vector<std::uint8_t> b = {0, 0, 51, 0, 102, 0, 255, 0};
   ColorDifference difference;
   difference.Add(a, b);
-  EXPECT_EQ(difference.count, 3u);
-  EXPECT_NEAR(difference.Mean(), (1.0 + 0 + 0.4) / 3, 1e-12);
-  EXPECT_EQ(ColorDifference{}.Mean(), 0);
+  Score score;
+  difference.To(&score);
+  EXPECT_EQ(difference.either.count, 3u);
+  EXPECT_NEAR(*score.color_l1, (1.0 + 0 + 0.4) / 3, 1e-12);
+  EXPECT_EQ(score.shared_color_l1, score.color_l1);  // both cover all of it
+  EXPECT_FALSE(score.seen_color_l1 || score.hidden_color_l1);
+  ColorDifference{}.To(&score);
+  EXPECT_EQ(score.color_l1, 0);
+  EXPECT_EQ(score.shared_color_l1, 1);
+}
+
+// Four pixels: both cover the first; parts of the second, painted 1/2 and 1; a alone the third, and
+// b nearly alone the fourth, of which `shared` knows nothing.
+TEST(Scores, WhereBothAreOutlinesDoNotCount) {
+  const auto planes = [](std::array<std::uint8_t, 4> grey, std::array<std::uint8_t, 4> alpha) {
+    std::vector<std::uint8_t> out;
+    for (int c = 0; c < 3; ++c) out.insert(out.end(), grey.begin(), grey.end());
+    out.insert(out.end(), alpha.begin(), alpha.end());
+    return out;
+  };
+  const std::vector<Side> sides = {Side::kSeen, Side::kHidden, Side::kSeen, Side::kHidden};
+  ColorDifference difference;
+  difference.Add(planes({255, 100, 255, 5}, {255, 200, 255, 10}),
+                 planes({204, 128, 0, 255}, {255, 128, 0, 255}), sides);
+  Score score;
+  difference.To(&score);
+  EXPECT_NEAR(*score.color_l1, (51 + 28 + 255 + 250) / 255.0 / 4, 1e-12);
+  EXPECT_NEAR(*score.shared_color_l1, (0.2 + 0.5) / 2, 1e-12);
+  EXPECT_NEAR(*score.seen_color_l1, 0.2, 1e-12);
+  EXPECT_NEAR(*score.hidden_color_l1, 0.5, 1e-12);
 }
 
 TEST(PredictionPictures, ShowUnlitColours) {
@@ -58,7 +88,7 @@ TEST(PredictionPictures, ShowUnlitColours) {
   PredictionPictures pictures(info, {0, 5});
   Mesh ball = Icosphere(3, 0.45f);
   ball.colors.assign(ball.positions.size(), {1.0f, 0.2f, 0.0f, 1.0f});
-  const auto images = pictures.Draw(ball).value();
+  const auto images = pictures.Draw(ball).value().rgba;
   ASSERT_EQ(images.size(), 2u * 4 * 16 * 16);
   const std::size_t centre = 8 * 16 + 8;
   for (std::size_t v = 0; v < 2; ++v) {
@@ -73,6 +103,28 @@ TEST(PredictionPictures, ShowUnlitColours) {
   broken.positions = {glm::vec3(0)};
   broken.faces = {{0, 0, 9}};
   EXPECT_FALSE(pictures.Draw(broken).ok());
+}
+
+// Of a ball, the view itself shows all that it sees, and the one from behind nearly nothing.
+TEST(PredictionPictures, KnowWhichSidesAViewSees) {
+  DatasetInfo info;
+  info.image_size = info.camera.lens.width = info.camera.lens.height = 16;
+  info.camera.elevation = 0;
+  PredictionPictures pictures(info, {0, 12});
+  Mesh ball = Icosphere(3, 0.45f);
+  ball.colors.assign(ball.positions.size(), glm::vec4(1));
+  const auto drawn = pictures.Draw(ball, 0).value();
+  ASSERT_EQ(drawn.sides.size(), 2u * 16 * 16);
+  const auto count = [&](std::size_t view, Side side) {
+    const auto from = drawn.sides.begin() + static_cast<std::ptrdiff_t>(view * 256);
+    return std::count(from, from + 256, side);
+  };
+  EXPECT_GT(count(0, Side::kSeen), 80);
+  // But for pixels of faces at the outline.
+  EXPECT_LE(count(0, Side::kHidden), 2);
+  EXPECT_LE(count(1, Side::kSeen), 2);
+  EXPECT_NEAR(count(1, Side::kHidden), count(0, Side::kSeen), 4);
+  EXPECT_TRUE(pictures.Draw(ball).value().sides.empty());
 }
 
 std::vector<std::uint8_t> Flat(std::uint8_t value, int size) {

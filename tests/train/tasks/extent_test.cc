@@ -75,7 +75,8 @@ Status WriteBoxes(const Path& folder, double half_extent) {
   for (int m = 0; m < 4; ++m) {
     const Mesh mesh = BoxOf(m, half_extent);
     ModelData data;
-    TILEGRAD_ASSIGN(data.images, pictures.Draw(mesh));
+    TILEGRAD_ASSIGN(auto drawn, pictures.Draw(mesh));
+    data.images = std::move(drawn.rgba);
     TILEGRAD_ASSIGN(data.occupancy, Voxelize(mesh, kOccupancyResolution));
     ModelInfo& model = models.emplace_back();
     model.id = std::to_string(m);

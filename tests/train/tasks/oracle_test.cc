@@ -32,7 +32,7 @@ ModelData PicturesOf(const Mesh& mesh, const DatasetInfo& info) {
   for (int view = 0; view < info.views; ++view) views.push_back(view);
   ModelData data;
   data.mesh = mesh;
-  data.images = PredictionPictures(info, views).Draw(mesh).value();
+  data.images = PredictionPictures(info, views).Draw(mesh).value().rgba;
   return data;
 }
 

@@ -138,8 +138,8 @@ class Examiner {
     out_.rows.push_back(means.Row("tilegrad", said_));
     for (std::size_t i = 0; i < models.size(); ++i) {
       const ModelInfo& info = Info(models[i]);
-      out_.models.push_back(
-          {model_.classes()[static_cast<std::size_t>(info.class_index)], info.id, said_[i]});
+      out_.models.push_back({model_.classes()[static_cast<std::size_t>(info.class_index)], info.id,
+                             said_[i], info.shape});
     }
     out_.predictor = job_.predictor.description();
     out_.dataset_source = data_.info().source;

@@ -13,6 +13,7 @@
 #include "scene/weak_perspective_ref.h"
 #include "train/data/dataset_files.h"
 #include "train/eval/scores.h"
+#include "train/eval/standard_error.h"
 #include "train/metrics/keypoint_score.h"
 #include "train/predictor.h"
 #include "train/ranks/share.h"
@@ -181,8 +182,9 @@ class PhotographJudge {
     out.classes = {set_.source};
     out.class_models = {static_cast<int>(chosen.size())};
     for (int m = 0; m < kMethods; ++m) {
-      const Score mean = tallies_[static_cast<std::size_t>(m)].Mean(set_.keypoint_names.size());
-      out.rows.push_back({kRowNames[m], {mean}, mean});
+      const Tally& tally = tallies_[static_cast<std::size_t>(m)];
+      const Score mean = tally.Mean(set_.keypoint_names.size());
+      out.rows.push_back({kRowNames[m], {mean}, mean, StandardErrors({&tally.scores, 1})});
     }
     for (std::size_t i = 0; i < chosen.size(); ++i)
       out.models.push_back({set_.source, set_.photographs[static_cast<std::size_t>(chosen[i])].id,
