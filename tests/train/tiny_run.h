@@ -133,18 +133,18 @@ T& ValueOf(TrainConfig& config, const std::string& key) {
 
 enum class Meshes { kNone, kBoxes };
 
-inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone,
-                                int classes = 1) {
-  constexpr int kModels = 12, kSize = 32, kViews = 4;
+inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone, int classes = 1,
+                                int size = 32) {
+  constexpr int kModels = 12, kViews = 4;
   DatasetInfo info;
   info.source = meshes == Meshes::kNone ? "nmr" : "folder";
-  info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
+  info.image_size = info.camera.lens.width = info.camera.lens.height = size;
   info.views = kViews;
   for (int c = 0; c < classes; ++c)
     info.classes.push_back("noise" + (c > 0 ? std::to_string(c) : std::string()));
   info.recipe = "0000000000000000";
   ModelData data;
-  data.images.resize(std::size_t{kViews} * 4 * kSize * kSize);
+  data.images.resize(std::size_t{kViews} * 4 * static_cast<std::size_t>(size * size));
   data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
                         kOccupancyResolution);
   if (meshes == Meshes::kBoxes) {

@@ -177,8 +177,11 @@ TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
 
 // The files of configs/ name keys that there are, and sizes that go with their images.
 TEST(TexturedConfigs, AreRead) {
-  for (const auto& [file, size] :
-       {std::pair("texture_quick", 64), {"texture_adversarial", 64}, {"texture_paper", 256}}) {
+  for (const auto& [file, size] : {std::pair("texture_quick", 64),
+                                   {"texture_adversarial", 64},
+                                   {"table2", 128},
+                                   {"texture_paper", 256},
+                                   {"texture_adversarial_paper", 256}}) {
     const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
     const auto config = ParseConfig(ReadText(path).value(), path.string());
     ASSERT_TRUE(config.ok()) << config.status().message();
