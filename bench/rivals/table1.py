@@ -6,8 +6,10 @@
     python3 bench/rivals/table1.py --data datasets/thirteen --out runs/table1 [--seeds 1 2]
 
 Trains and scores each renderer with each seed, one run after the other, and prints the table as
-Markdown: 3D IoU / F-score of each class, and both rules of IoU. A run that is finished is kept, one
-that was stopped goes on. Processor time is that of training, start-up included.
+Markdown: 3D IoU / F-score of each class, and both rules of IoU, with standard errors over held-out
+models; then differences to our renderer by pairs of models, with errors over models and seeds. A run
+that is finished is kept, one that was stopped goes on. Processor time is that of training, start-up
+included.
 """
 
 from __future__ import annotations
@@ -61,21 +63,17 @@ def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any
     return found
 
 
-def mean_of(classes: list[dict[str, float]], score: str) -> float:
-    return 100 * statistics.fmean(one[score] for one in classes)
-
-
 def cells(rows: list[dict[str, Any]]) -> list[str]:
-    """One row of the table: the mean over runs of each class, then means over classes with spread."""
+    """One row of the table: the mean over runs of each class, then means over classes with errors."""
     out = []
     for number in range(len(rows[0]["classes"])):
         iou, f_score = (statistics.fmean(100 * row["classes"][number][score] for row in rows)
                         for score in SCORES[:2])
         out.append(f"{iou:.1f} / {f_score:.1f}")
     for score in SCORES:
-        means = [mean_of(row["classes"], score) for row in rows]
-        spread = f" ± {(max(means) - min(means)) / 2:.1f}" if len(means) > 1 else ""
-        out.append(f"{statistics.fmean(means):.1f}{spread}")
+        mean = 100 * statistics.fmean(row["mean"][score] for row in rows)
+        error = 100 * statistics.fmean(row["error"][score] for row in rows)
+        out.append(f"{mean:.1f} ± {error:.1f}")
     return out
 
 
@@ -104,6 +102,7 @@ def main() -> int:
         print(f"table1: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results, options.steps))
+    print(runs.comparisons(results, "DIB-R", {score: (100, 1) for score in SCORES}))
     return 0
 
 

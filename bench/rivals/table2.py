@@ -7,8 +7,9 @@
 
 One network, the same data, steps and losses (configs/texture_quick.toml); only the renderer differs.
 Trains and scores one run after the other and prints the table as Markdown. Errors are means over all
-pixels and channels of the image; below each of ours stand the predicted texture without light and
-under the mean of all lights. A run that is finished is kept, one that was stopped goes on.
+pixels and channels of the image, with standard errors over held-out models; below each of ours stand
+the predicted texture without light and under the mean of all lights. Differences come last, by pairs
+of models, with errors over models and seeds. A run that is finished is kept, one that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import runs
 METHODS = {"N3MR": "render.rule=n3mr", "DIB-R": "render.rule=dibr"}
 # Cars of ShapeNet as printed: texture L1, angle of the light, texture + light L1.
 PAPER = {"N3MR": (0.03640, 23.5585, 0.02208), "DIB-R": (0.02179, 9.7096, 0.01362)}
-SCORES = ("texture_l1", "light_angle", "lit_l1")
+SCORES = {"texture_l1": (1, 4), "light_angle": (1, 1), "lit_l1": (1, 4)}  # factor, digits
 BASELINES = ("without light", "mean light")
 
 
@@ -43,17 +44,21 @@ def number(values: list[float | None], digits: int) -> str:
     known = [value for value in values if value is not None]
     if not known:
         return ""
-    spread = f" ± {(max(known) - min(known)) / 2:.{digits}f}" if len(known) > 1 else ""
-    return f"{statistics.fmean(known):.{digits}f}{spread}"
+    return f"{statistics.fmean(known):.{digits}f}"
 
 
 def cells(rows: list[dict[str, Any]]) -> list[str]:
-    return [number([row["mean"].get(score) for row in rows], 1 if score == "light_angle" else 4)
-            for score in SCORES]
+    out = []
+    for score, (_, digits) in SCORES.items():
+        error = number([row["error"].get(score) for row in rows], digits)
+        out.append(number([row["mean"].get(score) for row in rows], digits) + (f" ± {error}" if error else ""))
+    ratio = number([row.get("light_of_constant") for row in rows], 2)
+    return [*out, ratio]
 
 
 def table(results: dict[str, list[dict[str, Any]]]) -> str:
-    lines = [["method", "texture L1", "light (degrees)", "texture + light L1", "paper"], ["---"] + ["--:"] * 4]
+    header = ["method", "texture L1", "light (degrees)", "texture + light L1", "light / constant", "paper"]
+    lines = [header, ["---"] + ["--:"] * 5]
     for method, found in results.items():
         printed = " / ".join(str(value) for value in PAPER[method])
         lines.append([method, *cells([runs.row_of(one, "tilegrad") for one in found]), printed])
@@ -73,6 +78,7 @@ def main() -> int:
         print(f"table2: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results))
+    print(runs.comparisons(results, "DIB-R", SCORES))
     return 0
 
 
