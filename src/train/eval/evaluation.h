@@ -20,7 +20,8 @@ inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0
 struct Score {
   // What methods are compared by, in [0, 1]; more is better.
   double main() const {
-    if (mask_loss) return pck.value_or(1 - *mask_loss);
+    if (pck) return *pck;
+    if (mask_loss) return 1 - *mask_loss;
     return accuracy.value_or(iou);
   }
 

@@ -28,7 +28,7 @@ std::string NumberText(const ScoreMeasure& measure, const Score& score,
 std::string Cell(const Score& score, const std::optional<Score>& error = std::nullopt) {
   const auto number = [&](const char* key) { return NumberText(MeasureOf(key), score, error); };
   if (score.accuracy) return number("accuracy");
-  if (score.mask_loss) return fmt::format("{:.1f}", 100 * score.main());
+  if (score.mask_loss || score.pck) return fmt::format("{:.1f}", 100 * score.main());
   return number("iou") + " / " + number("f_score");
 }
 
@@ -126,7 +126,9 @@ constexpr const char* kPhotographNotes =
     "is "
     "the share of visible keypoints within a tenth of the box's longer side, a mean over "
     "keypoints. "
-    "All but \"predicted camera\" are seen through the annotated cameras.";
+    "All but \"predicted camera\" are seen through the annotated cameras; \"true keypoints\" says "
+    "what "
+    "these leave to gain.";
 
 constexpr const char* kErrorNote =
     " ±: standard error of the mean over held-out models, of which a class has few: differences "

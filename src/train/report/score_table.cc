@@ -130,9 +130,8 @@ std::string SideLine(const std::string& method, std::initializer_list<SideCell> 
 std::string PhotographsHtml(const Evaluation& evaluation) {
   std::string lines;
   for (const auto& row : evaluation.rows) {
-    lines += SideLine(row.method, {{row.mean.texture_l1.value_or(0), 4},
-                                   {row.mean.mask_loss.value_or(0), 3},
-                                   {row.mean.pck, 3}});
+    lines += SideLine(row.method,
+                      {{row.mean.texture_l1, 4}, {row.mean.mask_loss, 3}, {row.mean.pck, 3}});
   }
   static constexpr const char* kColumns[] = {"texture L1", "2D IoU loss", "PCK@0.1"};
   return SideTable("Photographs", kColumns, lines,

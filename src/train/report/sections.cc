@@ -29,8 +29,7 @@ std::string Comparison(const Evaluation& evaluation) {
 
 // Whether the methods draw one shape under lights of their own: then pictures tell them apart.
 bool IsOfLight(const Evaluation& evaluation) {
-  return std::ranges::all_of(evaluation.rows,
-                             [](const auto& row) { return row.mean.lit_l1.has_value(); });
+  return evaluation.rows.back().mean.lit_l1.has_value();
 }
 
 std::string ComparisonOfLight(const Evaluation& evaluation) {
@@ -38,8 +37,9 @@ std::string ComparisonOfLight(const Evaluation& evaluation) {
   std::string out = fmt::format(
       ". Under the light that it predicts its pictures are off by <b>{:.4f}</b> of 1", *own.lit_l1);
   for (std::size_t i = 0; i + 1 < evaluation.rows.size(); ++i) {
-    const auto& [method, classes, mean] = evaluation.rows[i];
-    out += fmt::format(", {} by {:.4f}", EscapeHtml(method), *mean.lit_l1);
+    const EvaluationRow& row = evaluation.rows[i];
+    if (!row.mean.lit_l1) continue;
+    out += fmt::format(", {} by {:.4f}", EscapeHtml(row.method), *row.mean.lit_l1);
   }
   if (own.light_angle) out += fmt::format("; its lights are {:.1f} degrees off", *own.light_angle);
   return out + ".";
@@ -129,6 +129,7 @@ std::string ComparisonHtml(const ReportFacts& facts) {
   std::string out =
       fmt::format("<dl class=\"bars\" aria-label=\"Mean {} of each method\">\n", measure);
   for (const auto& row : rows) {
+    if (light && !row.mean.lit_l1) continue;
     const double share = light ? *row.mean.lit_l1 / most : std::clamp(row.mean.main(), 0.0, 1.0);
     const std::string value = light ? fmt::format("{:.4f}", *row.mean.lit_l1)
                                     : fmt::format("{:.1f} %", 100 * row.mean.main());

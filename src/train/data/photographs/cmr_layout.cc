@@ -234,18 +234,28 @@ class CmrReader {
     TILEGRAD_ASSIGN(const MatPlace mask, images.Field(i, "mask"));
     TILEGRAD_ASSIGN(photo.mask, ReadMask(mask));
     TILEGRAD_ASSIGN(photo.camera, ReadCamera(cameras, i));
+    if (cameras.HasField("points")) {
+      TILEGRAD_ASSIGN(const MatPlace points, cameras.Field(i, "points"));
+      TILEGRAD_ASSIGN(photo.points, ReadPlaces(points));
+    }
     set_.photographs.push_back(std::move(photo));
     return {};
   }
 
   Status ReadMeanShape(const io::MatFile& sfm) {
-    const std::size_t count = set_.keypoint_names.size();
     TILEGRAD_ASSIGN(const MatPlace shape, MatPlace::Variable(sfm, "S"));
-    TILEGRAD_TRY(shape.ExpectSize(3, count));
-    TILEGRAD_ASSIGN(const auto s, shape.Numbers(3 * count));
-    for (std::size_t k = 0; k < count; ++k)
-      set_.mean_keypoints.push_back({s[3 * k], s[3 * k + 1], s[3 * k + 2]});
+    TILEGRAD_ASSIGN(set_.mean_keypoints, ReadPlaces(shape));
     return {};
+  }
+
+  // 3 x K.
+  Result<std::vector<std::array<double, 3>>> ReadPlaces(const MatPlace& places) const {
+    const std::size_t count = set_.keypoint_names.size();
+    TILEGRAD_TRY(places.ExpectSize(3, count));
+    TILEGRAD_ASSIGN(const auto s, places.Numbers(3 * count));
+    std::vector<std::array<double, 3>> out;
+    for (std::size_t k = 0; k < count; ++k) out.push_back({s[3 * k], s[3 * k + 1], s[3 * k + 2]});
+    return out;
   }
 
   Layout layout_;

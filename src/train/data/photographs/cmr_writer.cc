@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/cmr_writer.h"
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "io/mat_file.h"
 #include "scene/weak_perspective_ref.h"
@@ -46,8 +48,15 @@ MatArray RotationArray(const WeakPerspective& camera) {
   return MatArray::Numbers({3, 3}, columns);
 }
 
+MatArray PlacesArray(const std::vector<std::array<double, 3>>& points) {
+  std::vector<double> numbers;
+  for (const auto& point : points) numbers.insert(numbers.end(), point.begin(), point.end());
+  return MatArray::Numbers({3, points.size()}, numbers);
+}
+
 struct Part {
   std::vector<MatArray> images, cameras;
+  std::vector<std::string> camera_fields = {"rot", "scale", "trans"};
 
   void Add(const Photograph& photo) {
     images.push_back(MatArray::Text(photo.id));
@@ -60,15 +69,9 @@ struct Part {
     cameras.push_back(MatArray::Number(photo.camera->scale));
     cameras.push_back(
         RowArray({photo.camera->translation[0] + 0.5, photo.camera->translation[1] + 0.5}));
+    if (camera_fields.size() > 3) cameras.push_back(PlacesArray(photo.points));
   }
 };
-
-MatArray MeanShape(const PhotographSet& set) {
-  std::vector<double> numbers;
-  for (const auto& point : set.mean_keypoints)
-    numbers.insert(numbers.end(), point.begin(), point.end());
-  return MatArray::Numbers({3, set.mean_keypoints.size()}, numbers);
-}
 
 Status WriteKeypointNames(const Path& folder, const PhotographSet& set) {
   std::vector<double> mirror;
@@ -89,7 +92,14 @@ Status WriteCmrLayout(const Path& folder, const PhotographSet& set) {
   if (!cub) TILEGRAD_TRY(WriteKeypointNames(folder, set));
   for (const Split split : {Split::kTrain, Split::kValidation, Split::kTest}) {
     Part part;
-    for (const int i : set.Select(split)) part.Add(set.photographs[static_cast<std::size_t>(i)]);
+    const std::vector<int> chosen = set.Select(split);
+    const auto photo = [&](int i) -> const Photograph& {
+      return set.photographs[static_cast<std::size_t>(i)];
+    };
+    // Of all photographs of a part, or of none.
+    if (std::ranges::any_of(chosen, [&](int i) { return !photo(i).points.empty(); }))
+      part.camera_fields.emplace_back("points");
+    for (const int i : chosen) part.Add(photo(i));
     // PASCAL3D+ calls its held-out part "val" and has no other.
     const std::string name = split == Split::kTrain         ? "train"
                              : split == Split::kTest && cub ? "test"
@@ -101,10 +111,10 @@ Status WriteCmrLayout(const Path& folder, const PhotographSet& set) {
         folder / "data" / anno,
         {{"images", MatArray::Structs({"rel_path", "bbox", "width", "height", "parts", "mask"},
                                       std::move(part.images))}}));
-    TILEGRAD_TRY(io::SaveMat(
-        folder / "sfm" / sfm,
-        {{"sfm_anno", MatArray::Structs({"rot", "scale", "trans"}, std::move(part.cameras))},
-         {"S", MeanShape(set)}}));
+    TILEGRAD_TRY(
+        io::SaveMat(folder / "sfm" / sfm,
+                    {{"sfm_anno", MatArray::Structs(part.camera_fields, std::move(part.cameras))},
+                     {"S", PlacesArray(set.mean_keypoints)}}));
   }
   return {};
 }

@@ -49,21 +49,23 @@ Status CheckCamera(const WeakPerspective& camera) {
   return {};
 }
 
-Status CheckPlaces(const Photograph& photo) {
-  TILEGRAD_TRY(CheckBox(photo));
-  TILEGRAD_TRY(CheckKeypoints(photo));
-  return photo.camera ? CheckCamera(*photo.camera) : Status();
-}
-
-Status CheckMeanShape(const PhotographSet& set) {
-  for (const auto& place : set.mean_keypoints) {
+// `what`: "a mean keypoint".
+Status CheckWorld(const std::vector<std::array<double, 3>>& places, const char* what) {
+  for (const auto& place : places) {
     for (const double x : place) {
       if (IsFarther(x, kLargestScale))
-        return InvalidArgument("a mean keypoint is at {}, {:g} from the middle at most is possible",
-                               x, kLargestScale);
+        return InvalidArgument("{} is at {}, {:g} from the middle at most is possible", what, x,
+                               kLargestScale);
     }
   }
   return {};
+}
+
+Status CheckPlaces(const Photograph& photo) {
+  TILEGRAD_TRY(CheckBox(photo));
+  TILEGRAD_TRY(CheckKeypoints(photo));
+  TILEGRAD_TRY(CheckWorld(photo.points, "the true place of a keypoint"));
+  return photo.camera ? CheckCamera(*photo.camera) : Status();
 }
 
 }  // namespace
@@ -93,7 +95,7 @@ Result<PhotographSet> OpenPhotographs(const Path& folder) {
     return InvalidArgument("{}: no photographs to train on", folder.string());
   for (const Photograph& photo : set->photographs)
     TILEGRAD_TRY(CheckPlaces(photo).Within((folder / photo.id).string()));
-  TILEGRAD_TRY(CheckMeanShape(*set).Within(folder.string()));
+  TILEGRAD_TRY(CheckWorld(set->mean_keypoints, "a mean keypoint").Within(folder.string()));
   return std::move(*set);
 }
 

@@ -7,7 +7,8 @@
 //               pictures in images/ or CUB_200_2011/images/
 //   PASCAL3D+   as CMR's code lays it out: data/<class>_kps.mat, data/<class>_{train,val}.mat and
 //               sfm/<class>_{train,val}.mat, in the folder, p3d/ or cachedir/p3d/; pictures in
-//               Images/ or PASCAL3D+_release1.1/Images/. Its val is what we test on.
+//               Images/ or PASCAL3D+_release1.1/Images/. Its val is what we test on. Of rendered
+//               objects (rendered_set.h) sfm_anno also has `points`, 3 x K: Photograph::points
 //   a folder    of pictures with alpha, or with masks/<name>.png; cameras of COLMAP,
 //               transforms.json, or transforms_train.json and transforms_test.json, which say what
 //               is held out; keypoints.json (docs/photographs.md)
@@ -57,6 +58,9 @@ struct Photograph {
   PhotoMask mask;                   // empty: the picture's alpha
   std::vector<Keypoint> keypoints;  // as many as the set has names
   std::optional<WeakPerspective> camera;
+  // Where its keypoints truly are in the world of the cameras. Empty: nobody knows, as of all that
+  // was taken of real objects.
+  std::vector<std::array<double, 3>> points = {};
 };
 
 struct PhotographSet {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/rendered_set.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -118,6 +119,7 @@ class Photographer {
       const bool free =
           there && -q[2] < seen.depth[static_cast<std::size_t>(j * kSide + i)] + kHidden;
       photo->keypoints.push_back({x + left, y + top, free});
+      photo->points.push_back({p.x, p.y, p.z});
     }
     return {};
   }
@@ -187,6 +189,45 @@ Status FindCameras(PhotographSet* set) {
   return {};
 }
 
+using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic>;
+
+PointColumns MatrixOf(const std::vector<std::array<double, 3>>& points) {
+  PointColumns out(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t k = 0; k < points.size(); ++k)
+    out.col(static_cast<Eigen::Index>(k)) = Eigen::Vector3d(points[k].data());
+  return out;
+}
+
+// From the world of the models to that of the cameras, by the means of keypoints in both.
+Eigen::Matrix4d WorldOfCameras(const PhotographSet& set) {
+  PointColumns mean = PointColumns::Zero(3, static_cast<Eigen::Index>(set.mean_keypoints.size()));
+  const std::vector<int> train = set.Select(Split::kTrain);
+  for (const int i : train)
+    mean += MatrixOf(set.photographs[static_cast<std::size_t>(i)].points) /
+            static_cast<double>(train.size());
+  return Eigen::umeyama(mean, MatrixOf(set.mean_keypoints));
+}
+
+// Of the test part alone: nothing else knows the models.
+void TellTruth(PhotographSet* set) {
+  const Eigen::Matrix4d to_cameras = WorldOfCameras(*set);
+  for (Photograph& photo : set->photographs) {
+    if (photo.split != Split::kTest) {
+      photo.points.clear();
+      continue;
+    }
+    std::vector<Keypoint> all = photo.keypoints;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const Eigen::Vector3d place =
+          to_cameras.topLeftCorner<3, 3>() * Eigen::Vector3d(photo.points[k].data()) +
+          to_cameras.topRightCorner<3, 1>();
+      photo.points[k] = {place[0], place[1], place[2]};
+      all[k].visible = true;
+    }
+    photo.camera = FitWeakCamera(photo.points, all, *photo.camera);
+  }
+}
+
 }  // namespace
 
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
@@ -224,6 +265,7 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
       set.photographs.push_back(std::move(photo));
   }
   TILEGRAD_TRY(FindCameras(&set));
+  TellTruth(&set);
   return WriteCmrLayout(folder, set);
 }
 

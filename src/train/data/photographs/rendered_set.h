@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs that anyone can make: models in front of real backgrounds, one view of each object,
 // annotated as badly as real ones are, in the layout of PASCAL3D+ (photographs.h). Nothing knows
-// the models afterwards but the annotations of the test part, which are exact.
+// the models afterwards but the annotations of the test part, which are exact: also its cameras,
+// each that which sees its object's true keypoints best, in the world of the training part's.
 #pragma once
 
 #include "base/parallel.h"
@@ -30,8 +31,8 @@ struct AnnotationNoise {
 // Writes <folder>/Images and <folder>/{data,sfm}. An object is a model stretched by up to 15 %
 // along each axis, seen from all around at elevations from -5 to 30 degrees by a pinhole camera a
 // few lengths away, under the light of datasets. Keypoints: extreme_points.h, visible where nothing
-// hides them. Cameras: factorization.h, from the keypoints alone. The same for any number of
-// workers.
+// hides them. Cameras of the training part: factorization.h, from the keypoints alone. The same for
+// any number of workers.
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const ProgressSink& progress, const StopFlag& stop);
 

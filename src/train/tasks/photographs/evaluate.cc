@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/photographs/evaluate.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -25,8 +26,9 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kPckThreshold = 0.1;
-enum CameraMethod { kMean, kOwnCamera, kOurs, kMethods };
-constexpr const char* kRowNames[kMethods] = {"mean shape", "predicted camera", "tilegrad"};
+enum CameraMethod { kCeiling, kMean, kOwnCamera, kOurs, kMethods };
+constexpr const char* kRowNames[kMethods] = {"true keypoints", "mean shape", "predicted camera",
+                                             "tilegrad"};
 
 Path PhotographListOf(const Path& run) { return run / "training_photographs.txt"; }
 
@@ -130,8 +132,10 @@ class PhotographJudge {
     TILEGRAD_ASSIGN(const auto predicted,
                     PredictPhotographs(model_.context(), model_.network(), batch.input));
     first_ = static_cast<std::size_t>(first);
-    for (std::size_t i = 0; i < predicted.size(); ++i)
+    for (std::size_t i = 0; i < predicted.size(); ++i) {
+      ScoreTruth(store.photograph(some[i]), batch, i);
       TILEGRAD_TRY(ScoreOne(batch, i, predicted[i]));
+    }
     return {};
   }
 
@@ -143,6 +147,32 @@ class PhotographJudge {
     TILEGRAD_TRY(Compare(batch, i, {mean, batch.cameras[i]}, &tallies_[kMean]));
     TILEGRAD_TRY(Compare(batch, i, {photo, photo.camera}, &tallies_[kOwnCamera]));
     return Compare(batch, i, {photo, batch.cameras[i]}, &tallies_[kOurs]);
+  }
+
+  // What the annotated camera leaves to gain.
+  void ScoreTruth(const Photograph& photo, const PhotographBatch& batch, std::size_t i) {
+    if (photo.points.empty()) return;
+    Score score;
+    score.pck = Pck(batch.crops[i], {photo.points, batch.cameras[i]}, i, &tallies_[kCeiling]);
+    tallies_[kCeiling].scores[first_ + i] = score;
+  }
+
+  struct SeenKeypoints {
+    const std::vector<std::array<double, 3>>& places;
+    const WeakPerspective& camera;
+  };
+  std::optional<double> Pck(const CroppedPhoto& crop, const SeenKeypoints& seen, std::size_t i,
+                            Tally* tally) const {
+    KeypointScore own(1, kPckThreshold);
+    for (std::size_t k = 0; k < crop.keypoints.size(); ++k) {
+      if (!crop.keypoints[k].visible) continue;
+      const auto at = ProjectWeakly(seen.camera, seen.places[k]);
+      const double error =
+          crop.to_box * std::hypot(at[0] - crop.keypoints[k].x, at[1] - crop.keypoints[k].y);
+      tally->errors[(first_ + i) * crop.keypoints.size() + k] = error;
+      own.Add(0, error);
+    }
+    return own.Mean();
   }
 
   struct SeenThrough {
@@ -158,17 +188,7 @@ class PhotographJudge {
     Score score;
     score.texture_l1 = image.color;
     score.mask_loss = image.iou_loss;
-    const CroppedPhoto& crop = batch.crops[i];
-    KeypointScore own(1, kPckThreshold);
-    for (std::size_t k = 0; k < crop.keypoints.size(); ++k) {
-      if (!crop.keypoints[k].visible) continue;
-      const auto at = ProjectWeakly(seen.camera, seen.photo.keypoints[k]);
-      const double error =
-          crop.to_box * std::hypot(at[0] - crop.keypoints[k].x, at[1] - crop.keypoints[k].y);
-      tally->errors[(first_ + i) * crop.keypoints.size() + k] = error;
-      own.Add(0, error);
-    }
-    score.pck = own.Mean();
+    score.pck = Pck(batch.crops[i], {seen.photo.keypoints, seen.camera}, i, tally);
     tally->scores[first_ + i] = score;
     return {};
   }
@@ -181,7 +201,10 @@ class PhotographJudge {
     out.views_per_model = 1;
     out.classes = {set_.source};
     out.class_models = {static_cast<int>(chosen.size())};
-    for (int m = 0; m < kMethods; ++m) {
+    const bool truths = std::ranges::all_of(chosen, [&](int i) {
+      return !set_.photographs[static_cast<std::size_t>(i)].points.empty();
+    });
+    for (int m = truths ? kCeiling : kMean; m < kMethods; ++m) {
       const Tally& tally = tallies_[static_cast<std::size_t>(m)];
       const Score mean = tally.Mean(set_.keypoint_names.size());
       out.rows.push_back({kRowNames[m], {mean}, mean, StandardErrors({&tally.scores, 1})});

@@ -8,6 +8,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/data/photographs/extreme_points.h"
+#include "train/data/photographs/factorization.h"
 
 namespace tilegrad::train::rendered_set_test {
 
@@ -43,6 +44,26 @@ TEST_F(RenderedSet, IsInTheLayoutOfPascal3d) {
       EXPECT_LT(k.x, photo.box.right + 2);
     }
   }
+}
+
+// The test part's cameras see the true keypoints where they are annotated, but for perspective: an
+// eighth of a box at most, as objects are about a unit deep and 2.3 units away; the training part's
+// know a mean shape only. Nothing tells where the training part's keypoints truly are.
+TEST_F(RenderedSet, TestCamerasAreExact) {
+  ASSERT_TRUE(Make("a", 2).ok());
+  const auto set = OpenPhotographs(folder_ / "a");
+  ASSERT_TRUE(set.ok()) << set.status().message();
+  double sum = 0;
+  int count = 0;
+  for (const Photograph& photo : set->photographs) {
+    EXPECT_EQ(photo.points.empty(), photo.split == Split::kTrain);
+    if (photo.points.empty()) continue;
+    ASSERT_EQ(photo.points.size(), photo.keypoints.size());
+    sum += WeakCameraError(photo.points, photo.keypoints, *photo.camera) / photo.box.longer_side();
+    ++count;
+  }
+  ASSERT_GT(count, 1);
+  EXPECT_LT(sum / count, 0.04);
 }
 
 TEST_F(RenderedSet, IsTheSameForAnyWorkers) {
