@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/models/photograph_network.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
+#include <numeric>
+#include <vector>
 
 #include "base/error.h"
 #include "nn/nn.h"
+#include "nn/ops/sample_pictures.h"
+#include "train/ops/weak_cameras.h"
 
 namespace tilegrad::train {
 namespace {
@@ -16,7 +22,6 @@ constexpr double kStartRadius = 0.6;     // without keypoints; the object's long
 constexpr double kStartScale = 0.9;      // of cameras, where an object fills its crop
 constexpr double kLeastReach = 0.12;     // a hull that is flat or thin is filled up to this
 constexpr double kKeypointNearness = 8;  // of a keypoint's weights: exp(-(this * distance)^2)
-constexpr std::int64_t kWeakCameraNumbers = 7;
 
 glm::dvec3 VectorOf(const KeypointPlace& p) { return {p[0], p[1], p[2]}; }
 
@@ -38,7 +43,44 @@ nn::Var CamerasOf(const nn::Var& raw) {
                     1);
 }
 
+// Of logits [B, N]: for each row the place of its largest number in all rows of [B N, ..].
+std::vector<std::int32_t> Likeliest(const nn::Tensor& logits) {
+  const std::int64_t count = logits.shape()[1];
+  std::vector<std::int32_t> out;
+  nn::WithFloatType(logits.dtype(), [&]<class T>(T) {
+    const std::span<const T> all = logits.span<T>();
+    for (std::int64_t b = 0; b < logits.shape()[0]; ++b) {
+      const auto row =
+          all.subspan(static_cast<std::size_t>(b * count), static_cast<std::size_t>(count));
+      const auto best = std::ranges::max_element(row) - row.begin();
+      out.push_back(static_cast<std::int32_t>(b * count + best));
+    }
+  });
+  return out;
+}
+
 }  // namespace
+
+// Half a turn about x, as the world's y, which is up, goes to the image's, which is down; before it
+// the turn about y.
+std::array<double, 4> StartingRotation(int k, int count) {
+  const double half = std::numbers::pi * k / count;
+  return {0, std::cos(half), 0, std::sin(half)};
+}
+
+int NearestStart(const std::array<double, 4>& quaternion, int count) {
+  int best = 0;
+  double most = -1;
+  for (int k = 0; k < count; ++k) {
+    const std::array<double, 4> start = StartingRotation(k, count);
+    const double agree =
+        std::abs(std::inner_product(start.begin(), start.end(), quaternion.begin(), 0.0));
+    if (agree <= most) continue;
+    most = agree;
+    best = k;
+  }
+  return best;
+}
 
 // All triangles of the points lie within the hull, and its faces are among them.
 double HullReach(const std::vector<KeypointPlace>& points, const KeypointPlace& centre,
@@ -111,10 +153,18 @@ void PhotographNetwork::BuildHeads(Rng& rng) {
   auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, sphere_.numbers(), rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
-  auto& camera = nn::AddLinear(all_.camera, "fc", context_, latent, kWeakCameraNumbers, rng);
-  // Half a turn about x: the world's y, which is up, to the image's, which is down.
+  const std::int64_t count = config_.azimuths, logits = count > 1 ? count : 0;
+  auto& camera =
+      nn::AddLinear(all_.camera, "fc", context_, latent, count * kWeakNumbers + logits, rng);
+  std::vector<double> start;
+  for (int k = 0; k < count; ++k) {
+    start.insert(start.end(), {0, 0, 0});
+    const std::array<double, 4> rotation = StartingRotation(k, static_cast<int>(count));
+    start.insert(start.end(), rotation.begin(), rotation.end());
+  }
+  start.resize(static_cast<std::size_t>(count * kWeakNumbers + logits));
   camera.bias.value() =
-      context_.From({kWeakCameraNumbers}, std::span<const double>({0., 0., 0., 0., 1., 0., 0.}));
+      context_.From({static_cast<std::int64_t>(start.size())}, std::span<const double>(start));
 }
 
 void PhotographNetwork::StartShape(const PhotographStart& start) {
@@ -170,6 +220,20 @@ void PhotographNetwork::Texture(const PictureCode::Encoded& encoded, nn::Mode mo
   out->textures = nn::Permute(map, {0, 2, 3, 1});
 }
 
+void PhotographNetwork::Cameras(const nn::Var& latent, nn::Mode mode, Prediction* out) {
+  const nn::Var raw = all_.camera.Forward(latent, mode);
+  const std::int64_t count = config_.azimuths, numbers = count * kWeakNumbers;
+  if (count == 1 || !raw.valid()) {
+    out->cameras = raw.valid() ? CamerasOf(raw) : raw;
+    return;
+  }
+  const std::int64_t rows = raw.shape()[0] * count;
+  out->choice_logits = nn::Slice(raw, 1, numbers, numbers + count);
+  out->camera_choices = CamerasOf(nn::Reshape(nn::Slice(raw, 1, 0, numbers), {rows, kWeakNumbers}));
+  const std::vector<std::int32_t> likeliest = Likeliest(out->choice_logits.value());
+  out->cameras = nn::Gather(out->camera_choices, 0, context_.Indices(likeliest));
+}
+
 Prediction PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
   Prediction out;
   const PictureCode::Encoded encoded = all_.code->Encode(pictures, mode);
@@ -177,7 +241,7 @@ Prediction PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
   out.movement = sphere_.Movement(all_.shape.Forward(encoded.latent, mode));
   out.positions = MeanShape() + out.movement;
   out.keypoints = Keypoints(out.positions);
-  out.cameras = CamerasOf(all_.camera.Forward(encoded.latent, mode));
+  Cameras(encoded.latent, mode, &out);
   Texture(encoded, mode, &out);
   return out;
 }

@@ -28,6 +28,10 @@ struct PhotographNetworkConfig {
   bool symmetric_texture = true;   // the map is its mirror image at x = 0
   SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
   double output_deviation = 1e-4;  // the head of movements starts as N(0, this^2)
+  // Cameras that its head says for each picture, which start evenly around the object, with a logit
+  // each. One picture of a car often leaves its front and its rear to choose from; a single camera
+  // then learns the mean of both.
+  std::int64_t azimuths = 1;
 };
 
 // What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
@@ -59,6 +63,7 @@ class PhotographNetwork {
   void BuildHeads(Rng& rng);
   void StartShape(const PhotographStart& start);
   void Texture(const PictureCode::Encoded& encoded, nn::Mode mode, Prediction* out);
+  void Cameras(const nn::Var& latent, nn::Mode mode, Prediction* out);
 
   nn::Context& context_;
   PhotographNetworkConfig config_;
@@ -77,6 +82,12 @@ class PhotographNetwork {
 
 // InvalidArgument names the key that is wrong, or does not go with pictures of that size.
 Status CheckNetwork(const PhotographNetworkConfig& config, int image_size);
+
+// What camera `k` of `count` starts as: upright, turned by k / count of a circle about y; (w, x, y,
+// z).
+std::array<double, 4> StartingRotation(int k, int count);
+// The one of them from which a camera is turned least.
+int NearestStart(const std::array<double, 4>& quaternion, int count);
 
 // How far the convex hull of `points` reaches from `centre`, which is within it, in a direction of
 // length 1; 0 if the hull is flat there.

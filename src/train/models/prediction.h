@@ -22,7 +22,11 @@ struct Prediction {
   nn::Var sh{};          // [B, 9]; harmonics
   nn::Var pose{};        // [B, 10] Pose of the picture's camera (picture_lookup.h)
   nn::Var cameras{};     // [B, 7] (ops/weak_cameras.h), quaternions unit
-  nn::Var keypoints{};   // [B, K, 3]
+  // Of a network that says N cameras for each picture: all of them, of which `cameras` are the
+  // likeliest, and what speaks for each.
+  nn::Var camera_choices{};  // [B N, 7]
+  nn::Var choice_logits{};   // [B, N]
+  nn::Var keypoints{};       // [B, K, 3]
 };
 
 // Number i, a deformed `sphere`, with its texture, or else with colours brought into [0, 1] if it

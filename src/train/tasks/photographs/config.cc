@@ -14,7 +14,9 @@ ConfigFields FieldsOf(PhotographNetworkConfig* c) {
         {"network.symmetric_texture", &c->symmetric_texture, 0, 1,
          "the texture is its mirror image at x = 0, as every shape is"}},
        Without(FieldsOf(&c->sphere), {"network.template_radius", "network.symmetric"}),
-       {OutputDeviation(&c->output_deviation)}});
+       {OutputDeviation(&c->output_deviation),
+        {"network.azimuths", &c->azimuths, 1, 64,
+         "cameras that are said of each photograph, evenly around; the likeliest is taken"}}});
 }
 
 ConfigFields FieldsOf(PhotographLosses* c) {
@@ -23,6 +25,8 @@ ConfigFields FieldsOf(PhotographLosses* c) {
       {"loss.mask", &c->mask, 0, kNoLimit, "weight of the silhouettes' mean square error"},
       {"loss.iou", &c->iou, 0, kNoLimit, "weight of equation 12"},
       {"loss.camera", &c->camera, 0, kNoLimit, "weight of the predicted camera's error"},
+      {"loss.azimuth", &c->azimuth, 0, kNoLimit,
+       "weight of which camera is the likeliest (cross-entropy); network.azimuths above 1"},
       {"loss.deformation", &c->deformation, 0, kNoLimit, "weight of the mean length of movements"},
       {"loss.laplacian", &c->laplacian, 0, kNoLimit, "weight of the cotangent Laplacian"},
       {"loss.entropy", &c->entropy, 0, kNoLimit, "weight of the entropy of keypoints' weights"},
@@ -60,6 +64,11 @@ ConfigFields FieldsOf(PhotographsConfig* c) {
 
 Status CheckConfig(const PhotographsConfig& config) {
   TILEGRAD_TRY(CheckNetwork(config.network, static_cast<int>(config.size)));
+  if (config.camera == "predicted" && config.network.azimuths > 1)
+    return InvalidArgument(
+        "network.azimuths is {}, which is learned from cameras that are given: leave "
+        "photographs.camera at \"given\"",
+        config.network.azimuths);
   if (config.camera == "given" || config.camera == "predicted") return {};
   return InvalidArgument("photographs.camera is \"{}\", but must be \"given\" or \"predicted\"",
                          config.camera);

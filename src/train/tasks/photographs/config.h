@@ -15,6 +15,7 @@ struct PhotographLosses {
   double mask = 2;             // mean square of silhouettes
   double iou = 0;              // equation 12 of silhouettes
   double camera = 2;           // 1 - |q q'|, and the mean square of scale and shift
+  double azimuth = 2;          // which of several cameras is the likeliest (cross-entropy)
   double deformation = 10;     // mean length of movements
   double laplacian = 30;       // losses/cotangent_laplacian.h
   double entropy = 0.16;       // of each keypoint's weights

@@ -92,6 +92,26 @@ nn::Var PhotographStep::CameraLoss(const nn::Var& cameras, const PhotographBatch
   return rest + (1.0 - nn::Mean(agree));
 }
 
+// Of several cameras that are said, the one that starts nearest to the true one is to be it, and to
+// be the likeliest.
+void PhotographStep::AddCamera(const Prediction& predicted, const PhotographBatch& batch,
+                               LossSum* sum) const {
+  nn::Var cameras = predicted.cameras;
+  if (predicted.choice_logits.valid()) {
+    const auto count = static_cast<std::int32_t>(config_.network.azimuths);
+    std::vector<std::int32_t> nearest, rows;
+    for (const WeakPerspective& camera : batch.cameras) {
+      nearest.push_back(NearestStart(camera.quaternion, count));
+      rows.push_back(static_cast<std::int32_t>(rows.size()) * count + nearest.back());
+    }
+    cameras = nn::Gather(predicted.camera_choices, 0, context_.Indices(rows));
+    sum->Add("azimuth", "Which camera is the likeliest (cross entropy)", config_.loss.azimuth,
+             nn::CrossEntropy(predicted.choice_logits, context_.Indices(nearest)));
+  }
+  sum->Add("camera", "Camera (rotation, scale and shift)", config_.loss.camera,
+           CameraLoss(cameras, batch));
+}
+
 nn::Var PhotographStep::Entropy() const {
   const nn::Var weights = network_.KeypointWeights();
   return -nn::Mean(nn::Sum(weights * nn::Log(weights + 1e-12), {1}));
@@ -118,8 +138,7 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, St
             FlowLoss(predicted.flow, batch));
   }
   if (config_.camera == "given") {
-    sum.Add("camera", "Camera (rotation, scale and shift)", w.camera,
-            CameraLoss(predicted.cameras, batch));
+    AddCamera(predicted, batch, &sum);
   }
   sum.Add("deformation", "Mean length of movements", w.deformation,
           nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));

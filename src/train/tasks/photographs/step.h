@@ -4,6 +4,7 @@
 #pragma once
 
 #include "train/losses/cotangent_laplacian.h"
+#include "train/losses/loss_sum.h"
 #include "train/ops/render_op.h"
 #include "train/run/step_values.h"
 #include "train/tasks/learned_weights.h"
@@ -33,6 +34,7 @@ class PhotographStep {
   nn::Var Masked(const nn::Var& colors, const PhotographBatch& batch) const;
   nn::Var FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const;
   nn::Var CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const;
+  void AddCamera(const Prediction& predicted, const PhotographBatch& batch, LossSum* sum) const;
   nn::Var Entropy() const;
 
   nn::Context& context_;

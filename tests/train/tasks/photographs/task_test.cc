@@ -4,7 +4,11 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+
 #include "nn/nn.h"
+#include "scene/weak_perspective_ref.h"
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "train/config.h"
@@ -134,6 +138,72 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
   }
 }
 
+// Eight cameras of each photograph, of which the likeliest is told: the one nearest to the truth is
+// learned to be it. Bars are turned by anything about y.
+TEST_F(PhotographsTask, SeveralAzimuthsFindTheCamera) {
+  std::string config = TinyConfig();
+  config.replace(config.find("[network]"), 9, "[network]\nazimuths = 8");
+  TrainJob job;
+  job.config = ParseConfig(config, "tiny.toml").value();
+  job.config.schedule.steps = 200;
+  job.data = folder_ / "cub";
+  job.run = folder_ / "eight";
+  const auto trained = train::Train(job, workers_, kSilent, stop_);
+  ASSERT_TRUE(trained.ok()) << trained.status().message();
+  const auto log = ReadLog(job.run);
+  ASSERT_TRUE(log.ok());
+  const auto azimuth = [](const auto& entry) {
+    for (const auto& [name, value] : entry.values) {
+      if (name == "azimuth") return value;
+    }
+    return -1.0;
+  };
+  EXPECT_NEAR(azimuth(log->front()), std::log(8.0), 0.5);  // all alike
+  EXPECT_LT(azimuth(log->back()), azimuth(log->front()) - 0.3);
+  const auto predictor = Predictor::Load(job.run, workers_);
+  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const TaskEvaluation evaluation{
+      .run = job.run, .data = job.data, .predictor = *predictor, .split = Split::kTrain};
+  const auto scores = predictor->task().Evaluate(evaluation, workers_, kSilent, stop_);
+  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  EXPECT_EQ(scores->rows.size(), 3u);  // nobody knows where the bars' keypoints truly are
+}
+
+TEST(StartingRotations, AreTheNearestToThemselves) {
+  for (int k = 0; k < 8; ++k) {
+    std::array<double, 4> q = StartingRotation(k, 8);
+    EXPECT_EQ(NearestStart(q, 8), k);
+    for (double& x : q) x *= -3;  // the same rotation
+    EXPECT_EQ(NearestStart(q, 8), k);
+  }
+  EXPECT_EQ(StartingRotation(0, 1), (std::array<double, 4>{0, 1, 0, 0}));
+}
+
+// What is known of the keypoints is a row of its own, which an exact camera makes perfect.
+TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
+  PhotographSet set = OpenPhotographs(folder_ / "cub").value();
+  for (Photograph& photo : set.photographs) {
+    photo.points = set.mean_keypoints;
+    for (std::size_t k = 0; k < photo.points.size(); ++k) {
+      const auto seen = ProjectWeakly(*photo.camera, photo.points[k]);
+      photo.keypoints[k] = {seen[0], seen[1], true};
+    }
+  }
+  ASSERT_TRUE(WriteCmrLayout(folder_ / "cub", set).ok());
+  ASSERT_TRUE(Train("run", {}).ok());
+  const auto predictor = Predictor::Load(folder_ / "run", workers_);
+  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const TaskEvaluation job{
+      .run = folder_ / "run", .data = folder_ / "cub", .predictor = *predictor};
+  const auto scores = predictor->task().Evaluate(job, workers_, kSilent, stop_);
+  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  ASSERT_EQ(scores->rows.size(), 4u);
+  EXPECT_EQ(scores->rows[0].method, "true keypoints");
+  EXPECT_EQ(scores->rows[0].mean.pck, 1);
+  EXPECT_FALSE(scores->rows[0].mean.mask_loss);
+  EXPECT_NE(FormatTable(*scores).find("100.0"), std::string::npos);
+}
+
 TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
   ASSERT_TRUE(Train("one", {.workers = 1}).ok());
   ASSERT_TRUE(Train("two", {.workers = 2}).ok());
@@ -183,6 +253,10 @@ TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
 TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   ExpectMessage(Train("a", {.data = "none"}).status(), "no such folder");
   ExpectMessage(Train("b", {.more = "[loss]\nnone = 1\n"}).status(), "loss.none");
+  PhotographsConfig azimuths;
+  azimuths.network.azimuths = 4;
+  azimuths.camera = "predicted";
+  ExpectMessage(CheckConfig(azimuths), "network.azimuths is 4");
   std::string config = TinyConfig();
   config.replace(config.find("levels = 2"), 10, "levels = 2\ntexture = \"paint\"");
   TrainJob job;
