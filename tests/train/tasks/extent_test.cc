@@ -50,7 +50,9 @@ DatasetInfo InfoOf(double half_extent) {
   info.source = "nmr";
   info.image_size = 32;
   info.views = 8;
-  info.camera = {.azimuth_step = 45, .elevation = 30, .distance = 2.732};
+  info.camera.azimuth_step = 45;
+  info.camera.elevation = 30;
+  info.camera.distance = 2.732;
   info.camera.lens.fov_y = 30;
   info.camera.lens.width = info.camera.lens.height = info.image_size;
   info.camera.half_extent = half_extent;
