@@ -67,7 +67,8 @@ TEST(Paired, SmallDifferencesAreTies) {
 TEST(Paired, ModelsOfAShapeCountOnce) {
   Evaluation first = Scored("a", {0.3, 0.3, 0.5, 0.5}), second = Scored("b", {0.2, 0.2, 0.5, 0.5});
   for (std::size_t m = 0; m < 4; ++m) first.models[m].shape = m < 2 ? "one" : "two";
-  const auto& difference = IouOf(ComparePaired(first, second).value()).difference;
+  const PairedComparison comparison = ComparePaired(first, second).value();
+  const ClassedMean& difference = IouOf(comparison).difference;
   EXPECT_NEAR(difference.mean, 0.05, 1e-12);
   EXPECT_NEAR(*difference.error, 0.05, 1e-12);
 }

@@ -69,8 +69,8 @@ Mesh BoxOf(int model, double half_extent) {
   return mesh;
 }
 
-Status WriteBoxes(const Path& folder, double half_extent) {
-  const DatasetInfo info = InfoOf(half_extent);
+Status WriteBoxes(const Path& folder, double half_extent, double said) {
+  const DatasetInfo info = InfoOf(said);
   PredictionPictures pictures(info, {0, 1, 2, 3, 4, 5, 6, 7});
   std::filesystem::create_directories(ModelFilePath(folder, "box", "0").parent_path());
   std::vector<ModelInfo> models;
@@ -89,19 +89,20 @@ Status WriteBoxes(const Path& folder, double half_extent) {
   return WriteModels(folder, info, models);
 }
 
-// 3D IoU on what was trained on.
-Result<double> LearnBoxes(const Path& folder, double half_extent) {
+// 3D IoU on what was trained on: boxes of `half_extent`, of which the dataset says that it is
+// `said`.
+Result<double> LearnBoxes(const Path& folder, double half_extent, double said) {
   const Workers workers(2);
   const StopFlag stop = false;
-  TILEGRAD_TRY(WriteBoxes(folder / "data", half_extent));
+  TILEGRAD_TRY(WriteBoxes(folder / "data", half_extent, said));
   TrainJob job;
   job.data = folder / "data";
   job.run = folder / "run";
   TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "boxes"));
   TILEGRAD_TRY(Train(job, workers, {}, stop).status());
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(job.run, workers));
-  EXPECT_EQ(predictor.half_extent(), half_extent);
-  EXPECT_NEAR(MeshBounds(predictor.template_mesh()).high.x, half_extent, 1e-6);
+  EXPECT_EQ(predictor.half_extent(), said);
+  EXPECT_NEAR(MeshBounds(predictor.template_mesh()).high.x, said, 1e-6);
   const TaskEvaluation evaluation{
       .run = job.run, .data = job.data, .predictor = predictor, .split = Split::kTrain};
   TILEGRAD_ASSIGN(const Evaluation scores,
@@ -112,11 +113,15 @@ Result<double> LearnBoxes(const Path& folder, double half_extent) {
 using Extent = TempFolderTest;
 
 TEST_F(Extent, NmrIsLearnedInItsOwnSize) {
-  const auto nmr = LearnBoxes(folder_ / "nmr", 0.5), control = LearnBoxes(folder_ / "own", 0.45);
-  ASSERT_TRUE(nmr.ok()) << nmr.status().message();
-  ASSERT_TRUE(control.ok()) << control.status().message();
+  const auto nmr = LearnBoxes(folder_ / "nmr", 0.5, 0.5),
+             control = LearnBoxes(folder_ / "own", 0.45, 0.45),
+             wrong = LearnBoxes(folder_ / "wrong", 0.5, 0.45);
+  for (const auto& found : {nmr, control, wrong})
+    ASSERT_TRUE(found.ok()) << found.status().message();
+  std::printf("%f %f %f\n", *nmr, *control, *wrong);
   EXPECT_GT(*control, 0.6);
   EXPECT_GT(*nmr, *control - 0.05);
+  EXPECT_LT(*wrong, *nmr - 0.1);
 }
 
 }  // namespace tilegrad::train::extent_test
