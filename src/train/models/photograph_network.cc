@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "nn/ops/sample_pictures.h"
 #include "train/ops/weak_cameras.h"
 
 namespace tilegrad::train {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "support/temp_folder.h"
+#include "train/config.h"
 #include "train/data/photographs/miniature.h"
-#include "train/named_configs.h"
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
