@@ -142,9 +142,10 @@ std::string PhotographsHtml(const Evaluation& evaluation) {
 // Texture and light, of tasks that predict them.
 std::string LightHtml(const Evaluation& evaluation) {
   std::string lines;
-  for (const auto& [method, classes, mean] : evaluation.rows) {
-    if (!mean.texture_l1) continue;
-    lines += SideLine(method, {{mean.texture_l1, 4}, {mean.light_angle, 1}, {mean.lit_l1, 4}});
+  for (const EvaluationRow& row : evaluation.rows) {
+    if (!row.mean.texture_l1) continue;
+    lines += SideLine(row.method,
+                      {{row.mean.texture_l1, 4}, {row.mean.light_angle, 1}, {row.mean.lit_l1, 4}});
   }
   if (lines.empty()) return "";
   static constexpr const char* kColumns[] = {"texture L1", "light, °", "texture + light L1"};
