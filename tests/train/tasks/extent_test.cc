@@ -118,7 +118,6 @@ TEST_F(Extent, NmrIsLearnedInItsOwnSize) {
              wrong = LearnBoxes(folder_ / "wrong", 0.5, 0.45);
   for (const auto& found : {nmr, control, wrong})
     ASSERT_TRUE(found.ok()) << found.status().message();
-  std::printf("%f %f %f\n", *nmr, *control, *wrong);
   EXPECT_GT(*control, 0.6);
   EXPECT_GT(*nmr, *control - 0.05);
   EXPECT_LT(*wrong, *nmr - 0.1);
