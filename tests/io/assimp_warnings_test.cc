@@ -7,9 +7,9 @@
 
 #include "base/error.h"
 #include "io/archive.h"
-#include "io/mesh_readers.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
+#include "io/mesh_readers.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::assimp_warnings_test {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // N3MR's vertex parameterisation: values worked out by hand, independent numbers, differences.
-#include "train/models/sphere_model.h"
-
 #include <gtest/gtest.h>
 
 #include "base/rng.h"
 #include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "support/shared_data.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train::sphere_vertices_test {
 

@@ -196,7 +196,8 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
                                      const ProgressSink& progress, const StopFlag& stop,
                                      const MakeFitFunction& fit) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
-  if (job.oracle_steps > 0 && !fit) return InvalidArgument("--oracle fits meshes; this task predicts none");
+  if (job.oracle_steps > 0 && !fit)
+    return InvalidArgument("--oracle fits meshes; this task predicts none");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   EvaluationJob evaluation;

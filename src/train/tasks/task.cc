@@ -23,8 +23,7 @@ Result<std::string> Task::Fingerprint(const Path& data, const Workers& workers) 
 }
 
 Result<std::vector<nn::NamedTensor>> Task::Statistics() {
-  return InvalidArgument(
-      "schedule.portions must be 1: this task cannot split a batch");
+  return InvalidArgument("schedule.portions must be 1: this task cannot split a batch");
 }
 
 Status Model::Predict(std::span<const std::uint8_t> /*images*/, std::vector<Mesh>* /*meshes*/) {

@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
+#include "raster/conventions.h"
 #include "raster/extremes/bounded.h"
 #include "raster/extremes/soft_scene.h"
-#include "raster/conventions.h"
 #include "raster/project.h"
 #include "raster/visibility_ref.h"
 #include "render/mesh_ref.h"

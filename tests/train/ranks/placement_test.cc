@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Machines of several NUMA nodes as the kernel would describe them.
-#include "train/ranks/launch.h"
-
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -9,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "support/temp_folder.h"
+#include "train/ranks/launch.h"
 
 namespace tilegrad::train::placement_test {
 

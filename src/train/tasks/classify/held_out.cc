@@ -188,7 +188,8 @@ Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel
                                       const StopFlag& stop) {
   if (job.change) return InvalidArgument("a classifier predicts no meshes that could be refined");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
-  if (job.oracle_steps > 0) return InvalidArgument("--oracle fits meshes; a classifier predicts none");
+  if (job.oracle_steps > 0)
+    return InvalidArgument("--oracle fits meshes; a classifier predicts none");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   TILEGRAD_TRY(CheckClasses(dataset, model));

@@ -262,7 +262,8 @@ std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int co
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
                                        const ProgressSink& progress, const StopFlag& stop) {
   if (job.change)
-    return InvalidArgument("--refine needs cameras; predictions from photographs cannot be refined");
+    return InvalidArgument(
+        "--refine needs cameras; predictions from photographs cannot be refined");
   if (job.oracle_steps > 0) return InvalidArgument("photographs have no oracle");
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(job.data));
   if (!set.photographs[0].camera)
