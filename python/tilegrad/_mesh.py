@@ -11,7 +11,7 @@ import numpy as np
 
 from tilegrad import _arrays, _core, _numbers, _tools
 from tilegrad._camera import Camera
-from tilegrad._show import lit
+from tilegrad._lit import lit
 from tilegrad._paths import Path, ending_of, name_of
 from tilegrad._scene import Scene, Surface, Texture, changed
 
