@@ -71,7 +71,6 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {"Render " + In("a.glb"), "did you mean render?"},
            {"dataset_view", "did you mean dataset-view or dataset?"},
            {"--hlep", "did you mean --help?"},
-           {"figure2 --size 64", "figure2 is examples/python/figure2.py now"},
            {"photo.png", "unknown command \"photo.png\"; see"},
            {render + "--output x.png",
             "unknown option --output (did you mean --outputs or --out?)"},
