@@ -12,8 +12,7 @@ template <class From>
 Tensor Converted(Tensor tensor, std::span<const From> values) {
   assert(values.size() == tensor.elements());
   WithFloatType(tensor.dtype(), [&]<class T>(T) {
-    std::transform(values.begin(), values.end(), tensor.data<T>(),
-                   [](From v) { return static_cast<T>(v); });
+    std::copy(values.begin(), values.end(), tensor.data<T>());  // converts, or moves bytes
   });
   return tensor;
 }

@@ -61,6 +61,8 @@ Status Adam::Check(std::span<const Gradient> gradients) const {
   }
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     TILEGRAD_TRY(CheckGradient(slots_[i].parameter, gradients[i]));
+    if (options_.map != nullptr && gradients[i].dtype() != DType::kF32)
+      return InvalidArgument("adam: steps that go through a map are of F32");
   }
   return {};
 }
@@ -85,7 +87,9 @@ Status Adam::Step(std::span<const Gradient> gradients) {
   ++steps_;
   BeginStep();
   for (std::size_t i = 0; i < slots_.size(); ++i) {
-    if (gradients[i].is_product()) {
+    if (options_.map != nullptr) {
+      UpdateThroughMap(slots_[i], gradients[i].Value().value());
+    } else if (gradients[i].is_product()) {
       UpdateByProduct(slots_[i], gradients[i]);
     } else {
       const Tensor& gradient = gradients[i].a().value();
@@ -161,6 +165,30 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
   gradient.ldb = gradient.n;
   const Numbers all{0, slot.parameter.value.value().elements()};
   ProductAdamStep(gradient, Problem<float>(slot, all), context_.kernels());
+}
+
+void Adam::UpdateThroughMap(Slot& slot, const Tensor& gradient) {
+  Tensor step = context_.Copy(gradient);
+  const std::span<float> x = step.span<float>();
+  options_.map->Apply(x);
+  float *const m = slot.moments[0].data<float>(), *const v = slot.moments[1].data<float>();
+  const auto beta1 = static_cast<float>(options_.beta1);
+  const auto beta2 = static_cast<float>(options_.beta2);
+  const auto rest1 = static_cast<float>(1 - options_.beta1);
+  const auto rest2 = static_cast<float>(1 - options_.beta2);
+  float largest = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    m[i] = beta1 * m[i] + rest1 * x[i];
+    v[i] = beta2 * v[i] + rest2 * (x[i] * x[i]);
+    largest = std::max(largest, v[i]);
+  }
+  const double root = std::sqrt(static_cast<double>(largest)) * coefficients_.inverse_root;
+  if (!(root > 0)) return;
+  const auto factor = static_cast<float>(coefficients_.step / root);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = factor * m[i];
+  options_.map->Apply(x);
+  float* const p = slot.parameter.value.value().data<float>();
+  for (std::size_t i = 0; i < x.size(); ++i) p[i] -= x[i];
 }
 
 namespace {

@@ -36,6 +36,13 @@ class UpdateShare {
   virtual Status Finish() = 0;              // returns when all numbers are there
 };
 
+// A symmetric linear map of a parameter's numbers: one that spreads them over neighbours, say.
+class StepMap {
+ public:
+  virtual ~StepMap() = default;
+  virtual void Apply(std::span<float> x) = 0;
+};
+
 struct AdamOptions {
   double learning_rate = 1e-3;
   double beta1 = 0.9;
@@ -44,6 +51,11 @@ struct AdamOptions {
   // AdamW (Loshchilov, Hutter 2019): each step also takes learning_rate * weight_decay of a
   // parameter away. Biases and norm parameters, which have rank 1, do not decay.
   double weight_decay = 0;
+  // Of f32 parameters: gradients and steps go through it, and the largest second moment of a
+  // parameter is that of all its numbers, so that a step keeps the direction of the gradient's
+  // average. No epsilon and no decay. (B. Nicolet, A. Jacobson, W. Jakob, Large Steps in Inverse
+  // Rendering of Geometry, 2021.) Not with an UpdateShare. It outlives the optimiser.
+  StepMap* map = nullptr;
 };
 
 // Adam (Kingma, Ba 2015): one pass over parameter, gradient and both moments; where the gradient is
@@ -67,6 +79,8 @@ class Adam {
   std::span<const Var> parameters() const { return parameters_; }  // in the order given
   std::span<const Tensor> moments(std::size_t i) const { return slots_[i].moments; }  // m, v
   std::int64_t steps() const { return steps_; }
+  // For those who restore moments themselves. >= 0.
+  void set_steps(std::int64_t steps) { steps_ = steps; }
 
   // "adam.m.<parameter>" and "adam.v.<parameter>" for each, and "adam.steps" ([1] of kI64). Loading
   // restores the same bits; errors as CopyByName, and DataLoss if steps < 0.
@@ -87,6 +101,7 @@ class Adam {
   // Numbers [begin, end); called by several threads, each with other numbers.
   void Update(Slot& slot, const Tensor& gradient, Numbers numbers);
   void UpdateByProduct(Slot& slot, const Gradient& product);
+  void UpdateThroughMap(Slot& slot, const Tensor& gradient);
   template <class T>
   AdamProblem<T> Problem(Slot& slot, Numbers numbers) const;
 
@@ -137,6 +152,15 @@ std::vector<NamedTensor> Averages(const std::vector<NamedTensor>& state);
 //
 //   adam.options().learning_rate = WarmedUp(CosineRate(1e-3, {.steps = 10000}, step), 100, step);
 
+// From 1 at t = 0 along half a cosine to `end` at t = 1, and that from there on.
+inline double HalfCosine(double end, double t) {
+  return end + (1 - end) * (0.5 * (1 + std::cos(std::numbers::pi * std::min(t, 1.0))));
+}
+// From `from` > 0 at t = 0 by equal factors to `to` > 0 at t = 1, and that from there on.
+inline double Geometric(double from, double to, double t) {
+  return from * std::pow(to / from, std::min(t, 1.0));
+}
+
 // From the rate at step 0 along half a cosine to final_factor times the rate at `steps`, and that
 // from there on (Loshchilov, Hutter 2017). steps >= 1.
 struct CosineSchedule {
@@ -145,8 +169,7 @@ struct CosineSchedule {
 };
 inline double CosineRate(double rate, const CosineSchedule& schedule, std::int64_t step) {
   const double progress = static_cast<double>(step) / static_cast<double>(schedule.steps);
-  const double cosine = 0.5 * (1 + std::cos(std::numbers::pi * std::min(progress, 1.0)));
-  return rate * (schedule.final_factor + (1 - schedule.final_factor) * cosine);
+  return rate * HalfCosine(schedule.final_factor, progress);
 }
 
 // Rises to `rate` in equal steps: 1/steps of it at step 0, all of it at step steps - 1.

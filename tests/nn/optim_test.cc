@@ -34,6 +34,41 @@ TEST_F(Optimisers, AdamWDecaysMatrices) {
   EXPECT_NEAR(vector.item(), 1.0 - 0.1, 1e-9);
 }
 
+class Halving : public StepMap {
+ public:
+  void Apply(std::span<float> x) override {
+    for (float& number : x) number *= 0.5f;
+  }
+};
+
+// The first step through a map M is rate M M g / max |M g|; number by number it would be the rate.
+TEST(StepMaps, KeepTheDirectionOfTheGradient) {
+  const Workers workers(1);
+  Context context(workers);
+  Halving half;
+  const Var p = Parameter(context, context.Zeros({3}));
+  Adam adam(context, {{"p", p}}, {.learning_rate = 0.1, .map = &half});
+  const std::vector<Var> g = {
+      Constant(context, context.From({3}, std::span<const float>({4.0f, -2.0f, 0.0f})))};
+  ASSERT_TRUE(adam.Step(g).ok());
+  const auto moved = p.value().span<float>();
+  EXPECT_NEAR(moved[0], -0.05, 1e-7);
+  EXPECT_NEAR(moved[1], 0.025, 1e-7);
+  EXPECT_EQ(moved[2], 0);
+  EXPECT_EQ(g[0].value().data<float>()[0], 4);  // the caller's gradient stays
+  const std::vector<Var> none = {Constant(context, context.Zeros({3}))};
+  ASSERT_TRUE(adam.Step(none).ok());
+  EXPECT_LT(moved[0], -0.05);  // its average goes on
+}
+
+TEST_F(Optimisers, StepMapsAreOfFloats) {
+  Halving half;
+  const Var p = Matrix(1.0);
+  Adam adam(context_, {{"p", p}}, {.map = &half});
+  EXPECT_FALSE(adam.Step(Gradient({1, 1}, 3.0)).ok());
+  EXPECT_EQ(p.item(), 1);
+}
+
 TEST(Schedules, FollowTheirFormulas) {
   const CosineSchedule cosine{100, 0.1};
   EXPECT_DOUBLE_EQ(CosineRate(2, cosine, 0), 2.0);
