@@ -7,7 +7,9 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "support/shared_data.h"
+#include "train/losses/area.h"
 #include "train/losses/color_l1.h"
+#include "train/losses/edge_length.h"
 #include "train/losses/iou.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
@@ -62,6 +64,55 @@ TEST_F(Losses, HuberKnownValues) {
   EXPECT_NEAR(
       Value([&](const nn::Var& a) { return ColorHuberLoss(a, truth, 0.4); }, shape, {0.2, -1}),
       (0.05 + 0.8) / 2, 1e-12);
+}
+
+TEST_F(Losses, WeightedColorGradientAndValue) {
+  const nn::Shape shape = {2, 3, 3, 2};
+  const auto truth = context_.From(shape, std::span<const double>(Uniform(36, 0, 0.4, 3)));
+  const auto weight = context_.From({2, 3, 2}, std::span<const double>(Uniform(12, 0, 1, 9)));
+  ExpectGradient([&](const nn::Var& a) { return WeightedColorL1Loss(a, truth, weight); }, shape,
+                 Uniform(36, 0.5, 1, 4));
+  // Weights 1 and 0.5 of a pixel each, differences 1 and 0.4 in all channels.
+  const auto black = context_.Zeros({1, 3, 1, 2});
+  const auto halves = context_.From({1, 1, 2}, std::span<const double>({1.0, 0.5}));
+  EXPECT_NEAR(Value([&](const nn::Var& a) { return WeightedColorL1Loss(a, black, halves); },
+                    {1, 3, 1, 2}, {1, 0.4, 1, 0.4, 1, 0.4}),
+              (1 + 0.5 * 0.4) / 2, 1e-12);
+}
+
+TEST_F(Losses, SquaredSilhouetteGradientAndValue) {
+  const nn::Shape shape = {3, 5, 4};
+  const auto truth = context_.From(shape, std::span<const double>(Uniform(60, 0, 1, 1)));
+  ExpectGradient([&](const nn::Var& a) { return SquaredSilhouetteLoss(a, truth); }, shape,
+                 Uniform(60, 0, 1, 2));
+  // (0.5^2 + 0.2^2) over an area of 2, and 0.3^2 over nothing, which counts as 1.
+  const auto known = context_.From({2, 2}, std::span<const double>({1.0, 1, 0, 0}));
+  EXPECT_NEAR(Value([&](const nn::Var& a) { return SquaredSilhouetteLoss(a, known); }, {2, 2},
+                    {0.5, 0.8, 0.3, 0}),
+              0.5 * (0.29 / 2 + 0.09), 1e-9);
+}
+
+TEST_F(Losses, EdgeLengthAndAreaGradients) {
+  const Mesh mesh = Icosphere(1, 1);
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  std::vector<double> x = Uniform(6 * mesh.positions.size(), -0.2, 0.2, 6);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] += mesh.positions[i / 3 % mesh.positions.size()][static_cast<int>(i % 3)];
+  const nn::Shape shape = {2, static_cast<std::int64_t>(mesh.positions.size()), 3};
+  ExpectGradient([&](const nn::Var& p) { return EdgeLengthLoss(p, topology); }, shape, x);
+  ExpectGradient([&](const nn::Var& p) { return AreaLoss(p, mesh.faces); }, shape, x);
+}
+
+TEST_F(Losses, AreaOfABoxAndOfNothing) {
+  const Mesh box = Box({0, 0, 0}, {2, 1, 3});
+  std::vector<double> x;
+  for (const glm::vec3& p : box.positions) x.insert(x.end(), {p.x, p.y, p.z});
+  const nn::Shape shape = {1, static_cast<std::int64_t>(box.positions.size()), 3};
+  const auto area = [&](const std::vector<double>& of) {
+    return Value([&](const nn::Var& p) { return AreaLoss(p, box.faces); }, shape, of);
+  };
+  EXPECT_NEAR(area(x), 2 * (2 * 1 + 1 * 3 + 3 * 2), 1e-9);
+  EXPECT_EQ(area(std::vector<double>(x.size(), 0.0)), 0);
 }
 
 TEST_F(Losses, LaplacianGradient) {

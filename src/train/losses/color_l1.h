@@ -33,6 +33,10 @@ void AbsoluteDifferenceBackward(std::span<const T> truth, std::span<const T> pre
 // image and truth: [N, channels, H, W] of one dtype. A scalar.
 nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth);
 
+// The plain mean over images, channels and pixels of weight * |image - truth|; weight: [N, H, W].
+nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,
+                            const nn::Tensor& weight);
+
 // Huber's mixture instead of |d|: d^2 / (2 soft) up to |d| = soft, |d| - soft / 2 beyond. Where
 // something unknown makes colours bright or dark, L1 alone settles for their median, which may be
 // black, and this for nearly their mean.

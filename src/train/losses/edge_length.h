@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <span>
 
+#include "nn/tape.h"
 #include "scene/topology.h"
 
 namespace tilegrad::train {
@@ -61,5 +62,8 @@ void AddEdgeLengthGradient(const Topology& topology, std::span<const T> p, const
     }
   }
 }
+
+// positions: [B, V, 3]. A scalar, the mean over the batch.
+nn::Var EdgeLengthLoss(const nn::Var& positions, const Topology& topology);
 
 }  // namespace tilegrad::train

@@ -41,4 +41,8 @@ void IouBackward(const IouSums<T>& sums, std::span<const T> truth, double scale,
 // alpha and truth: [N, ...] of one dtype, values in [0, 1]. A scalar.
 nn::Var IouLoss(const nn::Var& alpha, const nn::Tensor& truth);
 
+// Mean over images of |S' - S|_2^2 / max(|S|_1, 1). Least where both agree also between 0 and 1,
+// while equation 12 wants 0 or 1. Arguments as above.
+nn::Var SquaredSilhouetteLoss(const nn::Var& alpha, const nn::Tensor& truth);
+
 }  // namespace tilegrad::train

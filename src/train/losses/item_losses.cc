@@ -10,8 +10,10 @@
 #include "base/error.h"
 #include "nn/kernels/pointwise.h"
 #include "nn/tape.h"
+#include "train/losses/area.h"
 #include "train/losses/color_l1.h"
 #include "train/losses/cotangent_laplacian.h"
+#include "train/losses/edge_length.h"
 #include "train/losses/iou.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
@@ -126,6 +128,27 @@ nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth) {
                    });
 }
 
+nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,
+                            const nn::Tensor& weight) {
+  const double scale = 1 / static_cast<double>(truth.elements());
+  const std::size_t plane = weight.elements() / static_cast<std::size_t>(weight.shape()[0]);
+  return ImageLoss("color loss", image, truth, scale,
+                   [&]<class T>(std::span<const T> s, std::span<const T> p, std::span<T> d) {
+                     const auto i = static_cast<std::size_t>(s.data() - truth.data<T>()) / s.size();
+                     const auto w = weight.span<T>().subspan(i * plane, plane);
+                     double sum = 0;
+                     for (std::size_t from = 0; from < s.size(); from += plane) {
+                       for (std::size_t k = 0; k < plane; ++k) {
+                         const T gap = p[from + k] - s[from + k];
+                         sum += static_cast<double>(w[k] * std::abs(gap));
+                         const T sign = gap > T(0) ? T(1) : gap < T(0) ? T(-1) : T(0);
+                         d[from + k] = static_cast<T>(scale) * w[k] * sign;
+                       }
+                     }
+                     return sum;
+                   });
+}
+
 nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft) {
   const auto& shape = truth.shape();
   const double scale = static_cast<double>(shape[1]) / static_cast<double>(shape.elements());
@@ -147,6 +170,23 @@ nn::Var IouLoss(const nn::Var& alpha, const nn::Tensor& truth) {
                    });
 }
 
+nn::Var SquaredSilhouetteLoss(const nn::Var& alpha, const nn::Tensor& truth) {
+  const double share = 1.0 / static_cast<double>(truth.shape()[0]);
+  return ImageLoss("silhouette loss", alpha, truth, share,
+                   [share]<class T>(std::span<const T> s, std::span<const T> a, std::span<T> d) {
+                     double area = 0, sum = 0;
+                     for (const T x : s) area += static_cast<double>(x);
+                     area = std::max(area, 1.0);
+                     const auto step = static_cast<T>(2 * share / area);
+                     for (std::size_t p = 0; p < s.size(); ++p) {
+                       const T gap = a[p] - s[p];
+                       sum += static_cast<double>(gap * gap);
+                       d[p] = step * gap;
+                     }
+                     return sum / area;
+                   });
+}
+
 nn::Var LaplacianLoss(const nn::Var& movement, const Topology& topology) {
   return MeshLoss("laplacian loss", movement,
                   [&]<class T>(std::span<const T> m, T scale, std::span<T> d) {
@@ -165,6 +205,25 @@ nn::Var SmoothnessLoss(const nn::Var& positions, std::span<const Face> faces,
                     const double loss = SmoothnessForward<T>(topology, faces, p, normals);
                     SmoothnessBackward<T>(topology, faces, p, normals, scale, d);
                     return loss;
+                  });
+}
+
+nn::Var EdgeLengthLoss(const nn::Var& positions, const Topology& topology) {
+  return MeshLoss("edge length loss", positions,
+                  [&]<class T>(std::span<const T> p, T scale, std::span<T> d) {
+                    EdgeSums sums;
+                    const double loss = EdgeLengthForward<T>(topology, p, &sums);
+                    std::ranges::fill(d, T(0));
+                    AddEdgeLengthGradient<T>(topology, p, sums, scale, d);
+                    return loss;
+                  });
+}
+
+nn::Var AreaLoss(const nn::Var& positions, std::span<const Face> faces) {
+  return MeshLoss("area loss", positions,
+                  [&]<class T>(std::span<const T> p, T scale, std::span<T> d) {
+                    std::ranges::fill(d, T(0));
+                    return AddAreaGradient<T>(faces, p, static_cast<double>(scale), d);
                   });
 }
 

@@ -2,7 +2,6 @@
 #include "train/tasks/common_config.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "nn/optim.h"
 
@@ -49,13 +48,10 @@ ConfigField OutputDeviation(double* value) {
 }
 
 ConfigFields FieldsOf(LossConfig* c) {
-  return {
-      {"loss.iou", &c->iou, 0, kNoLimit, "weight of equation 12"},
-      {"loss.color", &c->color, 0, kNoLimit, "weight of equation 13"},
-      {"loss.smoothness", &c->smoothness, 0, kNoLimit,
-       "weight of the normal difference of neighbouring faces"},
-      {"loss.laplacian", &c->laplacian, 0, kNoLimit, "weight of the Laplacian of the movement"},
-  };
+  // The paper's; fits have the others, too.
+  return Joined({{{"loss.iou", &c->iou, 0, kNoLimit, "weight of equation 12"},
+                  {"loss.color", &c->color, 0, kNoLimit, "weight of equation 13"}},
+                 Without(FieldsOf(c, "loss."), {"loss.edge_length", "loss.area"})});
 }
 
 ConfigFields FieldsOf(RenderConfig* c) {
@@ -95,8 +91,8 @@ RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size) 
 }
 
 double SharpnessAt(const RenderConfig& render, std::int64_t steps, std::int64_t step) {
-  const double share = std::min(1.0, 2.0 * static_cast<double>(step) / static_cast<double>(steps));
-  return render.sharpness_start * std::pow(render.sharpness / render.sharpness_start, share);
+  const double share = 2.0 * static_cast<double>(step) / static_cast<double>(steps);
+  return nn::Geometric(render.sharpness_start, render.sharpness, share);
 }
 
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "train/losses/regularizers.h"
 #include "train/models/sphere_model.h"
 #include "train/run/config_fields.h"
 #include "train/run/schedule.h"
@@ -14,11 +15,10 @@
 namespace tilegrad::train {
 
 // Weights of equation 14.
-struct LossConfig {
+struct LossConfig : RegularizerWeights {
+  LossConfig() : RegularizerWeights{.smoothness = 0.001, .laplacian = 0.01} {}
   double iou = 1.0;
   double color = 1.0;
-  double smoothness = 0.001;
-  double laplacian = 0.01;
 };
 
 struct RenderConfig {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "train/losses/loss_sum.h"
-#include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
 
@@ -11,13 +10,5 @@ namespace tilegrad::train {
 void AddIou(double weight, const nn::Var& alpha, const nn::Tensor& truth, LossSum* sum);
 // `loss`: of colours, however they are compared.
 void AddColor(double weight, const nn::Var& loss, LossSum* sum);
-
-// Of `sphere` deformed to `positions` by `movement`, [B, V, 3] both.
-struct DeformedSpheres {
-  const SphereModel& sphere;
-  const nn::Var& positions;
-  const nn::Var& movement;
-};
-void AddRegularizers(const LossConfig& weights, const DeformedSpheres& meshes, LossSum* sum);
 
 }  // namespace tilegrad::train

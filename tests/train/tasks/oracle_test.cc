@@ -39,7 +39,8 @@ ModelData PicturesOf(const Mesh& mesh, const DatasetInfo& info) {
 SingleImageConfig Config() {
   SingleImageConfig config;
   config.network.sphere = {.level = 2, .radius = 0.175, .smoothing = 2};
-  config.loss = {.iou = 10, .color = 3};
+  config.loss.iou = 10;
+  config.loss.color = 3;
   config.render = {.sharpness = 8000, .sharpness_start = 200};
   return config;
 }

@@ -83,7 +83,9 @@ ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& no
 
 void GanStep::AddShapeLosses(const ShapeTextureGenerator& generator, const Prediction& shapes,
                              LossSum* sum) const {
-  AddRegularizers(config_.loss, {generator.sphere(), shapes.positions, shapes.movement}, sum);
+  const SphereModel& sphere = generator.sphere();
+  AddRegularizers(config_.loss,
+                  {sphere.mesh().faces, sphere.topology(), shapes.positions, shapes.movement}, sum);
 }
 
 }  // namespace tilegrad::train

@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "train/losses/loss_sum.h"
 #include "train/ops/render_op.h"
-#include "train/tasks/equation14.h"
 #include "train/tasks/gan/critic.h"
 #include "train/tasks/gan/real_pictures.h"
 

@@ -49,7 +49,8 @@ nn::Var ImageLosses::Total(const Prediction& meshes, const BatchTensors& batch, 
   LossSum sum(values);
   AddIou(w.iou, images.alpha, batch.truth_alpha, &sum);
   if (HasColor()) AddColor(w.color, ColorL1Loss(images.colors, batch.truth_colors), &sum);
-  AddRegularizers(w, {sphere_, meshes.positions, meshes.movement}, &sum);
+  AddRegularizers(w, {sphere_.mesh().faces, sphere_.topology(), meshes.positions, meshes.movement},
+                  &sum);
   return sum.total();
 }
 

@@ -201,7 +201,10 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   LossSum sum(values);
   AddIou(config_.loss.iou, renders.images.alpha, batch.truth_alpha, &sum);
   AddColor(colored ? config_.loss.color : 0, ColorLoss(renders.images, batch, step), &sum);
-  AddRegularizers(config_.loss, {network_.sphere(), objects.positions, objects.movement}, &sum);
+  const SphereModel& sphere = network_.sphere();
+  AddRegularizers(config_.loss,
+                  {sphere.mesh().faces, sphere.topology(), objects.positions, objects.movement},
+                  &sum);
   if (objects.pose.valid()) {
     sum.Add("pose", "Camera (mean square error of its numbers)", config_.color.pose,
             PoseLoss(objects.pose, batch));
