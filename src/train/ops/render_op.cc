@@ -14,10 +14,47 @@ Renderer& RendererOf(SceneRenderer& r, float) { return r.renderer; }
 RendererT<double>& RendererOf(SceneRenderer& r, double) { return r.renderer64; }
 
 // The inputs in the order of SceneVars.
-enum Slot { kPositions, kColors, kTextures, kLights, kShininess, kSh, kCameras, kSlots };
+enum Slot {
+  kPositions,
+  kColors,
+  kTextures,
+  kLights,
+  kShininess,
+  kSh,
+  kCameras,
+  kUvs,
+  kReflectance,
+  kSlots
+};
+constexpr const char* kSlotNames[kSlots] = {"positions",        "colors",    "textures",
+                                            "light_directions", "shininess", "sh",
+                                            "cameras",          "uvs",       "reflectance"};
 
 std::array<nn::Var, kSlots> SlotsOf(const SceneVars& v) {
-  return {v.positions, v.colors, v.textures, v.light_directions, v.shininess, v.sh, v.cameras};
+  return {v.positions, v.colors,  v.textures, v.light_directions, v.shininess,
+          v.sh,        v.cameras, v.uvs,      v.reflectance};
+}
+
+// What the renderer takes as records, not arrays, of one image; or the gradients of it.
+template <class T>
+struct ImageRecords {
+  TextureT<T> texture;
+  std::span<T> d_texture;
+  SurfaceT<T> surface;
+  LightT<T> light;
+  CameraT<T> camera;
+};
+
+// Calls visit(slot, where numbers begin in an image's row of it, numbers).
+template <class T, class Visit>
+void ForEachRow(ImageRecords<T>& r, const Visit& visit) {
+  visit(kLights, 0, std::span(r.light.direction));
+  visit(kShininess, 0, std::span(&r.surface.shininess, 1));
+  visit(kReflectance, 0, std::span(r.surface.ambient));
+  visit(kReflectance, 3, std::span(r.surface.diffuse));
+  visit(kReflectance, 6, std::span(r.surface.specular));
+  std::size_t at = 0;
+  ForEachCameraNumber(r.camera, [&](T& number) { visit(kCameras, at++, std::span(&number, 1)); });
 }
 
 template <class T>
@@ -37,13 +74,15 @@ class BatchRender {
       : renderer_(RendererOf(renderer, T{})), frame_(FrameOf(renderer, T{})), job_(std::move(job)) {
     for (std::size_t s = 0; s < kSlots; ++s) {
       if (vars[s].valid()) inputs_[s] = vars[s].value();
+      wanted_[s] = vars[s].requires_grad();
     }
   }
 
   Status Check() const;
   Status Forward();
-  // d_inputs: of the slots that are there, in their order.
-  Status Gradients(std::span<const nn::Tensor> d_outputs, std::span<nn::Tensor> d_inputs);
+  // Of the slots that are there, in their order; empty for those that need none.
+  Result<std::vector<nn::Tensor>> Gradients(nn::Context& context,
+                                            std::span<const nn::Tensor> d_outputs);
   const ImagesT<T>& images() const { return frame_.images(); }
 
  private:
@@ -58,17 +97,19 @@ class BatchRender {
   }
   std::span<const T> Row(Slot slot, std::size_t row) { return RowOf(inputs_[slot], row); }
 
-  SceneT<T> SceneOf(std::size_t image);
+  using Tensors = std::array<nn::Tensor, kSlots>;
+
   void SetRecords(std::size_t image);
+  SceneT<T> SceneOf(std::size_t image);
+  SceneGradientsT<T> GradientsOf(std::size_t image, Tensors& d, ImageRecords<T>& records) const;
 
   RendererT<T>& renderer_;
   FrameT<T>& frame_;
   RenderJob job_;
   std::array<nn::Tensor, kSlots> inputs_;
-  std::vector<T> uvs_;
-  std::vector<TextureT<T>> textures_;  // of images
-  std::vector<SurfaceT<T>> surfaces_;
-  std::vector<LightT<T>> lights_;
+  std::array<bool, kSlots> wanted_ = {};
+  std::vector<T> uvs_;                    // of the job
+  std::vector<ImageRecords<T>> records_;  // of images
 };
 
 template <class T>
@@ -80,14 +121,18 @@ Status BatchRender<T>::Check() const {
                            images);
   }
   const std::int64_t vertices = inputs_[kPositions].shape()[1];
-  const nn::Shape expected[kSlots] = {
-      {meshes, vertices, 3}, {meshes, vertices, 3},   {}, {images, 3}, {images},
-      {images, 9},           {images, kCameraNumbers}};
-  static constexpr const char* kNames[kSlots] = {
-      "positions", "colors", "textures", "light_directions", "shininess", "sh", "cameras"};
+  const nn::Shape expected[kSlots] = {{meshes, vertices, 3},
+                                      {meshes, vertices, 3},
+                                      {},
+                                      {images, 3},
+                                      {images},
+                                      {images, 9},
+                                      {images, kCameraNumbers},
+                                      {static_cast<std::int64_t>(job_.faces.size()) / 3, 3, 2},
+                                      {images, 9}};
   for (std::size_t s = 0; s < kSlots; ++s) {
     if (!Has(static_cast<Slot>(s)) || s == kTextures || inputs_[s].shape() == expected[s]) continue;
-    return InvalidArgument("{} has the shape {}, expected {}", kNames[s],
+    return InvalidArgument("{} has the shape {}, expected {}", kSlotNames[s],
                            inputs_[s].shape().ToString(), expected[s].ToString());
   }
   const nn::Shape& t = inputs_[kTextures].shape();
@@ -98,40 +143,38 @@ Status BatchRender<T>::Check() const {
   return {};
 }
 
-// What the renderer takes as records rather than arrays.
 template <class T>
 void BatchRender<T>::SetRecords(std::size_t image) {
-  SurfaceT<T>& surface = surfaces_[image];
-  surface = SurfaceCast<T>(job_.surface);
-  if (Has(kShininess)) surface.shininess = Row(kShininess, image)[0];
-  if (Has(kLights)) std::ranges::copy(Row(kLights, image), lights_[image].direction.begin());
+  ImageRecords<T>& r = records_[image];
+  r.surface = SurfaceCast<T>(job_.surface);
+  r.camera = CameraCast<T>(job_.cameras[image]);
+  ForEachRow(r, [&](Slot slot, std::size_t at, auto numbers) {
+    if (Has(slot)) std::ranges::copy(Row(slot, image).subspan(at, numbers.size()), numbers.begin());
+  });
   if (!Has(kTextures)) return;
   const nn::Shape& shape = inputs_[kTextures].shape();
-  surface.texture = 0;
-  textures_[image] = {Row(kTextures, MeshOf(image)), static_cast<int>(shape[2]),
-                      static_cast<int>(shape[1]), job_.wrap, job_.filter};
+  r.surface.texture = 0;
+  r.texture = {Row(kTextures, MeshOf(image)), static_cast<int>(shape[2]),
+               static_cast<int>(shape[1]), job_.wrap, job_.filter};
 }
 
 template <class T>
 SceneT<T> BatchRender<T>::SceneOf(std::size_t image) {
   SetRecords(image);
+  const ImageRecords<T>& r = records_[image];
   const std::size_t mesh = MeshOf(image);
   SceneT<T> scene;
   scene.positions = Row(kPositions, mesh);
   scene.faces = job_.faces;
-  scene.camera = CameraCast<T>(job_.cameras[image]);
-  if (Has(kCameras)) {
-    const std::span<const T> row = Row(kCameras, image);
-    ForEachCameraNumber(scene.camera, row, [](T& to, T from) { to = from; });
-  }
+  scene.camera = r.camera;
   if (Has(kColors)) scene.colors = {Row(kColors, mesh), Rate::kVertex};
   scene.shading = job_.shading;
-  scene.surfaces = std::span(surfaces_).subspan(image, 1);
+  scene.surfaces = {&r.surface, 1};
   if (Has(kTextures)) {
-    scene.uvs = {uvs_, Rate::kCorner};
-    scene.textures = std::span(textures_).subspan(image, 1);
+    scene.uvs = {Has(kUvs) ? inputs_[kUvs].span<T>() : std::span<const T>(uvs_), Rate::kCorner};
+    scene.textures = {&r.texture, 1};
   }
-  if (Has(kLights)) scene.lights = std::span(lights_).subspan(image, 1);
+  if (Has(kLights)) scene.lights = {&r.light, 1};
   if (Has(kSh)) scene.sh = Row(kSh, image);
   return scene;
 }
@@ -141,52 +184,58 @@ Status BatchRender<T>::Forward() {
   TILEGRAD_TRY(Check());
   const std::size_t images = job_.cameras.size();
   uvs_.assign(job_.uvs.begin(), job_.uvs.end());
-  textures_.resize(images);
-  surfaces_.resize(images);
-  lights_.resize(images);
+  records_.resize(images);
   std::vector<SceneT<T>> scenes;
   for (std::size_t n = 0; n < images; ++n) scenes.push_back(SceneOf(n));
-  return renderer_.Render(scenes, job_.options, {.attributes = false, .normals = job_.normals},
+  return renderer_.Render(scenes, job_.options,
+                          {.alpha = job_.alpha, .attributes = false, .normals = job_.normals},
                           &frame_);
 }
 
 // Views of one mesh are given the same arrays, which get their sum in view order.
 template <class T>
-Status BatchRender<T>::Gradients(std::span<const nn::Tensor> d_outputs,
-                                 std::span<nn::Tensor> d_inputs) {
+SceneGradientsT<T> BatchRender<T>::GradientsOf(std::size_t image, Tensors& d,
+                                               ImageRecords<T>& records) const {
+  SceneGradientsT<T> out;
+  const std::size_t mesh = MeshOf(image);
+  if (wanted_[kPositions]) out.positions = RowOf(d[kPositions], mesh);
+  if (wanted_[kColors]) out.colors = RowOf(d[kColors], mesh);
+  if (wanted_[kUvs]) out.uvs = d[kUvs].template span<T>();
+  if (wanted_[kTextures]) records.d_texture = RowOf(d[kTextures], mesh);
+  if (wanted_[kTextures]) out.textures = {&records.d_texture, 1};
+  if (wanted_[kShininess] || wanted_[kReflectance]) out.surfaces = {&records.surface, 1};
+  if (wanted_[kLights]) out.lights = {&records.light, 1};
+  if (wanted_[kSh]) out.sh = RowOf(d[kSh], image);
+  if (wanted_[kCameras]) out.camera = &records.camera;
+  return out;
+}
+
+template <class T>
+Result<std::vector<nn::Tensor>> BatchRender<T>::Gradients(nn::Context& context,
+                                                          std::span<const nn::Tensor> d_outputs) {
   const std::size_t images = job_.cameras.size();
-  std::array<nn::Tensor*, kSlots> d = {};
-  for (std::size_t s = 0, next = 0; s < kSlots; ++s) {
-    if (Has(static_cast<Slot>(s))) d[s] = &d_inputs[next++];
+  Tensors d;
+  for (std::size_t s = 0; s < kSlots; ++s) {
+    if (wanted_[s]) d[s] = context.Empty(inputs_[s].shape(), nn::kDTypeOf<T>);
   }
-  std::vector<SceneGradientsT<T>> d_scenes(images);
-  std::vector<std::span<T>> d_textures(images);
-  std::vector<SurfaceT<T>> d_surfaces(images);
-  std::vector<LightT<T>> d_lights(images);
-  std::vector<CameraT<T>> d_cameras(images);
-  for (std::size_t n = 0; n < images; ++n) {
-    SceneGradientsT<T>& out = d_scenes[n];
-    out.positions = RowOf(*d[kPositions], MeshOf(n));
-    if (Has(kColors)) out.colors = RowOf(*d[kColors], MeshOf(n));
-    if (Has(kTextures)) d_textures[n] = RowOf(*d[kTextures], MeshOf(n));
-    if (Has(kTextures)) out.textures = std::span(d_textures).subspan(n, 1);
-    if (Has(kShininess)) out.surfaces = std::span(d_surfaces).subspan(n, 1);
-    if (Has(kLights)) out.lights = std::span(d_lights).subspan(n, 1);
-    if (Has(kSh)) out.sh = RowOf(*d[kSh], n);
-    if (Has(kCameras)) out.camera = &d_cameras[n];
-  }
+  std::vector<ImageRecords<T>> records(images);
+  std::vector<SceneGradientsT<T>> d_scenes;
+  d_scenes.reserve(images);
+  for (std::size_t n = 0; n < images; ++n) d_scenes.push_back(GradientsOf(n, d, records[n]));
   FrameGradientsT<T> d_frame;
   if (!d_outputs[0].empty()) d_frame.color = d_outputs[0].template span<T>();
-  if (!d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
+  if (job_.alpha && !d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
   TILEGRAD_TRY(renderer_.Backward(frame_, d_frame, d_scenes));
   for (std::size_t n = 0; n < images; ++n) {
-    if (Has(kShininess)) RowOf(*d[kShininess], n)[0] = d_surfaces[n].shininess;
-    if (Has(kLights)) std::ranges::copy(d_lights[n].direction, RowOf(*d[kLights], n).begin());
-    if (!Has(kCameras)) continue;
-    const std::span<T> row = RowOf(*d[kCameras], n);
-    ForEachCameraNumber(d_cameras[n], row, [](T from, T& to) { to = from; });
+    ForEachRow(records[n], [&](Slot slot, std::size_t at, auto numbers) {
+      if (wanted_[slot]) std::ranges::copy(numbers, RowOf(d[slot], n).subspan(at).begin());
+    });
   }
-  return {};
+  std::vector<nn::Tensor> out;
+  for (std::size_t s = 0; s < kSlots; ++s) {
+    if (Has(static_cast<Slot>(s))) out.push_back(d[s]);
+  }
+  return out;
 }
 
 template <class T>
@@ -195,37 +244,27 @@ RenderedImages Render(SceneRenderer& renderer, const SceneVars& vars, RenderJob 
   const std::array<nn::Var, kSlots> slots = SlotsOf(vars);
   const auto images = static_cast<std::int64_t>(job.cameras.size());
   const std::int64_t height = job.options.height, width = job.options.width;
+  const bool alpha = job.alpha;
   auto batch = std::make_shared<BatchRender<T>>(renderer, std::move(job), slots);
   if (Status status = batch->Forward(); !status.ok()) {
     const nn::Var failed = nn::Fail(vars.positions, std::move(status));
     return {failed, failed};
   }
-  std::vector<nn::Var> inputs;
-  std::vector<nn::Shape> shapes;
+  nn::ExternalOp op{.name = "render"};
   for (const nn::Var& var : slots) {
-    if (var.valid()) {
-      inputs.push_back(var);
-      shapes.push_back(var.shape());
-    }
+    if (var.valid()) op.inputs.push_back(var);
   }
-  auto backward = [batch, &context, shapes](std::span<const nn::Tensor> d_outputs) {
-    std::vector<nn::Tensor> d_inputs;
-    d_inputs.reserve(shapes.size());
-    for (const nn::Shape& shape : shapes) {
-      d_inputs.push_back(context.Empty(shape, nn::kDTypeOf<T>));
-    }
-    if (Status status = batch->Gradients(d_outputs, d_inputs); !status.ok())
-      context.Fail(std::move(status));
-    return d_inputs;
-  };
   const ImagesT<T>& drawn = batch->images();
-  const std::vector<nn::Var> out =
-      nn::External(context, {.name = "render",
-                             .inputs = inputs,
-                             .outputs = {context.From({images, 3, height, width}, drawn.color),
-                                         context.From({images, height, width}, drawn.alpha)},
-                             .backward = std::move(backward)});
-  return {out[0], out[1]};
+  op.outputs = {context.From({images, 3, height, width}, drawn.color)};
+  if (alpha) op.outputs.push_back(context.From({images, height, width}, drawn.alpha));
+  op.backward = [batch, &context](std::span<const nn::Tensor> d_outputs) {
+    auto gradients = batch->Gradients(context, d_outputs);
+    if (gradients.ok()) return std::move(*gradients);
+    context.Fail(gradients.status());
+    return std::vector<nn::Tensor>();
+  };
+  const std::vector<nn::Var> out = nn::External(context, std::move(op));
+  return {out[0], alpha ? out[1] : nn::Var()};
 }
 
 }  // namespace

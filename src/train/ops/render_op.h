@@ -12,7 +12,8 @@
 namespace tilegrad::train {
 
 // What the scenes of a batch are made of: B meshes of V vertices, each seen by `views` cameras, N =
-// B * views images. A Var that is left invalid is absent; one that is there gets its gradient.
+// B * views images. A Var that is left invalid is absent. Gradients are computed of those alone
+// that need one.
 struct SceneVars {
   nn::Var positions{};         // [B,V,3]
   nn::Var colors{};            // [B,V,3]
@@ -23,18 +24,20 @@ struct SceneVars {
   nn::Var sh{};                // [N,9]; Lighting::kSphericalHarmonics
   nn::Var cameras{};           // [N,16] rotation, translation, fx, fy, cx, cy: instead of
                                // RenderJob's, whose near planes are kept
+  nn::Var uvs{};               // [F,3,2], of all meshes: instead of RenderJob's
+  nn::Var reflectance{};       // [N,9] ambient, diffuse, specular: instead of RenderJob::surface's
 };
 
-// Calls visit(number of a camera, number of its row of SceneVars::cameras).
+// Calls visit with the numbers of a camera in the order of a row of SceneVars::cameras.
 inline constexpr std::int64_t kCameraNumbers = 16;
-template <class Camera, class Row, class Visit>
-void ForEachCameraNumber(Camera&& camera, Row& row, const Visit& visit) {
-  for (std::size_t i = 0; i < 9; ++i) visit(camera.rotation[i], row[i]);
-  for (std::size_t i = 0; i < 3; ++i) visit(camera.translation[i], row[9 + i]);
-  visit(camera.fx, row[12]);
-  visit(camera.fy, row[13]);
-  visit(camera.cx, row[14]);
-  visit(camera.cy, row[15]);
+template <class Camera, class Visit>
+void ForEachCameraNumber(Camera&& camera, const Visit& visit) {
+  for (auto& number : camera.rotation) visit(number);
+  for (auto& number : camera.translation) visit(number);
+  visit(camera.fx);
+  visit(camera.fy);
+  visit(camera.cx);
+  visit(camera.cy);
 }
 
 // What is the same for all meshes, and no tensor.
@@ -43,8 +46,9 @@ struct RenderJob {
   std::vector<Camera> cameras;            // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options{};
+  bool alpha = true;
   bool normals = false;  // draw them, too, into the renderer's frame (FrameOf)
-  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape.
+  // [F,3,2] of corners, with SceneVars::textures and without its uvs.
   std::span<const float> uvs{};
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
@@ -54,7 +58,7 @@ struct RenderJob {
 
 struct RenderedImages {
   nn::Var colors;  // [N, 3, H, W], 0 at background pixels
-  nn::Var alpha;   // [N, H, W]
+  nn::Var alpha;   // [N, H, W]; invalid without RenderJob::alpha
 };
 
 // A renderer with its images, reused from step to step so that a steady state takes nothing large

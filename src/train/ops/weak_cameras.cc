@@ -79,8 +79,8 @@ void PinholesBackward(const nn::Tensor& cameras, int size, const T* d, T* d_came
     WeakPerspectiveT<T> d_camera;
     const auto camera = InPixels(CameraAt(cameras.span<T>().data() + kRow * b), size);
     CameraT<T> d_pinhole;
-    const T* const row = d + kCameraNumbers * b;
-    ForEachCameraNumber(d_pinhole, row, [](T& to, T from) { to = from; });
+    const T* row = d + kCameraNumbers * b;
+    ForEachCameraNumber(d_pinhole, [&](T& number) { number = *row++; });
     PinholeOfAdjoint(camera, T(kPinholeDistance), d_pinhole, &d_camera);
     d_camera.scale *= half;
     for (T& t : d_camera.translation) t *= half;
@@ -123,9 +123,9 @@ nn::Var PinholeCameras(const nn::Var& cameras, int size) {
   nn::WithFloatType(cameras.dtype(), [&]<class T>(T) {
     for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b) {
       const auto camera = InPixels(CameraAt(at.span<T>().data() + kRow * b), size);
-      T* const row = out.data<T>() + kCameraNumbers * b;
-      ForEachCameraNumber(PinholeOf(camera, T(kPinholeDistance)), row,
-                          [](T from, T& to) { to = from; });
+      T* row = out.data<T>() + kCameraNumbers * b;
+      ForEachCameraNumber(PinholeOf(camera, T(kPinholeDistance)),
+                          [&](T number) { *row++ = number; });
     }
   });
   auto backward = [at, size, &context](std::span<const nn::Tensor> d) {

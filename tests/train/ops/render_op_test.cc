@@ -54,7 +54,9 @@ struct Batch {
                fill(kImages * 3, 0.3, 1),
                fill(kImages, 3, 9),
                fill(kImages * 9, 0.1, 0.4),
-               cameras};
+               cameras,
+               fill(6 * ball.faces.size(), 0, 1),
+               fill(kImages * 9, 0.1, 0.6)};
     job.faces = {ball.faces[0].data(), 3 * ball.faces.size()};
     job.views = kViews;
     job.uvs = uvs;
@@ -70,11 +72,17 @@ using Parts = std::vector<bool>;
 
 class Rendering {
  public:
-  Rendering(nn::Context& context, const Batch& batch, const Parts& parts, nn::DType type)
+  // `moving`: the part that alone is no constant; -1: all are none.
+  Rendering(nn::Context& context, const Batch& batch, const Parts& parts, nn::DType type,
+            int moving = -1)
       : batch_(batch), renderer_(context.workers()) {
     const auto v = static_cast<std::int64_t>(batch.ball.positions.size());
-    const nn::Shape shapes[] = {{kMeshes, v, 3}, {kMeshes, v, 3}, {kMeshes, 5, 7, 3}, {kImages, 3},
-                                {kImages},       {kImages, 9},    {kImages, 16}};
+    const nn::Shape shapes[] = {
+        {kMeshes, v, 3},    {kMeshes, v, 3},
+        {kMeshes, 5, 7, 3}, {kImages, 3},
+        {kImages},          {kImages, 9},
+        {kImages, 16},      {static_cast<std::int64_t>(batch.ball.faces.size()), 3, 2},
+        {kImages, 9}};
     for (std::size_t i = 0; i < parts.size(); ++i) {
       if (!parts[i]) continue;
       nn::Tensor tensor = context.Empty(shapes[i], type);
@@ -82,16 +90,24 @@ class Rendering {
         std::ranges::transform(batch.numbers[i], tensor.span<T>().begin(),
                                [](double x) { return static_cast<T>(x); });
       });
-      vars_[i] = nn::Parameter(context, std::move(tensor));
+      const bool moves = moving < 0 || moving == static_cast<int>(i);
+      vars_[i] = moves ? nn::Parameter(context, std::move(tensor))
+                       : nn::Constant(context, std::move(tensor));
       parameters.push_back(vars_[i]);
     }
   }
 
+  RenderedImages Draw(bool alpha = true) {
+    RenderJob job = batch_.job;
+    job.alpha = alpha;
+    return RenderScenes(
+        renderer_,
+        {vars_[0], vars_[1], vars_[2], vars_[3], vars_[4], vars_[5], vars_[6], vars_[7], vars_[8]},
+        job);
+  }
   // Some number that depends on every pixel.
   nn::Var Loss() {
-    const RenderedImages images = RenderScenes(
-        renderer_, {vars_[0], vars_[1], vars_[2], vars_[3], vars_[4], vars_[5], vars_[6]},
-        batch_.job);
+    const RenderedImages images = Draw();
     return nn::Sum(images.colors * images.colors) + nn::Sum(images.alpha * images.alpha);
   }
 
@@ -100,7 +116,7 @@ class Rendering {
  private:
   const Batch& batch_;
   SceneRenderer renderer_;
-  nn::Var vars_[7];
+  nn::Var vars_[9];
 };
 
 // Coverage, clamps and the nearest feature are kinks: one entry in twenty may sit on one. The loss
@@ -133,6 +149,28 @@ TEST(RenderScenes, TexturesUnderPhongLight) {
 TEST(RenderScenes, HarmonicsOverColorsAndTextures) {
   CheckDifferences(Lit(Lighting::kSphericalHarmonics),
                    {true, true, true, false, false, true, false});
+}
+
+TEST(RenderScenes, CoordinatesOfTexturesAndMaterials) {
+  CheckDifferences(Lit(Lighting::kPhong),
+                   {true, false, true, true, true, false, false, true, true});
+}
+
+// A rendering without alpha, of which some inputs are constants.
+TEST(RenderScenes, WithoutAlphaAndOfConstants) {
+  const Workers workers(1);
+  const Batch batch(Lit(Lighting::kPhong));
+  nn::Context context(workers);
+  const Parts parts = {true, false, true, true, true, false, true, true, true};
+  Rendering all(context, batch, parts, nn::DType::kF32);
+  const auto want = nn::Grad(nn::Sum(all.Draw(false).colors), {all.parameters[1]})[0];
+  Rendering one(context, batch, parts, nn::DType::kF32, /*moving=*/2);
+  const RenderedImages drawn = one.Draw(false);
+  EXPECT_FALSE(drawn.alpha.valid());
+  const auto got = nn::Grad(nn::Sum(drawn.colors), {one.parameters[1]})[0];
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  EXPECT_TRUE(std::ranges::equal(want.value().span<float>(), got.value().span<float>()));
+  EXPECT_FALSE(std::ranges::all_of(got.value().span<float>(), [](float d) { return d == 0; }));
 }
 
 // Float against double: visibility is the same but for pixels on an edge (none here), sums of 144
