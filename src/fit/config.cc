@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "base/error.h"
 #include "base/rng.h"
 #include "fit/material.h"
+#include "nn/optim.h"
+#include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
 namespace {
@@ -55,10 +56,7 @@ int LevelsOf(const FitConfig& config, ImageSize size) {
   return levels;
 }
 
-}  // namespace
-
-ConfigFields FieldsOf(FitConfig* c) {
-  const auto reporting = Affects::kReporting;
+ConfigFields FieldsOfDescent(FitConfig* c) {
   return {
       {"steps", &c->steps, 1, 1e7, "gradient steps, at most"},
       {"stop_gain", &c->stop_gain, 0, 1,
@@ -75,11 +73,23 @@ ConfigFields FieldsOf(FitConfig* c) {
        "share of the masks that may lack a point of the hull, if masks have gaps"},
       {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
       {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
-      {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
-      {"flatness", &c->regularizers.flatness, 0, 1e6, "weight of the angles between faces"},
-      {"edge_length", &c->regularizers.edge_length, 0, 1e6, "weight of unequal edges"},
-      {"area", &c->regularizers.area, -1, 1e6,
-       "weight of the surface's area; -1: as it suits the start"},
+  };
+}
+
+ConfigFields FieldsOfRegularizers(FitConfig* c) {
+  ConfigFields fields = FieldsOf(&c->regularizers, "");
+  for (ConfigField& field : fields) {
+    if (field.key == "smoothness") field.key = "flatness";  // "smoothing" is another option
+    if (field.key != "area") continue;
+    field.low = -1;
+    field.help = "weight of the surface's area; -1: as it suits the start";
+  }
+  return fields;
+}
+
+ConfigFields FieldsOfRun(FitConfig* c) {
+  const auto reporting = Affects::kReporting;
+  return {
       {"color_weight", &c->loss.color_weight, 0, 1e6, "of the L1 loss of colours"},
       {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "of the IoU loss of masks"},
       {"perturb_cameras", &c->perturb_cameras, 0, 180,
@@ -88,6 +98,12 @@ ConfigFields FieldsOf(FitConfig* c) {
       {"checkpoint_every", &c->checkpoint_every, 1, 1e9, "steps", reporting},
       {"timelapse", &c->timelapse, 0, 1e6, "pictures of the run; 0: none", reporting},
   };
+}
+
+}  // namespace
+
+ConfigFields FieldsOf(FitConfig* c) {
+  return Joined({FieldsOfDescent(c), FieldsOfRegularizers(c), FieldsOfRun(c)});
 }
 
 Result<std::int64_t> StepsOfQuality(std::string_view quality) {
@@ -150,14 +166,13 @@ FitSchedule ScheduleAt(const FitConfig& config, double t, ImageSize size) {
     out.factor = 4 << std::min(left, levels - 3);
   }
   const double end = FinalDelta(config, size), start = std::max(config.delta_start, end);
-  out.delta = start * std::pow(end / start, std::min(1.0, t / kDeltaShare));
+  out.delta = nn::Geometric(start, end, t / kDeltaShare);
   const bool resting = t < config.texture_rest;
   out.texture_rate = resting ? 0 : 1;
   out.light_rate = config.texture_rest == 0 || resting ? 1 : kLateLight;
   out.position_rate = resting && config.levels == 1 ? 0 : 1;
   out.camera_rate = t < config.cameras_rest ? 0 : 1;
-  out.rate =
-      config.final_rate + (1 - config.final_rate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+  out.rate = nn::HalfCosine(config.final_rate, t);
   return out;
 }
 

@@ -2,8 +2,6 @@
 #include "fit/diffusion.h"
 
 #include <Eigen/SparseCholesky>
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -32,8 +30,6 @@ struct Diffusion::System {
 
 Diffusion::Diffusion(const Topology& topology, double lambda)
     : topology_(&topology), lambda_(lambda) {}
-Diffusion::Diffusion(Diffusion&&) noexcept = default;
-Diffusion& Diffusion::operator=(Diffusion&&) noexcept = default;
 Diffusion::~Diffusion() = default;
 
 void Diffusion::Apply(std::span<float> x) {
@@ -48,25 +44,6 @@ void Diffusion::Apply(std::span<float> x) {
   factor.matrixL().solveInPlace(rows);
   factor.matrixU().solveInPlace(rows);
   for (Eigen::Index v = 0; v < rows.rows(); ++v) vertices.row(v) = rows.row(order[v]).cast<float>();
-}
-
-void UniformAdamStep(const UniformAdam& adam, Diffusion* smooth, std::span<float> gradient,
-                     std::span<float> m, std::span<float> v, std::span<float> values) {
-  smooth->Apply(gradient);
-  const auto b1 = static_cast<float>(adam.beta1), b2 = static_cast<float>(adam.beta2);
-  float largest = 0;
-  for (std::size_t i = 0; i < gradient.size(); ++i) {
-    m[i] = b1 * m[i] + (1 - b1) * gradient[i];
-    v[i] = b2 * v[i] + (1 - b2) * gradient[i] * gradient[i];
-    largest = std::max(largest, v[i]);
-  }
-  const auto t = static_cast<double>(adam.step);
-  const double root = std::sqrt(static_cast<double>(largest) / (1 - std::pow(adam.beta2, t)));
-  if (!(root > 0)) return;
-  const auto factor = static_cast<float>(adam.rate / ((1 - std::pow(adam.beta1, t)) * root));
-  for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] = factor * m[i];
-  smooth->Apply(gradient);
-  for (std::size_t i = 0; i < gradient.size(); ++i) values[i] -= gradient[i];
 }
 
 }  // namespace tilegrad::train

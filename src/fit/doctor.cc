@@ -152,7 +152,7 @@ std::string WhyNoColor(const FitterOptions& options, const Sight& s, Parameter p
 
 std::string WhyBlocked(const FitterOptions& options, const FitStep& step, const Sight& s,
                        const FitValues& values, Parameter p) {
-  if (values.image.total == 0) return "the images are already as they should be: the loss is 0";
+  if (values.image_loss == 0) return "the images are already as they should be: the loss is 0";
   std::string unseen = WhyUnseen(s);
   if (!unseen.empty()) return unseen;
   if (OnlyColor(p)) return WhyNoColor(options, s, p);
@@ -175,11 +175,12 @@ const char* UnitOf(Parameter p) {
 
 Finding Examine(const Fitter& fitter, Parameter p) {
   std::size_t all = 0, moved = 0;
-  for (const ParameterBlock& block : fitter.blocks()) {
+  for (const FittedBlock& block : fitter.blocks()) {
     if (block.what != p) continue;
-    all += block.gradient.size();
-    moved += static_cast<std::size_t>(std::count_if(block.gradient.begin(), block.gradient.end(),
-                                                    [](float d) { return d != 0; }));
+    const auto gradient = block.gradient.value().span<float>();
+    all += gradient.size();
+    moved +=
+        static_cast<std::size_t>(std::ranges::count_if(gradient, [](float d) { return d != 0; }));
   }
   Finding finding;
   finding.parameter = p;
@@ -215,12 +216,12 @@ Result<std::vector<Finding>> Diagnose(const FitScene& scene, const FitterOptions
     findings.push_back({p, 0, true, why});
     possible.parameters[p] = false;
   }
-  TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(scene, possible, workers));
-  TILEGRAD_ASSIGN(const FitValues values, fitter.Evaluate(step));
-  const Sight sight = Look(fitter, step);
+  TILEGRAD_ASSIGN(const auto fitter, Fitter::Make(scene, possible, workers));
+  TILEGRAD_ASSIGN(const FitValues values, fitter->Evaluate(step));
+  const Sight sight = Look(*fitter, step);
   for (const Parameter p : kParameters) {
     if (!possible.parameters[p]) continue;
-    Finding finding = Examine(fitter, p);
+    Finding finding = Examine(*fitter, p);
     if (finding.blocked) {
       finding.sentence = WhyBlocked(possible, step, sight, values, p);
     } else {

@@ -11,9 +11,9 @@
 
 #include "fit/diffusion.h"
 #include "fit/image_loss.h"
-#include "fit/parameter_block.h"
-#include "fit/regularizer.h"
-#include "nn/layers.h"
+#include "fit/unknowns.h"
+#include "nn/optim.h"
+#include "train/losses/regularizers.h"
 
 namespace tilegrad::train {
 
@@ -31,8 +31,8 @@ struct FitterOptions {
   ParameterSet parameters;
   LearningRates rates;
   ImageLoss loss;
-  RegularizerTerms regularizers;
-  double smoothing = 10;  // lambda of Diffusion
+  RegularizerWeights regularizers;  // areas are shares of the start's
+  double smoothing = 10;            // lambda of Diffusion
   // The view whose gain stays, where exposures are fitted: else colours and gains could share any
   // factor.
   int exposure_reference = 0;
@@ -54,51 +54,58 @@ struct FitStep {
   double camera_factor = 1;  // of cameras and focal lengths, beside that; 0: they rest
 };
 
-struct FitValues {
-  ImageLossValue image;
-  RegularizerTerms regularizers;
-  double total = 0;  // weighted
+struct FitValues : StepValues {
+  double image_loss = 0;  // the terms of images alone, weighted
+};
+
+// A block that moves.
+struct FittedBlock : ParameterBlock {
+  double learning_rate = 0;             // in the values' units
+  nn::Var gradient = {};                // of the last Evaluate; 0 where no view saw the block
+  std::unique_ptr<nn::Adam> adam = {};  // counts the steps of this block alone
 };
 
 class Fitter {
  public:
   // Errors name a parameter that no image depends on, and why. `workers` must outlive this.
-  static Result<Fitter> Make(FitScene scene, const FitterOptions& options, const Workers& workers);
+  static Result<std::unique_ptr<Fitter>> Make(FitScene scene, const FitterOptions& options,
+                                              const Workers& workers);
+  Fitter(const Fitter&) = delete;
+  Fitter& operator=(const Fitter&) = delete;
 
   // Loss before the step. Errors: those of the renderer; a loss or gradient that is not finite,
-  // before anything is changed. The same sizes allocate nothing.
+  // before anything is changed. The same sizes take nothing large from the heap.
   Result<FitValues> Step(const FitStep& step);
   // Loss and gradients, and no step.
   Result<FitValues> Evaluate(const FitStep& step);
 
   const FitScene& scene() const { return scene_; }
-  const Images& images() const { return renderer_->images(); }  // of the last step
-  const ImageLossRule& rule() const { return rule_; }
-  std::span<const ParameterBlock> blocks() const { return blocks_; }
+  const Images& images() const { return renderer_.frame.images(); }  // of the last step
+  std::span<const FittedBlock> blocks() const { return blocks_; }
 
-  // All that a later Step depends on, by name: values and moments of each block, connectivity and
-  // texture coordinates.
-  std::vector<nn::NamedTensor> State(nn::Context& context) const;
-  Status LoadState(std::span<const nn::NamedTensor> state);
+  // All that a later Step depends on, by name: values and moments of each block. And the faces,
+  // for which they are.
+  std::vector<nn::NamedTensor> State() const;
+  Status LoadState(const std::vector<nn::NamedTensor>& state);
 
  private:
   Fitter(FitScene scene, const FitterOptions& options, const Workers& workers);
-  Status LoadMesh(std::span<const nn::NamedTensor> state);
+  nn::Var Loss(const FitStep& step, FitValues* values);
   Status CheckFinite(const FitValues& values) const;
-  Status Move(ParameterBlock* block, const FitStep& step);
-  Diffusion* SmoothingOf(Parameter what);
-  template <class Visit>
-  void ForEachOfViews(std::span<const int> views, const Visit& visit);
+  Status Move(FittedBlock* block, const FitStep& step);
+  nn::StepMap* MapOf(Parameter what);
 
   FitScene scene_;
-  FitterOptions options_;
-  const Workers* workers_;
-  std::unique_ptr<FitRenderer> renderer_;
-  FitGradients gradients_;
-  ImageLossRule rule_;
-  Regularizer regularizer_;
+  const FitterOptions options_;
+  nn::Context context_;
+  SceneRenderer renderer_;
+  const Unknowns unknowns_;
+  const std::vector<Face> faces_;
+  const Topology topology_;
+  const nn::Tensor start_;  // positions
+  const double start_area_;
   Diffusion diffusion_, color_diffusion_;
-  std::vector<ParameterBlock> blocks_;
+  std::vector<FittedBlock> blocks_;
 };
 
 }  // namespace tilegrad::train

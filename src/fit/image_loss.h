@@ -2,12 +2,11 @@
 // What renders are held to, and how far they are from it.
 #pragma once
 
+#include <cstdint>
 #include <span>
-#include <vector>
 
 #include "base/aligned.h"
-#include "base/parallel.h"
-#include "render/frame_images.h"
+#include "train/losses/loss_sum.h"
 
 namespace tilegrad::train {
 
@@ -24,41 +23,23 @@ struct TargetImages {
   }
 };
 
-// Equation 12; or the squared differences' sum over the silhouette's area, which is least where
-// both agree also between 0 and 1, while the other wants 0 or 1.
-enum class SilhouetteLoss { kIou, kSquared };
+enum class SilhouetteLoss { kIou, kSquared };  // train/losses/iou.h
 
-// Colours count where a face is drawn, weighted by the target's alpha.
+// Weights; colours count where a face is drawn, weighted by the target's alpha.
 struct ImageLoss {
   double color_weight = 1, silhouette_weight = 1;
   SilhouetteLoss silhouette = SilhouetteLoss::kIou;
 };
 
-struct ImageLossValue {
-  double color = 0;       // L1: mean over pixels and channels of |difference|, unweighted
-  double silhouette = 0;  // unweighted
-  double total = 0;       // weighted
+// Views of a scene on the tape: image i shows view views[i].
+struct RenderedViews {
+  std::span<const int> views;
+  nn::Var colors, alpha;                // [N,3,H,W], [N,H,W]
+  std::span<const std::int32_t> faces;  // [N,H,W] drawn, or < 0
 };
 
-// Means over the views. Keeps its arrays: the same sizes allocate nothing.
-class ImageLossRule {
- public:
-  // Image i of the frame, its colours times gains[views[i]], is held to image views[i] of
-  // `targets`. Fills d_color, d_alpha and, where there are gains, d_gains with the gradient of the
-  // total.
-  struct Views {
-    std::span<const int> views;
-    std::span<const float> gains;  // of all views, or none: 1
-  };
-  ImageLossValue Evaluate(const ImageLoss& loss, const TargetImages& targets, const Views& views,
-                          const Images& frame, const Workers& workers);
-  const AlignedVector<float>& d_color() const { return d_color_; }
-  const AlignedVector<float>& d_alpha() const { return d_alpha_; }
-  const AlignedVector<float>& d_gains() const { return d_gains_; }  // [views]
-
- private:
-  AlignedVector<float> d_color_, d_alpha_, d_gains_;
-  std::vector<ImageLossValue> parts_;  // of each view
-};
+// Adds the terms that have a weight, means over the views.
+void AddImageLosses(const ImageLoss& loss, const TargetImages& targets,
+                    const RenderedViews& rendered, LossSum* sum);
 
 }  // namespace tilegrad::train

@@ -49,8 +49,7 @@ std::optional<MainLight> MainOfHarmonics(const FitScene& scene) {
 }
 
 std::optional<MainLight> MainOfDirection(const FitScene& scene) {
-  const auto& to = scene.lights[0].direction;
-  const glm::dvec3 d(to[0], to[1], to[2]);
+  const glm::dvec3 d(scene.light[0], scene.light[1], scene.light[2]);
   const auto& [r, g, b] = scene.surface.diffuse;
   const double length = glm::length(d);
   if (!(length > 0) || !(std::max({r, g, b}) > static_cast<float>(kLeastMain))) return std::nullopt;
@@ -103,7 +102,7 @@ void StartMaterial(const FitInput& input, bool blank, FitScene* scene) {
 }
 
 std::optional<MainLight> MainLightOf(const FitScene& scene) {
-  if (scene.uses_lights() && scene.lights.size() == 1) return MainOfDirection(scene);
+  if (scene.uses_lights()) return MainOfDirection(scene);
   if (scene.shading.lighting == Lighting::kSphericalHarmonics) return MainOfHarmonics(scene);
   return std::nullopt;
 }

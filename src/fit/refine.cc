@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/vec3.hpp>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "fit/fitter.h"
 #include "fit/input.h"
 #include "fit/score.h"
+#include "nn/optim.h"
 #include "scene/camera_conventions.h"
 #include "scene/shapes.h"
 #include "train/data/batches.h"
@@ -43,7 +43,7 @@ constexpr double kRefineColorRate = 0.06, kTexelRate = 0.005, kRefineSmoothing =
 // The outline beside colours, whose loss counts pixels without the object as well: at 1 the shape
 // follows highlights and patterns at the outline's cost.
 constexpr double kSilhouetteWeight = 10;
-constexpr RegularizerTerms kRegularizers = {.laplacian = 1, .flatness = 1e-4};
+constexpr RegularizerWeights kRegularizers = {.smoothness = 1e-4, .laplacian = 1};
 
 const int kOwnView[] = {0};
 const int kBothViews[] = {0, 1};
@@ -94,7 +94,7 @@ class Descent {
                               const Workers& workers) {
     scene.cameras = {camera, MirroredCamera(camera, picture.width)};
     const FitterOptions options = OptionsFor(scene);
-    TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(scene), options, workers));
+    TILEGRAD_ASSIGN(auto fitter, Fitter::Make(std::move(scene), options, workers));
     return Descent(std::move(fitter), picture);
   }
 
@@ -104,17 +104,18 @@ class Descent {
     for (int i = first; i < last; ++i) {
       TILEGRAD_TRY(options.watch.At(
           {"refining", static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(steps), ""}));
-      TILEGRAD_ASSIGN(const FitValues values, fitter_.Step(StepAt(static_cast<double>(i) / steps)));
-      loss_ = values.total;
+      TILEGRAD_ASSIGN(const FitValues values,
+                      fitter_->Step(StepAt(static_cast<double>(i) / steps)));
+      loss_ = values.loss;
     }
     return {};
   }
 
   double loss() const { return loss_; }  // of the last step
-  const FitScene& scene() const { return fitter_.scene(); }
+  const FitScene& scene() const { return fitter_->scene(); }
 
  private:
-  Descent(Fitter fitter, const TargetImages& picture)
+  Descent(std::unique_ptr<Fitter> fitter, const TargetImages& picture)
       : fitter_(std::move(fitter)), targets_(WithMirrorImage(picture)) {
     auto [small, factor] = AtMost(picture, kSearchSide);
     factor_ = factor;
@@ -129,16 +130,14 @@ class Descent {
     step.targets = coarse ? &*small_ : &targets_;
     step.job.scale = coarse ? 1.0f / static_cast<float>(factor_) : 1;
     step.job.options.width = step.job.options.height = step.targets->width;
-    const double end = kRefineFinalPixels * 2 / targets_.width,
-                 share = std::min(1.0, t / kRefineDeltaShare);
-    step.job.options.delta = kRefineDeltaStart * std::pow(end * end / kRefineDeltaStart, share);
+    const double end = kRefineFinalPixels * 2 / targets_.width;
+    step.job.options.delta = nn::Geometric(kRefineDeltaStart, end * end, t / kRefineDeltaShare);
     step.job.options.max_alpha_error = kRefineMaxAlphaError;
-    step.rate_factor =
-        kRefineFinalRate + (1 - kRefineFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+    step.rate_factor = nn::HalfCosine(kRefineFinalRate, t);
     return step;
   }
 
-  Fitter fitter_;
+  std::unique_ptr<Fitter> fitter_;
   TargetImages targets_;
   std::optional<TargetImages> small_;
   int factor_ = 1;

@@ -145,7 +145,7 @@ std::string Settings(const FitJob& job) {
 
 TermLabels FitLabels() {
   return {{"color", "Colour loss (mean difference)"}, {"silhouette", "Silhouette loss"},
-          {"laplacian", "Laplacian of the movement"}, {"flatness", "Angles between faces"},
+          {"laplacian", "Laplacian of the movement"}, {"smoothness", "Angles between faces"},
           {"edge_length", "Unequal edges"},           {"area", "Surface area"},
           {"delta", "Softness of outlines (NDC²)"},   {"factor", "Downsampling of the images"},
           {"images_per_second", "Images per second"}};

@@ -111,12 +111,8 @@ const std::set<std::string> kFormerLines = {"stop_gain = 0", "remeshes = 0", "co
 
 class FitWork : public RunWork {
  public:
-  FitWork(const FitJob& job, const FitStart& start, nn::Context& context, Fitter fitter)
-      : job_(job),
-        config_(start.config),
-        context_(context),
-        fitter_(std::move(fitter)),
-        clock_(config_) {}
+  FitWork(const FitJob& job, const FitStart& start, nn::Context& context, Fitter& fitter)
+      : job_(job), config_(start.config), context_(context), fitter_(fitter), clock_(config_) {}
 
   // All lines count, but those of earlier versions that say what is always so now; they wrote them
   // in another order. Of what is read, a checksum counts.
@@ -136,7 +132,7 @@ class FitWork : public RunWork {
   }
   Status Step(std::int64_t step, StepValues* values) override;
   std::vector<nn::NamedTensor> State() override {
-    std::vector<nn::NamedTensor> state = fitter_.State(context_);
+    std::vector<nn::NamedTensor> state = fitter_.State();
     for (auto& tensor : clock_.State(context_)) state.push_back(std::move(tensor));
     return state;
   }
@@ -161,7 +157,7 @@ class FitWork : public RunWork {
   const FitJob& job_;
   const FitConfig config_;
   nn::Context& context_;
-  Fitter fitter_;
+  Fitter& fitter_;
   FitClock clock_;
   std::map<int, SoftTargets> targets_;  // by factor
 };
@@ -182,17 +178,10 @@ Status FitWork::Step(std::int64_t step, StepValues* values) {
   const double time = clock_.At(step);
   const FitSchedule schedule = ScheduleAt(config, time, SizeOf(job_.input));
   const std::vector<int> views = ViewsAt(config, step, job_.input.training);
-  TILEGRAD_ASSIGN(const FitValues v,
+  TILEGRAD_ASSIGN(FitValues v,
                   fitter_.Step(StepOf(config, schedule, Targets(schedule, views), views)));
-  clock_.Note(step, v.image.total);
-  const RegularizerTerms& weights = config.regularizers;
-  values->loss = v.total;
-  values->terms = {{"color", config.loss.color_weight, v.image.color},
-                   {"silhouette", config.loss.silhouette_weight, v.image.silhouette},
-                   {"laplacian", weights.laplacian, v.regularizers.laplacian},
-                   {"flatness", weights.flatness, v.regularizers.flatness},
-                   {"edge_length", weights.edge_length, v.regularizers.edge_length},
-                   {"area", weights.area, v.regularizers.area}};
+  clock_.Note(step, v.image_loss);
+  *values = std::move(v);
   values->also = {{"delta", schedule.delta}, {"factor", static_cast<double>(schedule.factor)}};
   values->images = static_cast<std::int64_t>(views.size());
   return {};
@@ -254,9 +243,9 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   if (!start.note.empty() && job.warn) job.warn(start.note);
   TILEGRAD_TRY(watch.At({"looking at gradients", 0, 0, ""}));
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
-  TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
+  TILEGRAD_ASSIGN(const auto fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
-  FitWork work(job, start, context, std::move(fitter));
+  FitWork work(job, start, context, *fitter);
   const RunPlan plan = PlanOf(job);
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));

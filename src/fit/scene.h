@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene that fitting changes: everything that pictures of one object depend on, in arrays that
-// an optimiser may write, and its renderer.
+// The scene that fitting changes: everything that pictures of one object depend on, and its
+// renderer.
 #pragma once
 
 #include <array>
@@ -8,12 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "base/aligned.h"
-#include "render/renderer.h"
 #include "render/scene_fields.h"
-#include "scene/camera.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
+#include "train/ops/render_op.h"
 
 namespace tilegrad::train {
 
@@ -30,8 +28,8 @@ struct FitScene {
   Image texture;                         // of 3 channels
   Filter filter = Filter::kBilinear;
   Wrap wrap = Wrap::kRepeat;
-  Surface surface;  // of the whole mesh; read under Lambert and Phong light
-  std::vector<Light> lights;
+  Surface surface;                         // of the whole mesh; read under Lambert and Phong light
+  std::array<float, 3> light = {0, 0, 1};  // its direction, towards it; of intensity 1
   std::array<float, 9> sh = {};
   ShadingModel shading;
   // The mean over all directions of the light, of each channel, stays 1: the first harmonic stays
@@ -78,24 +76,10 @@ struct ParameterSet {
 // Which of them no image depends on, and why, in a sentence without the name; "" for the others.
 std::string WhyExcluded(const FitScene& scene, Parameter parameter);
 
-// dL/d(FitScene), of the shapes there. Cameras are those of the views that were rendered, in their
-// order; so are gains, and `focal` is that of the logarithm of one factor of all focal lengths.
-// What is not wanted is left as it is.
-struct FitGradients {
-  AlignedVector<float> positions, colors, uvs, texture;
-  Surface surface;
-  std::vector<Light> lights;
-  std::array<float, 9> sh = {};
-  std::vector<Camera> cameras;
-  std::vector<float> gains;
-  double focal = 0;
-};
-
-// Renders views of a scene, and takes gradients of images back. Allocates nothing once it has seen
-// the sizes. One call at a time.
+// Renders views of a scene. One call at a time.
 class FitRenderer {
  public:
-  explicit FitRenderer(const Workers& workers) : renderer_(RendererOn(workers)) {}
+  explicit FitRenderer(const Workers& workers) : context_(workers), renderer_(workers) {}
 
   // `scale`: pixels of the images wanted for a pixel of the cameras. `views` index into
   // scene.cameras.
@@ -106,25 +90,11 @@ class FitRenderer {
     bool alpha = true;
   };
   Status Render(const FitScene& scene, const Job& job);
-  const Images& images() const { return frame_.images(); }
-
-  // `scene` and `job` as in the last Render; d_frame in the shapes of its images.
-  Status Backward(const FitScene& scene, const Job& job, const FrameGradients& d_frame,
-                  const ParameterSet& wanted, FitGradients* gradients);
+  const Images& images() const { return renderer_.frame.images(); }
 
  private:
-  void SetScenes(const FitScene& scene, const Job& job);
-  void SetGradients(const FitScene& scene, const ParameterSet& wanted, FitGradients* gradients);
-  void GatherUvs(const FitScene& scene, FitGradients* gradients) const;
-
-  Renderer renderer_;
-  Frame frame_;
-  std::vector<Scene> scenes_;
-  std::vector<SceneGradients> d_scenes_;
-  AlignedVector<float> corner_uvs_, d_corner_uvs_;  // [F,3,2]
-  Texture texture_;
-  Surface surface_;
-  std::span<float> d_texture_;
+  nn::Context context_;
+  SceneRenderer renderer_;
 };
 
 // A mesh with its first texture or its vertex colours, and back. Materials' factors are multiplied

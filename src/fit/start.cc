@@ -174,7 +174,7 @@ void SetCameras(const FitJob& job, FitScene* scene) {
 void SetLight(const FitConfig& config, FitScene* scene) {
   scene->shading.lighting = config.lighting;
   scene->filter = config.filter;
-  if (scene->uses_lights()) scene->lights = {{config.light_direction, 1}};
+  scene->light = config.light_direction;
   scene->sh[0] = kFirstHarmonic;
 }
 

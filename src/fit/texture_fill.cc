@@ -8,6 +8,8 @@
 #include <glm/vec2.hpp>
 #include <numeric>
 
+#include "fit/unknowns.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -148,24 +150,26 @@ Result<std::vector<bool>> SeenTexels(const FitScene& scene, std::span<const int>
                                      ImageSize size, const Workers& workers) {
   FitScene plain = scene;  // without light and colours, which may be 0, every texel has its weight
   plain.shading = {};
-  plain.lights.clear();
   plain.colors.clear();
-  FitRenderer renderer(workers);
+  nn::Context context(workers);
+  SceneRenderer renderer(workers);
+  ParameterSet wanted;
+  wanted[Parameter::kTexture] = true;
+  const Unknowns unknowns(context, plain, wanted);
+  const auto texels =
+      std::ranges::find(unknowns.blocks(), Parameter::kTexture, &ParameterBlock::what);
   FitRenderer::Job job;
   job.options.width = size.width;
   job.options.height = size.height;
   job.alpha = false;
-  ParameterSet wanted;
-  wanted[Parameter::kTexture] = true;
-  const std::vector<float> ones(
-      3 * static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), 1.0f);
-  FitGradients gradients;
   std::vector<float> weight(scene.texture.pixels.size() / 3, 0.0f);
   for (const int view : views) {
     job.views = {&view, 1};
-    TILEGRAD_TRY(renderer.Render(plain, job));
-    TILEGRAD_TRY(renderer.Backward(plain, job, {.color = ones}, wanted, &gradients));
-    for (std::size_t t = 0; t < weight.size(); ++t) weight[t] += gradients.texture[3 * t];
+    const nn::Var sum = nn::Sum(unknowns.Render(&renderer, job).colors);
+    const auto gradients = nn::Grad(sum, {texels->value});
+    TILEGRAD_TRY(context.TakeStatus());
+    const auto d = gradients[0].value().span<float>();
+    for (std::size_t t = 0; t < weight.size(); ++t) weight[t] += d[3 * t];
   }
   std::vector<bool> seen(weight.size());
   std::transform(weight.begin(), weight.end(), seen.begin(),

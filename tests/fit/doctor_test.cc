@@ -117,7 +117,7 @@ TEST(Doctor, DrawnWhereTheMaskHasNothing) {
 TEST(Doctor, FacesAwayFromTheLight) {
   Patient patient;
   patient.scene.shading.lighting = Lighting::kLambert;
-  patient.scene.lights = {{{0, 0, -1}, 1}};
+  patient.scene.light = {0, 0, -1};
   ExpectBlocked(patient.Ask(Parameter::kLight), "faces away from the light");
 }
 

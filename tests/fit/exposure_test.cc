@@ -54,12 +54,13 @@ class Exposure : public TempFolderTest {
     step.job.options.width = step.job.options.height = 64;
     step.job.options.delta = 1e-3;
     step.job.options.max_alpha_error = 1e-6;
-    const auto values = fitter->Evaluate(step);
+    const auto values = (*fitter)->Evaluate(step);
     EXPECT_TRUE(values.ok());
     Evaluation out;
-    if (values.ok()) out.total = values->total;
-    for (const ParameterBlock& block : fitter->blocks()) {
-      out.gradient.insert(out.gradient.end(), block.gradient.begin(), block.gradient.end());
+    if (values.ok()) out.total = values->loss;
+    for (const FittedBlock& block : (*fitter)->blocks()) {
+      const auto gradient = block.gradient.value().span<float>();
+      out.gradient.insert(out.gradient.end(), gradient.begin(), gradient.end());
     }
     return out;
   }

@@ -108,7 +108,7 @@ TEST(TextureFill, SeenTexelsAreThoseInPixels) {
   AddSquare({0, 0}, {1, 1}, {0, 0}, &scene);
   scene.colors.assign(scene.positions.size(), 0.0f);
   scene.shading.lighting = Lighting::kLambert;
-  scene.lights = {{{0, 0, -1}, 1}};
+  scene.light = {0, 0, -1};
   // From one unit above (0.25, 0.5) it sees a quarter to each side.
   const float eye[] = {0.25f, 0.5f, 1}, target[] = {0.25f, 0.5f, 0}, up[] = {0, 1, 0};
   const Camera camera =

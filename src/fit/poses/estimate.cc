@@ -7,10 +7,11 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
-#include <numbers>
+#include <utility>
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "nn/optim.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::train {
@@ -63,16 +64,11 @@ PoseEstimate::PoseEstimate(const PosePictures& pictures, int level, const Worker
 }
 
 void PoseEstimate::ForgetShape() {
-  const Mesh sphere = Icosphere(level_, kRadius);
-  const auto& color = pictures_.mean_color;
-  scene_.positions.clear();
-  scene_.faces.clear();
-  scene_.colors.clear();
-  for (const glm::vec3& p : sphere.positions) {
-    scene_.positions.insert(scene_.positions.end(), {p.x, p.y, p.z});
-    scene_.colors.insert(scene_.colors.end(), color.begin(), color.end());
-  }
-  for (const Face& f : sphere.faces) scene_.faces.insert(scene_.faces.end(), {f[0], f[1], f[2]});
+  FitScene fresh = SceneOfMesh(Icosphere(level_, kRadius)).value();
+  for (std::size_t i = 0; i < fresh.colors.size(); ++i)
+    fresh.colors[i] = pictures_.mean_color[i % 3];
+  fresh.cameras = std::move(scene_.cameras);
+  scene_ = std::move(fresh);
 }
 
 void PoseEstimate::Place(std::size_t picture, const Camera& camera) {
@@ -91,9 +87,9 @@ FitStep PoseEstimate::StepAt(double t) const {
   step.targets = &pictures_.images;
   step.job.options.width = pictures_.images.width;
   step.job.options.height = pictures_.images.height;
-  step.job.options.delta = kDeltaStart * std::pow(kDeltaEnd / kDeltaStart, t);
+  step.job.options.delta = nn::Geometric(kDeltaStart, kDeltaEnd, t);
   step.job.options.max_alpha_error = kMaxAlphaError;
-  step.rate_factor = kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+  step.rate_factor = nn::HalfCosine(kFinalRate, t);
   return step;
 }
 
@@ -105,7 +101,7 @@ Status PoseEstimate::Tell(const RefitOptions& o, int step) const {
 }
 
 Result<double> PoseEstimate::Refit(const RefitOptions& o, std::span<const int> pictures) {
-  TILEGRAD_ASSIGN(Fitter fitter,
+  TILEGRAD_ASSIGN(const auto fitter,
                   Fitter::Make(scene_, OptionsOf(o, pictures_.color_weight), workers_));
   Rng rng(0, ++refits_);
   double sum = 0;
@@ -115,13 +111,13 @@ Result<double> PoseEstimate::Refit(const RefitOptions& o, std::span<const int> p
     const std::vector<int> views = Choose(pictures, kViewsPerStep, &rng);
     FitStep step = StepAt(static_cast<double>(i) / o.steps);
     step.views = views;
-    TILEGRAD_ASSIGN(const FitValues values, fitter.Step(step));
+    TILEGRAD_ASSIGN(const FitValues values, fitter->Step(step));
     if (4 * i >= 3 * o.steps) {
-      sum += values.total;
+      sum += values.loss;
       ++counted;
     }
   }
-  scene_ = fitter.scene();
+  scene_ = fitter->scene();
   return counted > 0 ? sum / counted : 0;
 }
 
