@@ -160,7 +160,7 @@ nn::Shape ShapeOf(const FitScene& scene, Parameter what, std::int64_t numbers) {
 }
 
 void Clamp(float low, float high, std::span<float> values) {
-  for (float& x : values) x = std::clamp(x, low, high);
+  for (float& x : values) x = std::min(std::max(x, low), high);  // no branches
 }
 
 }  // namespace

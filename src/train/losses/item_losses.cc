@@ -141,7 +141,8 @@ nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,
                        for (std::size_t k = 0; k < plane; ++k) {
                          const T gap = p[from + k] - s[from + k];
                          sum += static_cast<double>(w[k] * std::abs(gap));
-                         const T sign = gap > T(0) ? T(1) : gap < T(0) ? T(-1) : T(0);
+                         const auto sign =
+                             static_cast<T>((gap > T(0)) - (gap < T(0)));  // no branches
                          d[from + k] = static_cast<T>(scale) * w[k] * sign;
                        }
                      }
