@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
+#include <cmath>
 #include <optional>
 
 #include "base/read_budget.h"
@@ -112,8 +114,9 @@ Result<NpyType> FindType(const std::string& descr, const std::string& name) {
       return DataLoss("{}: big-endian data ({}); save it again as little-endian", name, descr);
     }
   }
-  return DataLoss("{}: element type \"{}\" is not supported (bool, integers, float32, float64 are)",
-                  name, descr);
+  return DataLoss(
+      "{}: element type \"{}\" is not supported (bool, integers, float16, float32, float64 are)",
+      name, descr);
 }
 
 // Product of the shape times the element size, or nothing on overflow.
@@ -138,6 +141,25 @@ Bytes FortranToC(std::span<const std::uint8_t> data, const std::vector<std::size
   return out;
 }
 
+// IEEE 754 binary16. Its numbers are those of float32 with the exponent's bias of 127 instead
+// of 15.
+float FromHalf(std::uint32_t bits) {
+  const std::uint32_t sign = (bits & 0x8000) << 16, exponent = bits >> 10 & 31,
+                      fraction = bits & 1023;
+  if (exponent == 0)
+    return std::copysign(std::ldexp(static_cast<float>(fraction), -24),
+                         std::bit_cast<float>(sign | 0x3f800000));
+  const std::uint32_t wide = exponent == 31 ? 255 : exponent + 112;
+  return std::bit_cast<float>(sign | wide << 23 | fraction << 13);
+}
+
+NpyArray WithoutHalves(NpyArray halves) {
+  std::vector<float> values(halves.data.size() / 2);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = FromHalf(halves.data[2 * i] | std::uint32_t{halves.data[2 * i + 1]} << 8);
+  return MakeNpy<float>(std::move(halves.shape), values);
+}
+
 std::string EntryName(const std::string& array) { return array + ".npy"; }
 
 }  // namespace
@@ -150,7 +172,8 @@ Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::strin
   if (!split) return DataLoss("{}: not a .npy array (bad magic, version or header length)", name);
   const auto header = ParseHeader(split->first);
   if (!header) return DataLoss("{}: the .npy header cannot be read: {}", name, split->first);
-  TILEGRAD_ASSIGN(const NpyType type, FindType(header->descr, name));
+  const bool halves = header->descr == "<f2";  // read as what has their size
+  TILEGRAD_ASSIGN(const NpyType type, FindType(halves ? "<u2" : header->descr, name));
   const auto data = bytes.subspan(split->second);
   const auto wanted = ByteCount(header->shape, NpyTypeSize(type));
   if (!wanted || *wanted != data.size()) {
@@ -161,6 +184,10 @@ Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::strin
   array.data = header->fortran && header->shape.size() > 1
                    ? FortranToC(data, header->shape, NpyTypeSize(type))
                    : Bytes(data.begin(), data.end());
+  if (halves) {
+    TILEGRAD_TRY(ReadBudget::Take(2 * array.data.size(), name));
+    return WithoutHalves(std::move(array));
+  }
   return array;
 }
 

@@ -2,6 +2,7 @@
 // Readers of arrays and archives.
 #include "base/read_budget.h"
 #include "fuzz/target.h"
+#include "io/binvox.h"
 #include "io/mat_file.h"
 #include "io/npz.h"
 #include "io/sh3f.h"
@@ -25,6 +26,20 @@ void Npy(Input input) {
   const auto again = io::DecodeNpy(io::EncodeNpy(*array), "again");
   Require(again.ok() && again->data == array->data && again->shape == array->shape,
           "what was written comes back");
+}
+
+void Binvox(Input input) {
+  const ReadBudget budget(kBudget);
+  const auto grid = io::DecodeBinvox(input, "grid");
+  if (!grid.ok()) return Require(!grid.status().message().empty(), "an error has a message");
+  const auto again = io::DecodeBinvox(io::EncodeBinvox(*grid), "again");
+  Require(again.ok() && again->voxels == grid->voxels && again->translate == grid->translate &&
+              again->scale == grid->scale,
+          "what was written comes back");
+}
+
+std::vector<Bytes> BinvoxSeeds() {
+  return {io::EncodeBinvox({2, {-0.5, -0.5, 0.25}, 1.5, {0, 1, 1, 0, 0, 0, 1, 0}})};
 }
 
 io::NpyArray SampleArray() {
@@ -170,6 +185,7 @@ std::vector<Bytes> MatSeeds() {
 }
 
 const Registration kTargets[] = {
+    Registration({"binvox", Binvox, BinvoxSeeds}),
     Registration({"mat", Mat, MatSeeds}),
     Registration({"npy", Npy, NpySeeds}),
     Registration({"npz", Npz, NpzSeeds}),
