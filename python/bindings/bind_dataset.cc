@@ -48,13 +48,20 @@ py::list ModelList(const Dataset& d) {
 }
 
 // [views,17] as cameras of the renderer.
-py::array Cameras(const Dataset& d) {
+py::array CameraArray(const Dataset& d, const std::vector<Camera>& cameras) {
   std::vector<double> out;
-  for (int v = 0; v < d.info().views; ++v) {
-    const auto numbers = NumbersOf(CameraCast<double>(d.info().camera.View(v)));
+  for (const Camera& camera : cameras) {
+    const auto numbers = NumbersOf(CameraCast<double>(camera));
     out.insert(out.end(), numbers.begin(), numbers.end());
   }
   return OwnedArray<double>(std::move(out), {Views(d), static_cast<py::ssize_t>(kCameraNumbers)});
+}
+
+py::array Cameras(const Dataset& d) { return CameraArray(d, train::CamerasOf(d.info(), {})); }
+
+py::array LoadCameras(const Dataset& d, int model) {
+  const int checked = CheckedModel(d, model);
+  return CameraArray(d, ValueOrThrow(WithoutGil([&] { return d.LoadCameras(checked); })));
 }
 
 py::array LoadImages(const Dataset& d, int model) {
@@ -108,6 +115,7 @@ void BindDataset(py::module_& m) {
       .def("load_images", &LoadImages, py::arg("model"), "(views, 4, H, W) uint8.")
       .def("load_all_images", &LoadAllImages, py::arg("models"), py::arg("threads"),
            "(models, views, 4, H, W) uint8.")
+      .def("load_cameras", &LoadCameras, py::arg("model"), "Of its views, (views, 17) float64.")
       .def("load_truth", &LoadTruth, py::arg("model"), "Occupancy, points, mesh.");
   py::class_<train::BatchOrder>(m, "BatchOrder", "What training sees at each step.")
       .def(py::init<int, int, std::uint64_t>(), py::arg("models"), py::arg("views"),

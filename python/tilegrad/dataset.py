@@ -87,7 +87,6 @@ class Dataset:
         self._indices = [i for i, model in enumerate(self.models) if split in (None, model.split)]
         self._views = self._checked_views(views)
         self._seed = _counting("Dataset", "seed", seed)
-        self._cameras = self._files.cameras
         self._epoch = 0
         self._images = self._files.load_all_images(
             self._indices, thread_count("Dataset", threads)) if in_memory else None
@@ -104,8 +103,9 @@ class Dataset:
 
     @property
     def cameras(self) -> Camera:
-        """Of all views; the same for every model."""
-        return Camera.of_numbers(self._cameras, (self.image_size, self.image_size))
+        """Of all views, the same for every model; where each has its own (items have those), what
+        they are like."""
+        return Camera.of_numbers(self._files.cameras, (self.image_size, self.image_size))
 
     def set_epoch(self, epoch: int) -> None:
         """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was
@@ -161,7 +161,7 @@ class Dataset:
         images = self._files.load_images(model) if self._images is None else self._images[index]
         rgba = images[shown].astype(np.float32) / 255
         return {"images": rgba[:, :3], "masks": rgba[:, 3],
-                "cameras": self._cameras[shown].astype(np.float32),
+                "cameras": self._files.load_cameras(model)[shown].astype(np.float32),
                 "views": shown.astype(np.int64), "class": self.models[model].class_index,
                 "split": _SPLITS.index(self.models[model].split), "model": model}
 

@@ -234,11 +234,9 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
   TILEGRAD_ASSIGN(ModelData data, dataset.Load(index));
   FitInput input;
   input.images = TargetsOfPlanar(data.images, dataset.info().image_size);
-  const auto views = static_cast<std::size_t>(dataset.info().views);
-  for (std::size_t i = 0; i < views; ++i) {
-    input.cameras.push_back(dataset.info().camera.View(static_cast<int>(i)));
+  input.cameras = CamerasOf(dataset.info(), data.cameras);
+  for (std::size_t i = 0; i < input.cameras.size(); ++i)
     input.names.push_back(fmt::format("view {}", i));
-  }
   input.occupancy = std::move(data.occupancy);
   TILEGRAD_TRY(FinishInput({hold_out, Background::kMask, kUsualFov, UpAxis::kY}, &input));
   return input;

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <zlib.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "io/archive.h"
@@ -313,6 +314,17 @@ constexpr std::string_view kNumpyArchive =
     "9498179f5f94920a12774bcc294e058a17672416a402f91a463a0ac69a3a0ab50a64032e0686067b06060607"
     "2002e206205e00c4071c00504b01022d032d0000000800000021007c9cdea258000000980000000500000000"
     "00000000000000800100000000612e6e7079504b05060000000001000100330000008f0000000000";
+
+// 1, -2, the largest, the smallest, -0 and infinity.
+TEST_F(FormatsTest, HalvesBecomeFloats) {
+  Bytes bytes = NpyWithHeader("{'descr': '<f2', 'fortran_order': False, 'shape': (6,), }", 0);
+  for (const int half : {0x3c00, 0xc000, 0x7bff, 0x0001, 0x8000, 0x7c00})
+    bytes.insert(bytes.end(),
+                 {static_cast<std::uint8_t>(half & 255), static_cast<std::uint8_t>(half >> 8)});
+  const auto values = Ok(DecodeNpy(bytes, "f"))->As<float>().value();
+  EXPECT_EQ(values, (std::vector<float>{1, -2, 65504, 0x1p-24f, 0, HUGE_VALF}));
+  EXPECT_TRUE(std::signbit(values[4]));
+}
 
 TEST_F(FormatsTest, NpzAsNumpyWritesIt) {
   Bytes bytes;

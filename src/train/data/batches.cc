@@ -15,6 +15,17 @@ namespace {
 constexpr std::uint64_t kOrderStream = 0x6f72646572, kViewStream = 0x76696577,
                         kMirrorStream = 0x6d6972726f72;
 
+Result<std::vector<Camera>> LoadStoreCameras(const Dataset& dataset,
+                                             const std::vector<int>& models) {
+  if (!dataset.info().own_cameras) return CamerasOf(dataset.info(), {});
+  std::vector<Camera> out;
+  for (const int model : models) {
+    TILEGRAD_ASSIGN(const std::vector<Camera> cameras, dataset.LoadCameras(model));
+    out.insert(out.end(), cameras.begin(), cameras.end());
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
@@ -24,12 +35,12 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
   store.models = static_cast<int>(models.size());
   store.views = dataset.info().views;
   store.size = dataset.info().image_size;
-  for (int v = 0; v < store.views; ++v) store.cameras.push_back(dataset.info().camera.View(v));
   const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
   store.bytes.resize(per_model * models.size());
   std::mutex mutex;
   std::uint64_t done = 0;
   std::vector<Status> failures(models.size());
+  TILEGRAD_ASSIGN(store.cameras, LoadStoreCameras(dataset, models));
   workers.For(models.size(), [&](std::size_t i, std::size_t) {
     if (stop) return;
     auto images = dataset.LoadImages(models[i]);

@@ -18,17 +18,21 @@ namespace tilegrad::train {
 // The images of some models in memory: [models][views][4][size][size] bytes.
 struct ImageStore {
   std::vector<std::uint8_t> bytes;
-  std::vector<Camera> cameras;  // by view, the same for all models
+  std::vector<Camera> cameras;  // by view, the same for all models, or by model and view
   int models = 0, views = 0, size = 0;
 
   std::size_t ImageBytes() const {
     return 4 * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   }
+  std::size_t Place(int model, int view) const {
+    return static_cast<std::size_t>(model) * static_cast<std::size_t>(views) +
+           static_cast<std::size_t>(view);
+  }
   std::span<const std::uint8_t> Image(int model, int view) const {
-    return {bytes.data() + (static_cast<std::size_t>(model) * static_cast<std::size_t>(views) +
-                            static_cast<std::size_t>(view)) *
-                               ImageBytes(),
-            ImageBytes()};
+    return {bytes.data() + Place(model, view) * ImageBytes(), ImageBytes()};
+  }
+  const Camera& CameraOf(int model, int view) const {
+    return cameras[Place(model, view) % cameras.size()];
   }
 };
 

@@ -13,6 +13,13 @@ Camera CameraRule::View(int index) const {
   return OrbitCamera(lens, azimuth_step * index, elevation, distance);
 }
 
+std::vector<Camera> CamerasOf(const DatasetInfo& info, const std::vector<Camera>& own) {
+  std::vector<Camera> cameras = own;
+  for (int v = static_cast<int>(own.size()); v < info.views; ++v)
+    cameras.push_back(info.camera.View(v));
+  return cameras;
+}
+
 std::vector<int> SpreadViews(int views, int count) {
   std::vector<int> out;
   for (int i = 0; i < count; ++i) out.push_back(i * views / count);
@@ -61,6 +68,11 @@ Result<ModelData> Dataset::Load(int model) const { return LoadModelFile(ModelPat
 
 Result<std::vector<std::uint8_t>> Dataset::LoadImages(int model) const {
   return LoadModelImages(ModelPath(model), info_);
+}
+
+Result<std::vector<Camera>> Dataset::LoadCameras(int model) const {
+  if (!info_.own_cameras) return CamerasOf(info_, {});
+  return LoadModelCameras(ModelPath(model), info_);
 }
 
 }  // namespace tilegrad::train

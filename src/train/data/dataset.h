@@ -41,6 +41,7 @@ struct DatasetInfo {
   std::vector<std::string> credits;  // one sentence a source
   std::string recipe;                // 16 hex digits over all that shapes the model files
   UpAxis up = UpAxis::kY;            // of the source's meshes; only while the files are made
+  bool own_cameras = false;          // each model has its own; `camera` is what they are like
 };
 
 // `count` of `views`, evenly spread: 0, step, 2 step, ...
@@ -74,6 +75,8 @@ struct ModelData {
   // [views][4][size][size], planar RGBA, row 0 on top. RGB is composited over black (premultiplied
   // by the anti-aliased alpha).
   std::vector<std::uint8_t> images;
+  // Of the views; empty unless DatasetInfo::own_cameras (CamerasOf).
+  std::vector<Camera> cameras = {};
   // [32][32][32] as [x][y][z], 0 or 1: solid occupancy of the mesh scaled to fill the cube
   // (train/metrics/metrics.h says the rule).
   std::vector<std::uint8_t> occupancy;
@@ -84,6 +87,9 @@ struct ModelData {
   // faces. Empty where the source has no meshes.
   Mesh mesh;
 };
+
+// Of the views of a model that are `own`, or those that all models have.
+std::vector<Camera> CamerasOf(const DatasetInfo& info, const std::vector<Camera>& own);
 
 class Dataset {
  public:
@@ -100,6 +106,7 @@ class Dataset {
   // finite.
   Result<ModelData> Load(int model) const;                        // everything
   Result<std::vector<std::uint8_t>> LoadImages(int model) const;  // ModelData::images only
+  Result<std::vector<Camera>> LoadCameras(int model) const;       // of its views
   Path ModelPath(int model) const;
 
  private:

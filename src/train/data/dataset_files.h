@@ -46,6 +46,8 @@ Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData&
                      const ModelStamp& stamp);
 Result<ModelData> LoadModelFile(const Path& path, const DatasetInfo& info);
 Result<std::vector<std::uint8_t>> LoadModelImages(const Path& path, const DatasetInfo& info);
+// Of a dataset whose models have cameras of their own.
+Result<std::vector<Camera>> LoadModelCameras(const Path& path, const DatasetInfo& info);
 // Reads the whole file, so that a broken one is found; an error if it is, or if it belongs to
 // another recipe.
 Result<ModelStamp> VerifyModelFile(const Path& path, const DatasetInfo& info);

@@ -39,23 +39,27 @@ void ReadFileName(JsonFields& fields, const char* key, std::string* out) {
   }
 }
 
-Json CameraJson(const CameraRule& rule) {
-  return {{"fov_y", rule.lens.fov_y},
-          {"azimuth_step", rule.azimuth_step},
-          {"elevation", rule.elevation},
-          {"distance", rule.distance},
-          {"half_extent", rule.half_extent}};
+Json CameraJson(const DatasetInfo& info) {
+  const CameraRule& rule = info.camera;
+  Json json = {{"fov_y", rule.lens.fov_y},
+               {"azimuth_step", rule.azimuth_step},
+               {"elevation", rule.elevation},
+               {"distance", rule.distance},
+               {"half_extent", rule.half_extent}};
+  if (info.own_cameras) json["own"] = true;
+  return json;
 }
 
-Status ReadCamera(const nlohmann::json& json, const std::string& place, int size,
-                  CameraRule* rule) {
+Status ReadCamera(const nlohmann::json& json, const std::string& place, DatasetInfo* info) {
+  CameraRule* const rule = &info->camera;
   JsonFields fields(json, place);
+  info->own_cameras = json.is_object() && json.contains("own") && json["own"] == true;
   fields.Read("fov_y", &rule->lens.fov_y);
   fields.Read("azimuth_step", &rule->azimuth_step);
   fields.Read("elevation", &rule->elevation);
   fields.Read("distance", &rule->distance);
   fields.Read("half_extent", &rule->half_extent);
-  rule->lens.width = rule->lens.height = size;
+  rule->lens.width = rule->lens.height = info->image_size;
   TILEGRAD_TRY(fields.status());
   const CameraRule& r = *rule;
   if (!(r.lens.fov_y > 0 && r.lens.fov_y < 180)) {
@@ -160,14 +164,10 @@ Status RemoveDataset(const Path& folder) {
 }
 
 Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info) {
-  const Json json = {{"format", kFormat},
-                     {"source", info.source},
-                     {"image_size", info.image_size},
-                     {"views", info.views},
-                     {"camera", CameraJson(info.camera)},
-                     {"classes", info.classes},
-                     {"credits", info.credits},
-                     {"recipe", info.recipe}};
+  const Json json = {
+      {"format", kFormat},       {"source", info.source},      {"image_size", info.image_size},
+      {"views", info.views},     {"camera", CameraJson(info)}, {"classes", info.classes},
+      {"credits", info.credits}, {"recipe", info.recipe}};
   return WriteTextAtomic(DatasetInfoPath(folder), JsonText(json, 2) + "\n");
 }
 
@@ -190,8 +190,7 @@ Result<DatasetInfo> ReadDatasetInfo(const Path& folder) {
   fields.Read("credits", &info.credits);
   fields.Read("recipe", &info.recipe);
   if (!fields.status().ok()) return fields.status();
-  TILEGRAD_TRY(ReadCamera(json.value("camera", nlohmann::json()), place + ": \"camera\"",
-                          info.image_size, &info.camera));
+  TILEGRAD_TRY(ReadCamera(json.value("camera", nlohmann::json()), place + ": \"camera\"", &info));
   return info;
 }
 

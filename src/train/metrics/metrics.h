@@ -29,6 +29,18 @@ Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
 // axis looks into is filled.
 Result<std::vector<std::uint8_t>> VoxelizeCarved(const Mesh& mesh, int resolution);
 
+// The rule of N3MR and SoftRas (their `voxelization`) for a mesh that they would evaluate: it is
+// not moved to fill the cube; [-half_extent, half_extent]^3 is scaled to resolution - 1 voxels in
+// its middle. The surface is the voxels of the vertices and, along each axis, the four around a
+// line through corners of voxels, at the height where it meets a face; solid is what cannot be
+// reached from outside. An error for an invalid mesh.
+Result<std::vector<std::uint8_t>> VoxelizeNmr(const Mesh& mesh, double half_extent, int resolution);
+
+// As Voxelize, of a surface that is known by points: so many that each of its voxels holds one. The
+// cube is [-half_extent, half_extent]^3; points beyond it are left out.
+Result<std::vector<std::uint8_t>> VoxelizePoints(std::span<const glm::vec3> points,
+                                                 double half_extent, int resolution);
+
 // |a and b| / |a or b| over voxels that are not 0; 1 if both are empty. The sizes must agree.
 double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "base/error.h"
 #include "train/metrics/metrics.h"
@@ -76,6 +77,34 @@ class Grid {
     }
   }
 
+  void MarkPoint(const dvec3& p) {
+    const dvec3 at = glm::floor(p);
+    if (glm::any(glm::lessThan(at, dvec3(0))) || glm::any(glm::greaterThanEqual(at, dvec3(n_))))
+      return;
+    state_[Index(static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(at.z))] =
+        kSurface;
+  }
+
+  // N3MR's: where lines along `axis` through corners of voxels meet the triangle.
+  void MarkLines(const Triangle& corners, int axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const dvec3 a = corners[1] - corners[0], b = corners[2] - corners[0];
+    const double area = a[u] * b[v] - a[v] * b[u];
+    if (area == 0) return;
+    const auto [first_u, last_u] = LinesAcross(corners, u);
+    const auto [first_v, last_v] = LinesAcross(corners, v);
+    for (int i = first_u; i <= last_u; ++i) {
+      for (int j = first_v; j <= last_v; ++j) {
+        const double du = i - corners[0][u], dv = j - corners[0][v];
+        const double s = (du * b[v] - dv * b[u]) / area, t = (dv * a[u] - du * a[v]) / area;
+        if (s < 0 || t < 0 || s + t > 1) continue;
+        dvec3 met;
+        met[axis] = corners[0][axis] + s * a[axis] + t * b[axis];
+        MarkAround(met, {u, i}, {v, j});
+      }
+    }
+  }
+
   // Everything that a path over voxel faces joins to the corner of the empty layer.
   void CarveOutside() {
     std::vector<std::array<int, 3>> open = {{-1, -1, -1}};
@@ -121,6 +150,28 @@ class Grid {
 
  private:
   enum State : std::uint8_t { kUnknown, kSurface, kOutside };
+
+  // Numbers of the lines from 0 to n_ that the triangle spans across an axis.
+  std::pair<int, int> LinesAcross(const Triangle& corners, int axis) const {
+    const double low = std::min({corners[0][axis], corners[1][axis], corners[2][axis]}),
+                 high = std::max({corners[0][axis], corners[1][axis], corners[2][axis]});
+    return {static_cast<int>(std::ceil(std::clamp(low, 0.0, n_ + 0.5))),
+            static_cast<int>(std::floor(std::clamp(high, -0.5, double(n_))))};
+  }
+
+  // The four voxels around a line, at the height of `met`.
+  struct Line {
+    int axis, number;
+  };
+  void MarkAround(dvec3 met, const Line& first, const Line& second) {
+    for (const double i : {-0.5, 0.5}) {
+      for (const double j : {-0.5, 0.5}) {
+        met[first.axis] = first.number + i;
+        met[second.axis] = second.number + j;
+        MarkPoint(met);
+      }
+    }
+  }
 
   // Along `axis` from its low or its high end; `at` says where across it.
   void CarveRay(std::array<int, 3> at, std::size_t axis, bool from_high) {
@@ -215,6 +266,36 @@ Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
 Result<std::vector<std::uint8_t>> VoxelizeCarved(const Mesh& mesh, int resolution) {
   TILEGRAD_ASSIGN(Grid grid, GridOf(mesh, resolution));
   grid.CarveAlongAxes();
+  return grid.Solid();
+}
+
+Result<std::vector<std::uint8_t>> VoxelizeNmr(const Mesh& mesh, double half_extent,
+                                              int resolution) {
+  TILEGRAD_TRY(CheckResolution(resolution));
+  TILEGRAD_TRY(Validate(mesh));
+  const double scale = (resolution - 1) / (2 * half_extent);
+  Grid grid(resolution);
+  for (const Face& face : mesh.faces) {
+    Triangle corners;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const dvec3 p(mesh.positions[static_cast<std::size_t>(face[k])]);
+      corners[k] = p * scale + 0.5 * resolution;
+      grid.MarkPoint(corners[k]);
+    }
+    for (int axis = 0; axis < 3; ++axis) grid.MarkLines(corners, axis);
+  }
+  grid.CarveOutside();
+  return grid.Solid();
+}
+
+Result<std::vector<std::uint8_t>> VoxelizePoints(std::span<const glm::vec3> points,
+                                                 double half_extent, int resolution) {
+  TILEGRAD_TRY(CheckResolution(resolution));
+  Grid grid(resolution);
+  for (const glm::vec3& p : points)
+    grid.MarkPoint(
+        OffBorders((dvec3(p) / (2 * half_extent) + 0.5) * double(resolution), resolution));
+  grid.CarveOutside();
   return grid.Solid();
 }
 

@@ -28,17 +28,16 @@ Status AddRow(const Example& example, const UnlitPictures& request, const Worker
 
 }  // namespace
 
-Status AddSheet(const DatasetInfo& info, const Workers& workers, Showcase* showcase) {
+Status AddSheet(int image_size, const Workers& workers, Showcase* showcase) {
   if (showcase->examples.empty()) return {};
-  std::vector<Camera> cameras;
-  for (const int view : ShownViews(info.views)) {
-    if (cameras.size() < 2) cameras.push_back(info.camera.View(view));
-  }
-  const int size = info.image_size * std::max(1, kCellSize / info.image_size);
+  const std::size_t views = std::min<std::size_t>(2, showcase->examples[0].cameras.size());
+  const int size = image_size * std::max(1, kCellSize / image_size);
   std::vector<ImageU8> cells;
-  for (const Example& example : showcase->examples)
-    TILEGRAD_TRY(AddRow(example, {cameras, info.image_size, size}, workers, &cells));
-  const bool turned = cameras.size() > 1;
+  for (const Example& example : showcase->examples) {
+    const auto cameras = std::span(example.cameras).first(views);
+    TILEGRAD_TRY(AddRow(example, {cameras, image_size, size}, workers, &cells));
+  }
+  const bool turned = views > 1;
   showcase->sheet = TileImages(cells, turned ? 4 : 2);
   showcase->sheet_columns =
       turned ? "input, prediction, prediction from another side, truth from there"

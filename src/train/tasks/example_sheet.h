@@ -12,6 +12,6 @@ namespace tilegrad::train {
 // the dataset, each as truth and prediction. A row an example: what the network sees, its
 // prediction from there, its prediction from the second view, and the truth from there. Predictions
 // are drawn in detail, the dataset's pictures pixel by pixel. Nothing without examples.
-Status AddSheet(const DatasetInfo& info, const Workers& workers, Showcase* showcase);
+Status AddSheet(int image_size, const Workers& workers, Showcase* showcase);
 
 }  // namespace tilegrad::train

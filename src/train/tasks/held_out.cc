@@ -22,6 +22,9 @@ std::string SourceName(const std::string& source) {
       {"sweethome3d", "of the Sweet Home 3D furniture library"},
       {"shapenet", "of ShapeNet"},
       {"nmr", "of ShapeNet, as rendered for N3MR"},
+      {"choy", "of ShapeNet, as rendered for 3D-R2N2"},
+      {"dvr", "of ShapeNet, as rendered for N3MR"},
+      {"dibr", "of ShapeNet, as rendered for DIB-R"},
       {"planes", "of FlightGear's aircraft"},
       {"ships", "of FlightGear's ships"},
       {"cars", "of the games TORCS, Trigger Rally and UFO: Alien Invasion"},
@@ -32,17 +35,19 @@ std::string SourceName(const std::string& source) {
   return at == names.end() ? "of " + source : at->second;
 }
 
-// How far the camera of a shown view has gone around from the first, in whole degrees.
-int TurnTo(const DatasetInfo& info, int view) {
+// How far the camera of a shown view has gone around from the first: "+90°".
+std::string TurnTo(const DatasetInfo& info, int view) {
+  if (info.own_cameras) return "another side";
   const int steps = (view - ShownViews(info.views)[0] + info.views) % info.views;
-  return static_cast<int>(std::lround(std::abs(info.camera.azimuth_step) * steps)) % 360;
+  return fmt::format("+{}°", std::lround(std::abs(info.camera.azimuth_step) * steps) % 360);
 }
 
 // The captions of a truth and of the prediction beside it.
-std::pair<ShownPicture, ShownPicture> Captions(const std::string& name, int turn, bool input) {
-  const std::string view = input ? "" : fmt::format(", camera turned by {}°", turn);
+std::pair<ShownPicture, ShownPicture> Captions(const std::string& name, const std::string& turn,
+                                               bool input) {
+  const std::string view = input ? "" : fmt::format(", camera at {}", turn);
   return {{{},
-           input ? "input" : fmt::format("truth, +{}°", turn),
+           input ? "input" : fmt::format("truth, {}", turn),
            name + (input ? ": the image that the network sees" : ": truth") + view},
           {{}, "predicted", name + ": predicted" + view}};
 }
@@ -59,8 +64,10 @@ class Exhibitor {
     const std::vector<int> views = ShownViews(info_.views);
     TILEGRAD_ASSIGN(auto meshes, predictor_.Predict(ImageOf(data, views[0])));
     out.prediction = std::move(meshes[0]);
+    const std::vector<Camera> all = CamerasOf(info_, data.cameras);
     std::vector<Camera> cameras;
-    for (const int view : views) cameras.push_back(info_.camera.View(view));
+    for (const int view : views) cameras.push_back(all[static_cast<std::size_t>(view)]);
+    out.cameras = cameras;
     TILEGRAD_ASSIGN(
         auto predicted,
         DrawMesh(out.prediction, {cameras, info_.image_size, info_.image_size}, workers_));
@@ -188,7 +195,7 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
     out.examples.push_back(std::move(example));
     if (progress) progress({"predicting", out.examples.size(), chosen.size(), ""});
   }
-  TILEGRAD_TRY(AddSheet(dataset.info(), workers, &out));
+  TILEGRAD_TRY(AddSheet(dataset.info().image_size, workers, &out));
   return out;
 }
 

@@ -116,6 +116,7 @@ struct Example {
   std::string creator, license;        // empty where unknown
   Mesh prediction, truth;              // without faces: none
   std::vector<ShownPicture> pictures;  // the first is what the network sees
+  std::vector<Camera> cameras = {};    // of a dataset's views that `pictures` shows
 };
 
 struct ShowcaseRequest {

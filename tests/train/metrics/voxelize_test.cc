@@ -53,6 +53,31 @@ TEST(Voxelize, MovingAndScalingChangeNothing) {
   EXPECT_FALSE(At(grid, 16, 4, 16));  // its hole, along y
 }
 
+// 2 * 0.38 of a cube of 31 voxels: from 4.22 to 27.78, the voxels 4 to 27. Without the scale of 31
+// it would be 3 to 28.
+TEST(Voxelize, NmrLeavesHalfAVoxelAroundTheCube) {
+  const auto grid = VoxelizeNmr(Box({0, 0, 0}, {0.76f, 0.76f, 0.76f}), 0.5, 32).value();
+  EXPECT_EQ(Count(grid), 24 * 24 * 24);
+  EXPECT_TRUE(At(grid, 4, 4, 4));
+  EXPECT_TRUE(At(grid, 27, 27, 27));
+  // Where a mesh stands counts: it is not moved into the middle.
+  const auto moved = VoxelizeNmr(Box({0.125f, 0, 0}, {0.76f, 0.76f, 0.76f}), 0.5, 32).value();
+  EXPECT_FALSE(At(moved, 4, 16, 16));
+  EXPECT_TRUE(At(moved, 31, 16, 16));
+  // A face between two lines through corners of voxels is not seen across them; one that meets
+  // them marks the four voxels around each.
+  const auto thin = VoxelizeNmr(Box({0, 0, 0}, {0.76f, 0.76f, 0.001f}), 0.5, 32).value();
+  EXPECT_EQ(Count(thin), 2 * 24 * 24);
+}
+
+TEST(Voxelize, DensePointsAreASurface) {
+  const Mesh ball = Icosphere(4, 0.5f);
+  const auto points = SampleSurface(ball, 100000, 1).value();
+  const auto grid = VoxelizePoints(points, 0.5, 32).value();
+  EXPECT_GT(VoxelIou(grid, Voxelize(ball, 32).value()), 0.98);  // corners of voxels hold no point
+  EXPECT_TRUE(At(grid, 16, 16, 16));
+}
+
 TEST(Voxelize, AnOpenShellIsNotFilled) {
   Mesh box = Box({0, 0, 0}, {1, 1, 1});
   const auto closed = Voxelize(box, 32).value();

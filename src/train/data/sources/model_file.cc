@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "io/npz.h"
+#include "scene/camera_conventions.h"
 #include "train/data/dataset_files.h"
 
 namespace tilegrad::train {
@@ -77,6 +78,40 @@ Status TakeOccupancy(const NpzArrays& arrays, std::vector<std::uint8_t>* out) {
   return {};
 }
 
+// Of a camera in a file: rotation, translation, fx, fy, cx, cy.
+constexpr std::size_t kCameraNumbers = 16;
+
+ArrayShape CameraShape(const DatasetInfo& info) {
+  return {static_cast<std::size_t>(info.views), kCameraNumbers};
+}
+
+NpyArray CamerasToNpy(const DatasetInfo& info, const std::vector<Camera>& cameras) {
+  std::vector<float> numbers;
+  for (const Camera& c : cameras) {
+    numbers.insert(numbers.end(), std::begin(c.rotation), std::end(c.rotation));
+    numbers.insert(numbers.end(), std::begin(c.translation), std::end(c.translation));
+    numbers.insert(numbers.end(), {c.fx, c.fy, c.cx, c.cy});
+  }
+  return MakeNpy<float>(CameraShape(info), numbers);
+}
+
+Result<std::vector<Camera>> CamerasFromNpy(const NpyArray& array, const DatasetInfo& info) {
+  TILEGRAD_ASSIGN(const auto numbers, Take<float>(array, "cameras", CameraShape(info)));
+  std::vector<Camera> cameras(static_cast<std::size_t>(info.views));
+  const float* at = numbers.data();
+  for (Camera& c : cameras) {
+    std::copy_n(at, 9, c.rotation);
+    std::copy_n(at + 9, 3, c.translation);
+    c.fx = at[12];
+    c.fy = at[13];
+    c.cx = at[14];
+    c.cy = at[15];
+    at += kCameraNumbers;
+    TILEGRAD_TRY(Validate(CameraCast<double>(c)).Within("array \"cameras\""));
+  }
+  return cameras;
+}
+
 ArrayShape ImageShape(const DatasetInfo& info) {
   const auto size = static_cast<std::size_t>(info.image_size);
   return {static_cast<std::size_t>(info.views), 4, size, size};
@@ -85,6 +120,11 @@ ArrayShape ImageShape(const DatasetInfo& info) {
 Result<ModelData> FromArrays(const NpzArrays& arrays, const DatasetInfo& info) {
   ModelData data;
   TILEGRAD_ASSIGN(data.images, Take<std::uint8_t>(arrays, "images", ImageShape(info)));
+  if (info.own_cameras) {
+    const auto at = arrays.find("cameras");
+    if (at == arrays.end()) return DataLoss("array \"cameras\" is missing");
+    TILEGRAD_ASSIGN(data.cameras, CamerasFromNpy(at->second, info));
+  }
   TILEGRAD_TRY(TakeOccupancy(arrays, &data.occupancy));
   TILEGRAD_TRY(TakeVectors(arrays, "points", &data.points));
   TILEGRAD_TRY(TakeVectors(arrays, "mesh_positions", &data.mesh.positions));
@@ -117,7 +157,7 @@ Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData&
   const auto* faces = reinterpret_cast<const std::int32_t*>(data.mesh.faces.data());
   const std::size_t face_count = data.mesh.faces.size();
   const std::int64_t numbers[] = {static_cast<std::int64_t>(stamp.geometry), stamp.source_faces};
-  const NpzArrays arrays = {
+  NpzArrays arrays = {
       {"images", MakeNpy<std::uint8_t>(ImageShape(info), data.images)},
       {"occupancy", MakeNpy<std::uint8_t>({n, n, n}, data.occupancy)},
       {"points", VectorsToNpy(data.points)},
@@ -127,6 +167,7 @@ Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData&
       {"recipe", TextToNpy(stamp.recipe)},
       {"stamp", MakeNpy<std::int64_t>({2}, numbers)},
   };
+  if (info.own_cameras) arrays["cameras"] = CamerasToNpy(info, data.cameras);
   return io::SaveNpz(path, arrays);
 }
 
@@ -142,6 +183,13 @@ Result<std::vector<std::uint8_t>> LoadModelImages(const Path& path, const Datase
   auto images = Take<std::uint8_t>(array, "images", ImageShape(info));
   if (!images.ok()) return images.status().Within(path.string());
   return images;
+}
+
+Result<std::vector<Camera>> LoadModelCameras(const Path& path, const DatasetInfo& info) {
+  TILEGRAD_ASSIGN(const NpyArray array, io::LoadNpzArray(path, "cameras"));
+  auto cameras = CamerasFromNpy(array, info);
+  if (!cameras.ok()) return cameras.status().Within(path.string());
+  return cameras;
 }
 
 Result<ModelStamp> VerifyModelFile(const Path& path, const DatasetInfo& info) {

@@ -55,7 +55,7 @@ struct Gathering {
                                            1.0 / 255};
     Fill<T>(b, reader, [&](std::size_t v) { return store.Image(sample.model, sample.views[v]); });
     for (std::size_t v = 0; v < views; ++v)
-      CamerasOf(b)[v] = store.cameras[static_cast<std::size_t>(sample.views[v])];
+      CamerasOf(b)[v] = store.CameraOf(sample.model, sample.views[v]);
     Mirror(b, sample);
   }
   template <class T>

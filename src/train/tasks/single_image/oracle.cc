@@ -24,7 +24,7 @@ ImageStore StoreOf(const ModelData& data, const DatasetInfo& info) {
   store.models = 1;
   store.views = info.views;
   store.size = info.image_size;
-  for (int view = 0; view < info.views; ++view) store.cameras.push_back(info.camera.View(view));
+  store.cameras = CamerasOf(info, data.cameras);
   return store;
 }
 
