@@ -23,11 +23,21 @@ const std::map<std::string, train::Split> kSplits = {{"test", train::Split::kTes
                                                      {"validation", train::Split::kValidation},
                                                      {"train", train::Split::kTrain}};
 
+const std::map<std::string, train::VoxelRule> kVoxelRules = {{"ours", train::VoxelRule::kOurs},
+                                                             {"binvox", train::VoxelRule::kBinvox},
+                                                             {"nmr", train::VoxelRule::kNmr}};
+
+std::optional<train::VoxelRule> RuleOf(const std::string& name) {
+  if (name.empty()) return std::nullopt;
+  return kVoxelRules.at(name);
+}
+
 struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
   std::string split = "test";
   int refine = 0, oracle = 0;
+  std::string voxels;   // by whose rule; empty: the dataset's
   std::string compare;  // a run whose scores are there; empty: none
 };
 
@@ -57,7 +67,8 @@ struct Subject {
 Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out) {
   TILEGRAD_ASSIGN(out->run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
-  if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0)
+  if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0 &&
+      options.voxels.empty())
     out->files = {out->run / "eval.md", out->run / "eval.json"};
   TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
   if (options.compare.empty()) return {};
@@ -70,8 +81,9 @@ Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out)
 // What ranks must have in common.
 Result<std::vector<train::Trait>> TraitsOf(const EvalOptions& options, const Subject& subject,
                                            const Workers& workers) {
-  std::vector<train::Trait> out = train::CommonTraits(fmt::format(
-      "{} {} {} {}", options.views_per_model, options.split, options.refine, options.oracle));
+  std::vector<train::Trait> out =
+      train::CommonTraits(fmt::format("{} {} {} {} {}", options.views_per_model, options.split,
+                                      options.refine, options.oracle, options.voxels));
   TILEGRAD_ASSIGN(std::string run, train::WithFile("", subject.predictor->checkpoint()));
   TILEGRAD_ASSIGN(std::string data, train::DataFingerprint(subject.data, workers));
   out.push_back({"checkpoint", std::move(run), "all must see the same run"});
@@ -121,7 +133,8 @@ Status RunEvaluation(const EvalOptions& options) {
                                   options.views_per_model,
                                   RefineWith(options.refine, *subject.predictor),
                                   options.oracle,
-                                  ranks.crew()};
+                                  ranks.crew(),
+                                  RuleOf(options.voxels)};
   ProgressLine line;
   auto evaluation = subject.predictor->task().Evaluate(
       job, workers, ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
@@ -151,6 +164,10 @@ void AddEval(CommandList* list) {
                "steps of fitting the template to all views of each model, for a row that says how "
                "good predictions can be at best; 300 take a second a model or two",
                {Range{0, 100000}});
+  command->Add("--voxels", &options->voxels,
+               "by whose rule the voxels of the 3D IoU are made: ours, binvox's (-cb -dc -aw, the "
+               "paper's) or N3MR's; with it scores are printed only [that of the dataset's own]",
+               {NoDefault{}, OneOf{{"ours", "binvox", "nmr"}}});
   command->Add(
       "--compare", &options->compare,
       "folder of another run that was scored on the same models: each measure's difference "

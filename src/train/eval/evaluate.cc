@@ -49,7 +49,7 @@ class Evaluator {
     color_views_ = SpreadViews(views, std::min(kColorViews, views));
     for (int w = 0; w < workers_.count(); ++w)
       pictures_.push_back(std::make_unique<PredictionPictures>(data_.info(), color_views_));
-    TILEGRAD_ASSIGN(const Shape undeformed, ShapeOf(job_.template_mesh, /*seed=*/1));
+    TILEGRAD_ASSIGN(const Shape undeformed, ShapeOf(job_.template_mesh, /*seed=*/1, job_.voxels));
     TILEGRAD_TRY(LoadTrainingShapes());
     TILEGRAD_ASSIGN(const Shape single, MakeSingleShape());
     for (auto* scores : AllScores()) scores->resize(held_out.size());
@@ -81,7 +81,7 @@ class Evaluator {
   };
   Status ScoreModel(std::size_t i, int model, const Constant& shapes) {
     TILEGRAD_ASSIGN(const ModelData data, data_.Load(model));
-    TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
+    TILEGRAD_ASSIGN(const Shape truth, TruthOf(data));
     template_scores_[i] = Compare(shapes.undeformed, truth);
     single_scores_[i] = Compare(shapes.single, truth);
     if (job_.oracle) {
@@ -90,6 +90,12 @@ class Evaluator {
     if (Retrieves()) retrieval_scores_[i] = ScoreRetrieval(data, truth);
     TILEGRAD_ASSIGN(predicted_scores_[i], ScorePredictions(model, data, truth, &unusable_[i]));
     return {};
+  }
+
+  Result<Shape> TruthOf(const ModelData& data) const {
+    VoxelJob voxels = job_.voxels;
+    voxels.half_extent = data_.info().camera.half_extent;
+    return TruthShape(data, OwnVoxelRule(data_.info().source), voxels);
   }
 
   std::span<const std::uint8_t> Image(const ModelData& data, int view) const {
@@ -115,15 +121,20 @@ class Evaluator {
     std::set<std::pair<int, std::string>> seen;
     for (std::size_t i = 0; i < train.size(); ++i) {
       TILEGRAD_TRY(Tick("training shapes", i, train.size()));
-      TILEGRAD_ASSIGN(ModelData data, data_.Load(train[i]));
+      TILEGRAD_ASSIGN(const ModelData data, data_.Load(train[i]));
       // The i-th is searched where the rounded share of those up to it goes up.
       if ((i + 1) * searched / train.size() > i * searched / train.size())
         TILEGRAD_TRY(AddSearched(data));
       const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
-      if (seen.emplace(info.class_index, ShapeOf(info)).second)
-        train_.grids.push_back(std::move(data.occupancy));
+      if (seen.emplace(info.class_index, ShapeOf(info)).second) TILEGRAD_TRY(AddGrid(data));
     }
     out_.retrieval_models = static_cast<int>(searched);
+    return {};
+  }
+
+  Status AddGrid(const ModelData& data) {
+    TILEGRAD_ASSIGN(Shape shape, TruthOf(data));
+    train_.grids.push_back(std::move(shape.occupancy));
     return {};
   }
 
@@ -131,7 +142,7 @@ class Evaluator {
   bool Retrieves() const { return job_.split != Split::kTrain && job_.retrieval_models > 0; }
 
   Status AddSearched(const ModelData& data) {
-    TILEGRAD_ASSIGN(Shape shape, TruthShape(data));
+    TILEGRAD_ASSIGN(Shape shape, TruthOf(data));
     train_.shapes.push_back(std::move(shape));
     train_.color_images.push_back(Images(data, color_views_));
     train_.index.Add(data.images, data_.info().views, data_.info().image_size);
@@ -178,8 +189,8 @@ class Evaluator {
   };
   Score ScorePrediction(Mesh mesh, const Origin& from, const ModelData& data, const Shape& truth,
                         std::uint8_t* unusable) const {
-    const auto pictures = pictures_[from.worker]->Draw(mesh, from.view);
-    const auto shape = ShapeOf(std::move(mesh), from.seed);
+    const auto pictures = pictures_[from.worker]->Draw(mesh, from.view, data.cameras);
+    const auto shape = ShapeOf(std::move(mesh), from.seed, job_.voxels);
     *unusable = !shape.ok() || !pictures.ok();
     if (*unusable) return WorstScore(truth);
     Score score = Compare(*shape, truth);
@@ -233,6 +244,7 @@ class Evaluator {
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
     out_.dataset_source = data_.info().source;
+    out_.voxels = kVoxelRuleNames[static_cast<int>(job_.voxels.rule)];
     out_.views_per_model = static_cast<int>(views_.size());
   }
 

@@ -12,6 +12,7 @@
 #include "base/progress.h"
 #include "train/data/dataset.h"
 #include "train/eval/evaluation.h"
+#include "train/eval/scores.h"
 #include "train/ranks/crew.h"
 
 namespace tilegrad::train {
@@ -33,6 +34,7 @@ struct EvaluationJob {
   // these are spread evenly over all. With 24 views each a search takes some milliseconds, and the
   // shapes take 200 MB. 0: that baseline is left out, as it is of training models' scores.
   int retrieval_models = 1000;
+  VoxelJob voxels{};      // with the half-extent of predictions
   std::string predictor;  // Predictor::description, for the heading
   Crew* crew = nullptr;   // of ranks that score models together; only on rank 0 are scores whole
 };

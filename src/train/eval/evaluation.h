@@ -15,6 +15,11 @@ namespace tilegrad::train {
 // The row of tasks that predict light whose light is the same for all pictures.
 inline constexpr const char* kMeanLightRow = "mean light";
 
+// By whose rule the voxels of an IoU are made: ours (Voxelize), binvox's as the paper ran it
+// (VoxelizeCarved), or N3MR's (VoxelizeNmr).
+enum class VoxelRule { kOurs, kBinvox, kNmr };
+inline constexpr const char* kVoxelRuleNames[] = {"ours", "binvox", "nmr"};
+
 inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
 
 struct Score {
@@ -25,7 +30,7 @@ struct Score {
     return accuracy.value_or(iou);
   }
 
-  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; voxels of Voxelize
+  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; Evaluation::voxels
   std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
   // Share of pictures whose class was told right, of tasks that classify: `iou` means nothing then.
   std::optional<double> accuracy = std::nullopt;
@@ -72,6 +77,7 @@ inline const std::string& ShapeOf(const ModelScore& model) {
 struct Evaluation {
   std::string predictor, split;
   std::string dataset_source;
+  std::string voxels = "ours";  // kVoxelRuleNames: of Score::iou
   int views_per_model = 0;
   std::vector<std::string> classes;  // those that have models in the split
   std::vector<int> class_models;     // how many

@@ -150,6 +150,8 @@ std::string Notes(const Evaluation& evaluation) {
         "has the picture most like the input.",
         evaluation.retrieval_models);
   }
+  if (evaluation.voxels != "ours")
+    notes += fmt::format(" 3D IoU: of voxels by the rule of {}.", evaluation.voxels);
   if (HasAny(evaluation, &Score::carved_iou)) {
     notes +=
         " Carved IoU: mean over classes of the IoU with voxels by the paper's rule (binvox -cb -dc "
@@ -255,6 +257,7 @@ nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
                {"class_models", evaluation.class_models},
                {"rows", Json::array()},
                {"models", Json::array()}};
+  if (evaluation.voxels != "ours") json["voxels"] = evaluation.voxels;
   for (const auto& row : evaluation.rows) json["rows"].push_back(ToJson(evaluation, row));
   for (const ModelScore& model : evaluation.models) {
     Json entry = ToJson(model.score);

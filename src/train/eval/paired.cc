@@ -62,6 +62,9 @@ Result<PairedComparison> ComparePaired(const Evaluation& first, const Evaluation
   const std::vector<ScorePair> pairs = PairsOf(first, second);
   if (pairs.empty())
     return InvalidArgument("\"{}\" was scored on none of these models", second.predictor);
+  if (first.voxels != second.voxels)
+    return InvalidArgument("the two were scored with voxels by different rules: {} and {}",
+                           first.voxels, second.voxels);
   PairedComparison out{second.predictor, static_cast<int>(pairs.size()), {}};
   const bool shapes = !Classifies(first) && !IsOfPhotographs(first);
   for (const ScoreMeasure& measure : kMeasures) {

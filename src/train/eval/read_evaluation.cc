@@ -104,6 +104,7 @@ Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   fields.Read("shape_threshold", &out.shape_threshold);
   if (json.is_object() && json.contains("retrieval_models"))  // not in those of elder programs
     fields.Read("retrieval_models", 0, most, &out.retrieval_models);
+  if (json.is_object() && json.contains("voxels")) fields.Read("voxels", &out.voxels);
   fields.Read("unusable_predictions", 0, most, &out.unusable_predictions);
   fields.Read("classes", &out.classes);
   if (!fields.status().ok()) return fields.status();

@@ -29,19 +29,33 @@ std::optional<double> MeanOf(std::span<const Score> scores, Pick pick) {
 
 }  // namespace
 
-Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed) {
-  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule{}.half_extent)));
+VoxelRule OwnVoxelRule(const std::string& source) {
+  if (source == "nmr") return VoxelRule::kNmr;
+  return source == "choy" || source == "dibr" ? VoxelRule::kBinvox : VoxelRule::kOurs;
+}
+
+Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed, const VoxelJob& voxels) {
   Shape shape;
-  TILEGRAD_ASSIGN(shape.occupancy, Voxelize(mesh, kOccupancyResolution));
+  if (voxels.rule == VoxelRule::kNmr) {
+    TILEGRAD_ASSIGN(shape.occupancy, VoxelizeNmr(mesh, voxels.half_extent, kOccupancyResolution));
+  }
+  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule{}.half_extent)));
+  if (voxels.rule == VoxelRule::kOurs) {
+    TILEGRAD_ASSIGN(shape.occupancy, Voxelize(mesh, kOccupancyResolution));
+  }
   TILEGRAD_ASSIGN(shape.carved, VoxelizeCarved(mesh, kOccupancyResolution));
+  if (voxels.rule == VoxelRule::kBinvox) shape.occupancy = shape.carved;
   TILEGRAD_ASSIGN(shape.points, SampleSurface(mesh, kTruthPoints, seed));
   return shape;
 }
 
-Result<Shape> TruthShape(const ModelData& data) {
+Result<Shape> TruthShape(const ModelData& data, VoxelRule own, const VoxelJob& voxels) {
   Shape shape{data.occupancy, {}, data.points};
   if (data.mesh.faces.empty()) return shape;
   TILEGRAD_ASSIGN(shape.carved, VoxelizeCarved(data.mesh, kOccupancyResolution));
+  if (voxels.rule == own) return shape;
+  TILEGRAD_ASSIGN(Shape made, ShapeOf(data.mesh, /*seed=*/0, voxels));
+  shape.occupancy = std::move(made.occupancy);
   return shape;
 }
 
@@ -108,18 +122,19 @@ PredictionPictures::PredictionPictures(const DatasetInfo& info, std::vector<int>
       renderer_(*alone_) {}
 
 Result<PredictionPictures::Pictures> PredictionPictures::Draw(const Mesh& mesh,
-                                                              std::optional<int> from) {
+                                                              std::optional<int> from,
+                                                              std::span<const Camera> own) {
   TILEGRAD_TRY(Validate(mesh));
   const MeshScene made(mesh, {.color_space = ColorSpace::kSrgb});
   Scene scene = made.scene();
   std::vector<bool> seen;
   if (from) {
-    TILEGRAD_ASSIGN(seen, FacesSeenFrom(*from, mesh.faces.size(), scene));
+    TILEGRAD_ASSIGN(seen, FacesSeenBy(ViewOf(*from, own), mesh.faces.size(), scene));
   }
   Pictures out;
   Picture picture;
   for (const int view : views_) {
-    scene.camera = info_.camera.View(view);
+    scene.camera = ViewOf(view, own);
     const PictureRequest request{.width = info_.image_size,
                                  .height = info_.image_size,
                                  .supersampling = kSamples,
@@ -136,10 +151,10 @@ Result<PredictionPictures::Pictures> PredictionPictures::Draw(const Mesh& mesh,
 }
 
 // At the samples of pictures.
-Result<std::vector<bool>> PredictionPictures::FacesSeenFrom(int view, std::size_t faces,
-                                                            Scene scene) {
+Result<std::vector<bool>> PredictionPictures::FacesSeenBy(const Camera& camera, std::size_t faces,
+                                                          Scene scene) {
   const int size = kSamples * info_.image_size;
-  scene.camera = ScaledCamera(info_.camera.View(view), static_cast<float>(kSamples));
+  scene.camera = ScaledCamera(camera, static_cast<float>(kSamples));
   Picture picture;
   const PictureRequest request{.width = size, .height = size, .color = false, .face_ids = true};
   TILEGRAD_TRY(renderer_.Render(scene, request, &picture));

@@ -20,10 +20,20 @@ struct Shape {
   std::vector<glm::vec3> points;        // of the surface; empty: unknown
 };
 
+// By which the voxels that come with a set are made: DatasetInfo::source.
+VoxelRule OwnVoxelRule(const std::string& source);
+
+struct VoxelJob {
+  VoxelRule rule = VoxelRule::kOurs;
+  double half_extent = CameraRule{}.half_extent;  // of meshes; N3MR's rule does not move them
+};
+
 // `seed`: of the points.
-Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed);
-// As the dataset keeps it. An error for a mesh without extent.
-Result<Shape> TruthShape(const ModelData& data);
+Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed, const VoxelJob& voxels = {});
+// As the dataset keeps it, which has them by its `own` rule; by another one only where there is a
+// mesh to make them from. An error for a mesh without extent.
+Result<Shape> TruthShape(const ModelData& data, VoxelRule own = VoxelRule::kOurs,
+                         const VoxelJob& voxels = {});
 
 Score Compare(const Shape& shape, const Shape& truth);
 // Of a prediction that has no shape.
@@ -65,11 +75,16 @@ class PredictionPictures {
     std::vector<std::uint8_t> rgba;  // [views][4][size][size]
     std::vector<Side> sides;         // [views][size][size], at centres of pixels
   };
-  // `from`: the view that the mesh was predicted from; none: no sides.
-  Result<Pictures> Draw(const Mesh& mesh, std::optional<int> from = std::nullopt);
+  // `from`: the view that the mesh was predicted from; none: no sides. `own`: the cameras of the
+  // model's views; empty: the dataset's.
+  Result<Pictures> Draw(const Mesh& mesh, std::optional<int> from = std::nullopt,
+                        std::span<const Camera> own = {});
 
  private:
-  Result<std::vector<bool>> FacesSeenFrom(int view, std::size_t faces, Scene scene);
+  Camera ViewOf(int view, std::span<const Camera> own) const {
+    return own.empty() ? info_.camera.View(view) : own[static_cast<std::size_t>(view)];
+  }
+  Result<std::vector<bool>> FacesSeenBy(const Camera& camera, std::size_t faces, Scene scene);
 
   const DatasetInfo& info_;
   std::vector<int> views_;

@@ -216,6 +216,8 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
   evaluation.views_per_model = job.views_per_model;
   evaluation.predictor = job.predictor.description();
   evaluation.crew = job.crew;
+  evaluation.voxels = {job.voxels.value_or(OwnVoxelRule(dataset.info().source)),
+                       job.predictor.half_extent()};
   return train::Evaluate(evaluation, workers, progress, stop);
 }
 

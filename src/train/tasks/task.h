@@ -102,6 +102,8 @@ struct TaskEvaluation {
   // predictions can be; 0: none. An error where a task has no such row.
   int oracle_steps = 0;
   Crew* crew = nullptr;  // of ranks that score models together; only on rank 0 are scores whole
+  // By whose rule voxels of an IoU are made; none: that of the dataset's.
+  std::optional<VoxelRule> voxels = std::nullopt;
 };
 
 // A picture of a report.

@@ -188,6 +188,7 @@ Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel
                                       const StopFlag& stop) {
   if (job.change) return InvalidArgument("a classifier predicts no meshes that could be refined");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
   if (job.oracle_steps > 0)
     return InvalidArgument("--oracle fits meshes; a classifier predicts none");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));

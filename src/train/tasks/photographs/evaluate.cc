@@ -264,6 +264,7 @@ Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers&
   if (job.change)
     return InvalidArgument(
         "--refine needs cameras; predictions from photographs cannot be refined");
+  if (job.voxels) return InvalidArgument("--voxels: photographs have none");
   if (job.oracle_steps > 0) return InvalidArgument("photographs have no oracle");
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(job.data));
   if (!set.photographs[0].camera)

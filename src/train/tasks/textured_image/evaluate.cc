@@ -263,6 +263,7 @@ Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const Tas
     return InvalidArgument(
         "--refine fits shapes only; predictions of textures and lights cannot be refined");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.voxels) return InvalidArgument("--voxels: this task is scored by ours and by binvox's");
   if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
