@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -22,17 +21,19 @@
 #include "train/data/few_models.h"
 #include "train/data/sources/installed.h"
 #include "train/data/sources/model_source.h"
+#include "train/data/sources/split_list.h"
 
 namespace tilegrad::cli {
 namespace {
 
 struct DatasetOptions {
   std::vector<std::string> sources = {"sweethome3d"};
-  std::string input, out, split_list;
+  std::string input, out;
+  std::vector<std::string> split_lists;
   int workers = 0;
-  bool fixed_size = false;  // --size or --views was given
-  bool shares = false;      // of the split were given
-  bool liveries = false;    // --liveries was given
+  bool size = false, views = false;  // --size, --views were given
+  bool shares = false;               // of the split were given
+  bool liveries = false;             // --liveries was given
   bool force = false;
   train::BuildOptions build;
 
@@ -44,7 +45,8 @@ using Opened = Result<std::unique_ptr<train::ModelSource>>;
 constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
 
 std::vector<std::string> DatasetSourceNames() {
-  std::vector<std::string> names = {"shapenet", "folder", "procedural", "nmr", train::kThirteen};
+  std::vector<std::string> names = {"shapenet", "choy",   "nmr",        "dvr",
+                                    "dibr",     "folder", "procedural", train::kThirteen};
   for (const auto& source : train::InstalledSources()) names.emplace_back(source.name);
   return names;
 }
@@ -56,7 +58,10 @@ std::string DatasetSourceHelp() {
          "trigger-rally-data, ufoai-data), several of these with commas between, thirteen (all of "
          "these), shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL with "
          "one of " +
-         io::MeshFileEndings() + "), procedural (built in), nmr (.npz renders of N3MR and SoftRas)";
+         io::MeshFileEndings() +
+         "), procedural (built in); renders of ShapeNet: nmr (.npz of N3MR and SoftRas), dvr (the "
+         "NMR_Dataset of DVR), choy (ShapeNetRendering and ShapeNetVox32 of 3D-R2N2), dibr (the "
+         "paper's)";
 }
 
 // One source, or several of installed packages as one. Errors: --input is missing, or given where
@@ -78,37 +83,51 @@ Opened OpenDatasetSource(const DatasetOptions& options) {
     return installed->open(options.input.empty() ? installed->folder : options.input);
   if (options.input.empty()) return InvalidArgument("--source {} needs --input FOLDER", name);
   if (name == "folder") return train::FolderSource(options.input);
-  if (name == "shapenet") return train::ShapeNetSource(options.input, options.split_list);
-  return train::NmrSource(options.input);
+  if (name == "nmr") return train::NmrSource(options.input);
+  const std::vector<Path> files(options.split_lists.begin(), options.split_lists.end());
+  TILEGRAD_ASSIGN(const train::SplitList list, train::SplitList::Read(files));
+  if (name == "shapenet") return train::ShapeNetSource(options.input, list);
+  const auto open = name == "choy"  ? train::ChoySource
+                    : name == "dvr" ? train::DvrSource
+                                    : train::DibrSource;
+  return open(options.input, list, options.build.image_size);
 }
 
 bool Has(const DatasetOptions& options, std::string_view source) {
   return std::find(options.sources.begin(), options.sources.end(), source) != options.sources.end();
 }
 
+// Sets of pictures: their views, and mostly their split, are what they are.
+bool HoldsPictures(const std::string& name) {
+  return name == "nmr" || name == "choy" || name == "dvr" || name == "dibr";
+}
+
 // An option that would do nothing is a mistake: somebody expects a split that there will not be.
 Status CheckEffects(const DatasetOptions& options) {
   const std::string name = options.Name();
-  if (!options.split_list.empty() && name != "shapenet")
-    return InvalidArgument("--split-list is for --source shapenet, not {}", name);
+  const bool pictures = HoldsPictures(name), listed = !options.split_lists.empty();
+  if (listed && (name == "nmr" || (!pictures && name != "shapenet")))
+    return InvalidArgument("--split-list is for --source shapenet, choy, dvr and dibr, not {}",
+                           name);
+  if (options.build.allow_broken && !pictures && name != "shapenet")
+    return InvalidArgument("--allow-broken: any model of --source {} may be broken", name);
   if (!options.input.empty() && name == "procedural")
     return InvalidArgument("--input: --source procedural reads no models; folder does");
-  if (options.build.up != UpAxis::kY && (name == "procedural" || name == "nmr"))
+  if (options.build.up != UpAxis::kY && (name == "procedural" || pictures))
     return InvalidArgument("--up: --source {} reads no mesh files", name);
   if (options.build.up != UpAxis::kY && name != "folder" && name != "shapenet" &&
       name != "sweethome3d")
     return InvalidArgument("--up: --source {} has an up axis of its own", name);
-  if (options.shares && (name == "nmr" || !options.split_list.empty())) {
+  if (options.shares && ((pictures && name != "dibr") || listed)) {
     return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
-                           name == "nmr" ? "--source nmr" : "--split-list");
+                           listed ? "--split-list" : "--source " + name);
   }
   if (options.liveries && !Has(options, "thirteen") && !Has(options, "planes") &&
       !Has(options, "cars"))
     return InvalidArgument("--liveries: models of --source {} have one set of textures each", name);
-  if (options.fixed_size && name == "nmr") {
-    return InvalidArgument(
-        "--source nmr holds images of 64 pixels in 24 views: leave out --size "
-        "and --views");
+  if (pictures && (options.views || (options.size && name == "nmr"))) {
+    return InvalidArgument("--source {} holds 24 views{}: leave out --{}", name,
+                           name == "nmr" ? " of 64 pixels" : "", options.views ? "views" : "size");
   }
   return {};
 }
@@ -133,17 +152,10 @@ void PrintTable(const train::BuildSummary& summary) {
   }
 }
 
-// Reasons mostly begin with the file: what is the same in several is what follows it.
 void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
   if (summary.rejected.empty()) return;
-  std::map<std::string, int> reasons;
-  for (const auto& model : summary.rejected) {
-    const auto colon = model.reason.rfind(": ");
-    ++reasons[colon == std::string::npos ? model.reason : model.reason.substr(colon + 2)];
-  }
-  Print("{} could not be used ({} lists them):\n", Count(summary.rejected.size(), "model"),
-        (folder / "rejected.jsonl").string());
-  for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
+  Print("{} could not be used ({} lists them):\n{}", Count(summary.rejected.size(), "model"),
+        (folder / "rejected.jsonl").string(), summary.broken.Summary());
 }
 
 // A few of what `items` say of files, below a heading.
@@ -228,8 +240,14 @@ void AddSourceOptions(Command* command, DatasetOptions* options) {
   command->Add("--input", &options->input,
                "folder of the models; those of packages have a default, procedural needs none");
   command->Add("--out", &options->out, "folder to fill [datasets/SOURCE]");
-  command->Add("--split-list", &options->split_list,
-               "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
+  command->Add(
+      "--split-list", &options->split_lists,
+      "published lists of the models to use, with commas between: SYNSET/MODEL "
+      "train|val|test, or one file a split, whose name has train, val or test in it; those "
+      "of Pixel2Mesh, DVR, DIB-R, PyTorch3D, 3D-R2N2 and ShapeNet's all.csv as they are",
+      {SplitAtCommas{}});
+  command->Add("--allow-broken", &options->build.allow_broken,
+               "go on if more than 1 % of a published set cannot be used");
 }
 
 void AddBuildOptions(Command* command, train::BuildOptions* build) {
@@ -263,7 +281,8 @@ void AddDataset(CommandList* list) {
   AddForceOption(&command, &options->force);
   AddWorkersOption(&command, &options->workers);
   command.action = [&command, options] {
-    options->fixed_size = command.Given("--size") || command.Given("--views");
+    options->size = command.Given("--size");
+    options->views = command.Given("--views");
     options->liveries = command.Given("--liveries");
     options->shares = command.Given("--test-share") || command.Given("--validation-share");
     if (!options->liveries && options->Name() == "thirteen") options->build.liveries = 1;

@@ -208,6 +208,16 @@ Bytes EncodeNpy(const NpyArray& array) {
   return out;
 }
 
+Result<std::vector<double>> NumbersOf(const NpyArray& array, const std::string& name) {
+  if (array.type == NpyType::kF32) {
+    TILEGRAD_ASSIGN(const std::vector<float> values, array.As<float>());
+    return std::vector<double>(values.begin(), values.end());
+  }
+  auto values = array.As<double>();
+  if (!values.ok()) return values.status().Within(name);
+  return values;
+}
+
 Result<NpyArray> LoadNpy(const Path& path) {
   const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));

@@ -57,11 +57,15 @@ Result<std::vector<T>> NpyArray::As() const {
   return std::vector<T>(begin, begin + data.size() / sizeof(T));
 }
 
-// Versions 1 to 3 of the format; Fortran order is converted, and float16 becomes float32. Sizes are checked against the data
-// before memory is taken; big-endian and object arrays are refused. `name` stands in messages.
+// Versions 1 to 3 of the format; Fortran order is converted, and float16 becomes float32. Sizes are
+// checked against the data before memory is taken; big-endian and object arrays are refused. `name`
+// stands in messages.
 Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::string& name);
 Bytes EncodeNpy(const NpyArray& array);
 Result<NpyArray> LoadNpy(const Path& path);
+
+// Of float32 or float64; `name` stands in the error for other types.
+Result<std::vector<double>> NumbersOf(const NpyArray& array, const std::string& name);
 
 using NpzArrays = std::map<std::string, NpyArray>;
 Result<NpzArrays> LoadNpz(const Path& path);

@@ -250,7 +250,9 @@ class Builder {
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
       const SourceEntry& e = entry(i);
       if (!outcomes_[i].stamp) {
-        summary_.rejected.push_back({e.id, e.class_name, e.file, outcomes_[i].failure.message()});
+        const std::string& reason = outcomes_[i].failure.message();
+        summary_.rejected.push_back({e.id, e.class_name, e.file, reason});
+        summary_.broken.Add(e.class_name + "/" + e.id, reason);
         continue;
       }
       usable_.push_back(chosen_[i]);
@@ -294,6 +296,8 @@ class Builder {
       return DataLoss("none of {} can be used; {} says why", Count(chosen_.size(), "model"),
                       RejectedPath(folder_).string());
     }
+    if (source_.published())
+      TILEGRAD_TRY(summary_.broken.Check(chosen_.size(), options_.allow_broken));
     Split();
     // No list for a moment rather than one that does not fit the classes.
     std::error_code error;

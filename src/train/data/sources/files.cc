@@ -2,15 +2,14 @@
 // Models that lie in folders, one file each: any tree class/file, and ShapeNetCore.
 #include <algorithm>
 #include <cctype>
-#include <map>
 #include <set>
-#include <sstream>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "base/text.h"
 #include "io/mesh_file.h"
 #include "train/data/sources/model_source.h"
+#include "train/data/sources/split_list.h"
 
 namespace tilegrad::train {
 namespace {
@@ -27,6 +26,7 @@ class FileModels : public ModelSource {
   }
   std::vector<IgnoredFile> ignored() const override { return ignored_; }
   std::string name() const override { return name_; }
+  bool published() const override { return name_ == "shapenet"; }
   std::vector<std::string> credits() const override { return {credit_}; }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
@@ -39,31 +39,6 @@ class FileModels : public ModelSource {
   std::vector<SourceEntry> entries_;
   std::vector<IgnoredFile> ignored_;
 };
-
-// "synset/model" -> split.
-using SplitList = std::map<std::string, Split>;
-
-Result<SplitList> ReadSplitList(const Path& path) {
-  TILEGRAD_ASSIGN(const std::string text, ReadText(path));
-  const std::map<std::string, Split> names = {
-      {"train", Split::kTrain}, {"val", Split::kValidation}, {"test", Split::kTest}};
-  SplitList list;
-  std::istringstream lines(text);
-  int number = 0;
-  for (std::string line; std::getline(lines, line);) {
-    ++number;
-    std::istringstream words(line);
-    std::string model, split, more;
-    if (!(words >> model)) continue;
-    if (!(words >> split) || (words >> more) || names.count(split) == 0) {
-      return DataLoss("{}: line {}: expected \"<synset>/<model> <train|val|test>\"", path.string(),
-                      number);
-    }
-    list[model] = names.at(split);
-  }
-  if (list.empty()) return DataLoss("{}: lists no models", path.string());
-  return list;
-}
 
 // Images, materials and buffers, which models name; and what file managers hide.
 bool BelongsToModels(const Path& file) {
@@ -152,11 +127,7 @@ Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
       "folder", "Models of the user.", std::move(list.entries), std::move(list.ignored)));
 }
 
-Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Path& split_list) {
-  SplitList list;
-  if (!split_list.empty()) {
-    TILEGRAD_ASSIGN(list, ReadSplitList(split_list));
-  }
+Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list) {
   std::vector<SourceEntry> entries;
   TILEGRAD_ASSIGN(const auto synsets, ListFolder(folder));
   for (const Path& synset : synsets) {
@@ -165,10 +136,8 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Pa
     TILEGRAD_ASSIGN(const auto models, ListFolder(synset));
     for (const Path& model : models) {
       const std::string name = model.filename().string();
-      const auto listed = list.find(id + "/" + name);
-      if (!IsFolder(model) || (!list.empty() && listed == list.end())) continue;
-      std::optional<Split> split;
-      if (listed != list.end()) split = listed->second;
+      const Listing listing = list.Of(id, name);
+      if (!IsFolder(model) || !listing.used) continue;
       const Path file = model / "models" / "model_normalized.obj";
       entries.push_back({class_name,
                          SafeFileName(name),
@@ -176,13 +145,13 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Pa
                          "ShapeNet terms of use",
                          "",
                          file.string(),
-                         split,
+                         listing.split,
                          {}});
     }
   }
   if (entries.empty()) {
     return NotFound("{}: no models{}; expected <synset>/<model>/models/model_normalized.obj",
-                    folder.string(), list.empty() ? "" : " that " + split_list.string() + " names");
+                    folder.string(), list.size() > 0 ? " that the list names" : "");
   }
   return std::unique_ptr<ModelSource>(
       std::make_unique<FileModels>("shapenet", "3D models: ShapeNetCore (Chang et al. 2015).",

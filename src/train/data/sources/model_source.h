@@ -15,6 +15,8 @@
 
 namespace tilegrad::train {
 
+class SplitList;
+
 struct SourceEntry {
   std::string class_name;  // safe as a file name
   std::string id;          // unique in its class, safe as a file name
@@ -48,6 +50,8 @@ class ModelSource {
   // The camera and sizes that the source dictates, where it holds images.
   virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
   virtual std::vector<IgnoredFile> ignored() const { return {}; }
+  // Whether it is a set that others know too, of whose models hardly any may be unusable.
+  virtual bool published() const { return false; }
   // Another where the same entries give other models, as after a change of a list that says how
   // they are read; 0 where nothing does.
   virtual std::uint64_t version() const { return 0; }
@@ -80,14 +84,25 @@ std::unique_ptr<ModelSource> CombineSources(std::string name,
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
 // folder/<synset>/<model>/models/model_normalized.obj, the paper's 13 synsets; other folders
-// are not looked at. `split_list`, if not empty, is a text file of lines "<synset>/<model> <split>"
-// with train, val or test; then only the models that it lists are used.
-Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Path& split_list);
+// are not looked at. With a list (split_list.h) only the models that it lists are used.
+Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list);
+
+// Published renders of ShapeNet models; each file says what lies where: 3D-R2N2's (choy.cc), N3MR's
+// as kept for DVR (dvr.cc, which has lists of its own) and the paper's (dibr.cc). Without a list
+// 3D-R2N2's rule divides its set: the first 80 % of each class train, the others test.
+Result<std::unique_ptr<ModelSource>> ChoySource(const Path& folder, const SplitList& list,
+                                                int image_size);
+Result<std::unique_ptr<ModelSource>> DvrSource(const Path& folder, const SplitList& list,
+                                               int image_size);
+Result<std::unique_ptr<ModelSource>> DibrSource(const Path& folder, const SplitList& list,
+                                                int image_size);
 
 // The renders of N3MR and SoftRas: folder/<class>_<train|val|test>_images.npz, uint8
 // [N,24,4,64,64], with _voxels.npz, bool [N,32,32,32]. One pair of files is held in memory at a
 // time.
 Result<std::unique_ptr<ModelSource>> NmrSource(const Path& folder);
+// N3MR's cameras in our frame (nmr.cc).
+CameraRule NmrCameras();
 
 // "airplane" for "02691156" and so on for the 13 synsets; other names stay as they are.
 std::string SynsetName(const std::string& synset);

@@ -80,6 +80,7 @@ class Nmr : public ModelSource {
   void Sort() { SortEntries(&entries_); }
 
   std::string name() const override { return "nmr"; }
+  bool published() const override { return true; }
   std::vector<std::string> credits() const override {
     return {"Renders of ShapeNetCore models by Kato et al. (Neural 3D Mesh Renderer, 2018)."};
   }
@@ -89,11 +90,7 @@ class Nmr : public ModelSource {
     DatasetInfo info;
     info.image_size = kSize;
     info.views = kNmrViews;
-    info.camera.lens.fov_y = 30;
-    info.camera.azimuth_step = 15;
-    info.camera.elevation = 30;
-    info.camera.distance = 2.732;
-    info.camera.half_extent = 0.5;
+    info.camera = NmrCameras();
     return info;
   }
 
@@ -158,6 +155,16 @@ std::optional<NmrPart> ParsePart(const Path& file) {
 }
 
 }  // namespace
+
+CameraRule NmrCameras() {
+  CameraRule rule;
+  rule.lens.fov_y = 30;
+  rule.azimuth_step = 15;
+  rule.elevation = 30;
+  rule.distance = 2.732;
+  rule.half_extent = 0.5;
+  return rule;
+}
 
 Result<std::unique_ptr<ModelSource>> NmrSource(const Path& folder) {
   TILEGRAD_ASSIGN(const auto files, ListFolder(folder));

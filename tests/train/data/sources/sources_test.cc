@@ -11,6 +11,7 @@
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/sources/procedural.h"
+#include "train/data/sources/split_list.h"
 #include "train/data/sources/sweethome3d_list.h"
 
 namespace tilegrad::train::sources_test {
@@ -18,7 +19,13 @@ namespace tilegrad::train::sources_test {
 constexpr const char* kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
-class SourcesTest : public TempFolderTest {};
+class SourcesTest : public TempFolderTest {
+ protected:
+  Result<std::unique_ptr<ModelSource>> Listed() const {
+    TILEGRAD_ASSIGN(const SplitList list, SplitList::Read({folder_ / "split.txt"}));
+    return ShapeNetSource(folder_ / "net", list);
+  }
+};
 
 TEST(Procedural, ModelsAreValidDifferentAndRepeatable) {
   for (int c = 0; c < static_cast<int>(ProceduralClasses().size()); ++c) {
@@ -131,21 +138,21 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
   EXPECT_TRUE((*all)->Load(0).ok());
 
   Write("split.txt", "03001627/a1 test\n\n03001627/c3 val\n");
-  const auto listed = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
+  const auto listed = Listed();
   ASSERT_TRUE(listed.ok()) << listed.status().message();
   ASSERT_EQ((*listed)->entries().size(), 2u);
   EXPECT_EQ((*listed)->entries()[0].split, Split::kTest);
   EXPECT_EQ((*listed)->entries()[1].split, Split::kValidation);
 
   Write("split.txt", "03001627/a1 test\n03001627/b2 exam\n");
-  const auto wrong = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
+  const auto wrong = Listed();
   ASSERT_FALSE(wrong.ok());
   EXPECT_NE(wrong.status().message().find("line 2"), std::string::npos);
 
   Write("split.txt", "03001627/d4 test\n");
-  const auto none = ShapeNetSource(folder_ / "net", folder_ / "split.txt");
+  const auto none = Listed();
   ASSERT_FALSE(none.ok());
-  EXPECT_NE(none.status().message().find("split.txt names"), std::string::npos);
+  EXPECT_NE(none.status().message().find("that the list names"), std::string::npos);
 }
 
 TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {

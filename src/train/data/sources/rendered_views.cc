@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/sources/rendered_views.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "io/image_file.h"
+#include "scene/camera_conventions.h"
+#include "train/data/cutout.h"
+#include "train/data/sources/split_list.h"
+
+namespace tilegrad::train {
+namespace {
+
+// 255 inside.
+ImageU8 HardMask(const ImageU8& mask) {
+  ImageU8 out(mask.width, mask.height, 1);
+  for (std::size_t p = 0; p < out.pixels.size(); ++p)
+    out.pixels[p] = mask.pixels[p * static_cast<std::size_t>(mask.channels)] != 0 ? 255 : 0;
+  return out;
+}
+
+Result<std::vector<std::uint8_t>> LoadView(const RenderedView& view, int size) {
+  TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(view.image));
+  if (!view.mask.empty()) {
+    TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(view.mask));
+    TILEGRAD_ASSIGN(image, WithMask(image, HardMask(mask)));
+  }
+  if (image.width != image.height || image.width < size) {
+    return InvalidArgument("{} x {} pixels, not a square of --size {} or more", image.width,
+                           image.height, size);
+  }
+  return PrepareCutout(image, size, Framing::kKeep);
+}
+
+class RenderedViews : public ModelSource {
+ public:
+  RenderedViews(RenderedSet set, int image_size) : set_(std::move(set)), image_size_(image_size) {}
+
+  Status List(const SplitList& list) {
+    TILEGRAD_ASSIGN(const auto synsets, ListFolder(set_.models));
+    for (const Path& synset : synsets) {
+      if (IsFolder(synset)) TILEGRAD_TRY(ListClass(synset, list));
+    }
+    if (entries_.empty())
+      return NotFound("{}: no models{}; expected {}", set_.models.string(),
+                      list.size() > 0 ? " that the list names" : "", set_.expected);
+    if (entries_.size() < list.size()) {
+      ignored_.push_back(
+          {set_.models.string(), fmt::format("{} of {} models of the list are missing",
+                                             list.size() - entries_.size(), list.size())});
+    }
+    SortEntries(&entries_);
+    return {};
+  }
+
+  std::string name() const override { return set_.name; }
+  std::vector<std::string> credits() const override { return {set_.credit}; }
+  const std::vector<SourceEntry>& entries() const override { return entries_; }
+  std::vector<IgnoredFile> ignored() const override { return ignored_; }
+  bool published() const override { return true; }
+  std::optional<DatasetInfo> FixedInfo() const override {
+    DatasetInfo info;
+    info.image_size = image_size_;
+    info.views = kRenderedViews;
+    info.camera = set_.like;
+    info.own_cameras = true;
+    return info;
+  }
+
+  Result<SourceModel> Load(std::size_t entry) const override {
+    TILEGRAD_ASSIGN(RenderedModel model, set_.read(entries_[entry].file));
+    ModelData data = std::move(model.truth);
+    for (const RenderedView& view : model.views) {
+      const auto planes = LoadView(view, image_size_);
+      if (!planes.ok()) return planes.status().Within(view.image.string());
+      data.images.insert(data.images.end(), planes->begin(), planes->end());
+      TILEGRAD_TRY(Validate(view.camera).Within(view.image.string()));
+      data.cameras.push_back(
+          ScaledCamera(CameraCast<float>(view.camera), static_cast<float>(image_size_)));
+    }
+    return SourceModel{std::move(data)};
+  }
+
+ private:
+  Status ListClass(const Path& synset, const SplitList& list) {
+    const std::string id = synset.filename().string();
+    TILEGRAD_ASSIGN(std::vector<Path> models, ListFolder(synset));
+    std::erase_if(models, [](const Path& model) { return !IsFolder(model); });
+    if (models.empty()) ignored_.push_back({synset.string(), "holds no model: no class"});
+    const auto training =
+        static_cast<std::size_t>(set_.train_portion * static_cast<double>(models.size()));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const std::string model = models[i].filename().string();
+      Listing listing = list.Of(id, model);
+      if (!listing.used) continue;
+      if (!listing.split && set_.train_portion > 0)
+        listing.split = i < training ? Split::kTrain : Split::kTest;
+      entries_.push_back({SafeFileName(SynsetName(id)),
+                          SafeFileName(model),
+                          model,
+                          "ShapeNet terms of use",
+                          "",
+                          models[i].string(),
+                          listing.split,
+                          {}});
+    }
+    return {};
+  }
+
+  const RenderedSet set_;
+  const int image_size_;
+  std::vector<SourceEntry> entries_;
+  std::vector<IgnoredFile> ignored_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ModelSource>> OpenRenderedSet(RenderedSet set, const SplitList& list,
+                                                     int image_size) {
+  auto source = std::make_unique<RenderedViews>(std::move(set), image_size);
+  TILEGRAD_TRY(source->List(list));
+  return std::unique_ptr<ModelSource>(std::move(source));
+}
+
+Camera64 CameraOfObject(Camera64 camera, const double centre[3], double scale) {
+  for (int row = 0; row < 3; ++row) {
+    double& t = camera.translation[row];
+    for (int k = 0; k < 3; ++k) t += camera.rotation[3 * row + k] * centre[k];
+    t /= scale;
+  }
+  return camera;
+}
+
+}  // namespace tilegrad::train
