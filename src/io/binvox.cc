@@ -11,7 +11,7 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr int kMaxRun = 255;  // voxels
+constexpr int kMaxVoxelRun = 255;  // voxels
 
 std::size_t Cubed(int side) {
   const auto n = static_cast<std::size_t>(side);
@@ -19,12 +19,12 @@ std::size_t Cubed(int side) {
 }
 
 // Where voxel number `i` of a file is in BinvoxGrid::voxels.
-std::size_t PlaceOf(std::size_t i, std::size_t side) {
+std::size_t PlaceOfVoxel(std::size_t i, std::size_t side) {
   const std::size_t x = i / (side * side), z = i / side % side, y = i % side;
   return (x * side + y) * side + z;
 }
 
-bool Finite(const BinvoxGrid& grid) {
+bool IsFiniteCube(const BinvoxGrid& grid) {
   for (const double t : grid.translate) {
     if (!std::isfinite(t)) return false;
   }
@@ -32,7 +32,7 @@ bool Finite(const BinvoxGrid& grid) {
 }
 
 // One line of the header; false where it makes no sense.
-bool ReadHeaderLine(std::string_view line, BinvoxGrid* grid) {
+bool ReadBinvoxLine(std::string_view line, BinvoxGrid* grid) {
   std::istringstream words{std::string(line)};
   std::string key;
   words >> key;
@@ -45,12 +45,12 @@ bool ReadHeaderLine(std::string_view line, BinvoxGrid* grid) {
   }
   if (key == "translate") words >> grid->translate[0] >> grid->translate[1] >> grid->translate[2];
   if (key == "scale") words >> grid->scale;
-  return !words.fail() && (key == "translate" || key == "scale") && Finite(*grid);
+  return !words.fail() && (key == "translate" || key == "scale") && IsFiniteCube(*grid);
 }
 
-Status ReadRuns(std::string_view runs, const std::string& name, BinvoxGrid* grid) {
+Status ReadBinvoxRuns(std::string_view runs, const std::string& name, BinvoxGrid* grid) {
   const std::size_t wanted = Cubed(grid->side);
-  if (runs.size() % 2 != 0 || runs.size() / 2 * kMaxRun < wanted)
+  if (runs.size() % 2 != 0 || runs.size() / 2 * kMaxVoxelRun < wanted)
     return DataLoss("{}: the file ends before its {} voxels do", name, wanted);
   TILEGRAD_TRY(ReadBudget::Take(wanted, name));
   grid->voxels.resize(wanted);
@@ -61,7 +61,7 @@ Status ReadRuns(std::string_view runs, const std::string& name, BinvoxGrid* grid
     if (value > 1) return DataLoss("{}: a voxel is {}; 0 and 1 are possible", name, value);
     if (count > wanted - at) return DataLoss("{}: more voxels than dim^3 = {}", name, wanted);
     for (const std::size_t end = at + count; at < end; ++at)
-      grid->voxels[PlaceOf(at, static_cast<std::size_t>(grid->side))] = value;
+      grid->voxels[PlaceOfVoxel(at, static_cast<std::size_t>(grid->side))] = value;
   }
   if (at == wanted) return {};
   return DataLoss("{}: {} voxels, but dim^3 = {}", name, at, wanted);
@@ -76,7 +76,7 @@ Result<BinvoxGrid> DecodeBinvox(std::span<const std::uint8_t> bytes, const std::
     return DataLoss("{}: not a binvox file: it does not begin with #binvox", name);
   BinvoxGrid grid;
   while (lines.Next(line) && line != "data") {
-    if (!ReadHeaderLine(line, &grid)) {
+    if (!ReadBinvoxLine(line, &grid)) {
       return DataLoss(
           "{}: line {}: expected \"dim N N N\" with N up to {}, \"translate X Y Z\", \"scale S\" "
           "or "
@@ -86,7 +86,7 @@ Result<BinvoxGrid> DecodeBinvox(std::span<const std::uint8_t> bytes, const std::
   }
   if (line != "data" || grid.side == 0)
     return DataLoss("{}: the header has no \"dim\" or no \"data\"", name);
-  TILEGRAD_TRY(ReadRuns(lines.Rest(), name, &grid));
+  TILEGRAD_TRY(ReadBinvoxRuns(lines.Rest(), name, &grid));
   return grid;
 }
 
@@ -103,11 +103,11 @@ Bytes EncodeBinvox(const BinvoxGrid& grid) {
                   grid.translate[0], grid.translate[1], grid.translate[2], grid.scale);
   Bytes out(header.begin(), header.end());
   const auto side = static_cast<std::size_t>(grid.side);
-  const auto at = [&](std::size_t i) { return grid.voxels[PlaceOf(i, side)]; };
+  const auto at = [&](std::size_t i) { return grid.voxels[PlaceOfVoxel(i, side)]; };
   for (std::size_t i = 0, end = Cubed(grid.side); i < end;) {
     std::uint8_t count = 0;
     const std::uint8_t value = at(i);
-    for (; i < end && count < kMaxRun && at(i) == value; ++i) ++count;
+    for (; i < end && count < kMaxVoxelRun && at(i) == value; ++i) ++count;
     out.insert(out.end(), {value, count});
   }
   return out;

@@ -20,12 +20,12 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kDistance = 1.75;     // of a column of 1
-constexpr double kTrainPortion = 0.8;  // 3D-R2N2's DATASET_PORTION
-constexpr int kSide = kOccupancyResolution;
+constexpr double kChoyDistance = 1.75;     // of a column of 1
+constexpr double kChoyTrainPortion = 0.8;  // 3D-R2N2's DATASET_PORTION
+constexpr int kChoySide = kOccupancyResolution;
 
 // The camera turned by `degrees` about its z axis, clockwise as seen from behind it.
-Camera64 Rolled(const Camera64& camera, double degrees) {
+Camera64 RolledCamera(const Camera64& camera, double degrees) {
   const double angle = degrees * std::acos(-1.0) / 180, c = std::cos(angle), s = std::sin(angle);
   Camera64 out = camera;
   for (int k = 0; k < 3; ++k) {
@@ -37,7 +37,7 @@ Camera64 Rolled(const Camera64& camera, double degrees) {
   return out;
 }
 
-Result<std::vector<Camera64>> ReadMetadata(const Path& file) {
+Result<std::vector<Camera64>> ReadChoyCameras(const Path& file) {
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::istringstream lines(text);
   std::vector<Camera64> cameras;
@@ -47,11 +47,11 @@ Result<std::vector<Camera64>> ReadMetadata(const Path& file) {
     if (!(numbers >> azimuth)) continue;
     numbers >> elevation >> in_plane >> distance >> fov;
     const auto camera = MakeCamera<double>(Lens{.width = 1, .height = 1},
-                                           {azimuth, elevation, kDistance * distance});
+                                           {azimuth, elevation, kChoyDistance * distance});
     if (numbers.fail() || !camera.ok() || !std::isfinite(in_plane))
       return DataLoss("{}: line {}: expected five numbers of a camera, got \"{}\"", file.string(),
                       cameras.size() + 1, line);
-    cameras.push_back(Rolled(*camera, in_plane));
+    cameras.push_back(RolledCamera(*camera, in_plane));
   }
   if (cameras.size() == kRenderedViews) return cameras;
   return DataLoss("{}: {} views, expected {}", file.string(), cameras.size(), kRenderedViews);
@@ -61,7 +61,7 @@ Result<std::vector<Camera64>> ReadMetadata(const Path& file) {
 // model's coordinates. Without -cb it stands in the cube's lowest corner.
 struct CentredVoxels {
   std::vector<std::uint8_t> occupancy =
-      std::vector<std::uint8_t>(std::size_t{kSide} * kSide * kSide);
+      std::vector<std::uint8_t>(std::size_t{kChoySide} * kChoySide * kChoySide);
   double centre[3];
 };
 
@@ -70,12 +70,13 @@ template <class At>
 void ForEachSolid(const io::BinvoxGrid& grid, const At& at) {
   for (std::size_t i = 0; i < grid.voxels.size(); ++i) {
     const int n = static_cast<int>(i);
-    if (grid.voxels[i] != 0) at(std::array{n / (kSide * kSide), n / kSide % kSide, n % kSide});
+    if (grid.voxels[i] != 0)
+      at(std::array{n / (kChoySide * kChoySide), n / kChoySide % kChoySide, n % kChoySide});
   }
 }
 
-CentredVoxels Centre(const io::BinvoxGrid& grid) {
-  std::array<int, 3> low = {kSide, kSide, kSide}, high = {-1, -1, -1}, shift{};
+CentredVoxels CentreVoxels(const io::BinvoxGrid& grid) {
+  std::array<int, 3> low = {kChoySide, kChoySide, kChoySide}, high = {-1, -1, -1}, shift{};
   ForEachSolid(grid, [&](const std::array<int, 3>& at) {
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], at[k]);
@@ -84,25 +85,25 @@ CentredVoxels Centre(const io::BinvoxGrid& grid) {
   });
   CentredVoxels out;
   for (std::size_t k = 0; k < 3; ++k) {
-    const int off = low[k] + high[k] + 1 - kSide;  // of the box's middle, in half voxels
+    const int off = low[k] + high[k] + 1 - kChoySide;  // of the box's middle, in half voxels
     if (std::abs(off) > 2) shift[k] = -off / 2;
-    out.centre[k] = grid.translate[k] + grid.scale * (0.5 - shift[k] / double{kSide});
+    out.centre[k] = grid.translate[k] + grid.scale * (0.5 - shift[k] / double{kChoySide});
   }
   ForEachSolid(grid, [&](const std::array<int, 3>& at) {
     const int x = at[0] + shift[0], y = at[1] + shift[1], z = at[2] + shift[2];
-    out.occupancy[static_cast<std::size_t>((x * kSide + y) * kSide + z)] = 1;
+    out.occupancy[static_cast<std::size_t>((x * kChoySide + y) * kChoySide + z)] = 1;
   });
   return out;
 }
 
-Result<RenderedModel> ReadModel(const Path& voxels, const Path& folder, double half_extent) {
+Result<RenderedModel> ReadChoyModel(const Path& voxels, const Path& folder, double half_extent) {
   const Path rendering = folder / "rendering";
-  TILEGRAD_ASSIGN(const auto cameras, ReadMetadata(rendering / "rendering_metadata.txt"));
+  TILEGRAD_ASSIGN(const auto cameras, ReadChoyCameras(rendering / "rendering_metadata.txt"));
   const Path file = voxels / folder.parent_path().filename() / folder.filename() / "model.binvox";
   TILEGRAD_ASSIGN(const io::BinvoxGrid grid, io::LoadBinvox(file));
-  if (grid.side != kSide)
-    return DataLoss("{}: {}^3 voxels, expected {}^3", file.string(), grid.side, kSide);
-  CentredVoxels centred = Centre(grid);
+  if (grid.side != kChoySide)
+    return DataLoss("{}: {}^3 voxels, expected {}^3", file.string(), grid.side, kChoySide);
+  CentredVoxels centred = CentreVoxels(grid);
   RenderedModel model;
   model.truth.occupancy = std::move(centred.occupancy);
   for (std::size_t v = 0; v < cameras.size(); ++v) {
@@ -124,9 +125,9 @@ Result<std::unique_ptr<ModelSource>> ChoySource(const Path& folder, const SplitL
   set.credit = "Renders and voxels of ShapeNetCore models by Choy et al. (3D-R2N2, 2016).";
   set.expected = "ShapeNetRendering/SYNSET/MODEL/rendering and ShapeNetVox32/SYNSET/MODEL";
   set.models = folder / "ShapeNetRendering";
-  set.train_portion = kTrainPortion;
+  set.train_portion = kChoyTrainPortion;
   set.read = [voxels = folder / "ShapeNetVox32", half = set.like.half_extent](const Path& model) {
-    return ReadModel(voxels, model, half);
+    return ReadChoyModel(voxels, model, half);
   };
   return OpenRenderedSet(std::move(set), list, image_size);
 }

@@ -23,7 +23,7 @@
 namespace tilegrad::train {
 namespace {
 
-Result<Camera64> ReadCamera(const Path& file) {
+Result<Camera64> ReadDibrCamera(const Path& file) {
   TILEGRAD_ASSIGN(const io::NpyArray array, io::LoadNpy(file));
   TILEGRAD_ASSIGN(const std::vector<double> m, NumbersOf(array, file.string()));
   if (array.shape != std::vector<std::size_t>{4, 4})
@@ -36,7 +36,7 @@ Result<Camera64> ReadCamera(const Path& file) {
   return camera;
 }
 
-Status ReadMesh(const Path& file, ModelData* truth) {
+Status ReadDibrMesh(const Path& file, ModelData* truth) {
   TILEGRAD_ASSIGN(const io::LoadedMesh loaded, io::LoadMesh(file));
   const std::uint64_t seed = HashText(file.parent_path().filename().string(), 0);
   TILEGRAD_ASSIGN(truth->points, SampleSurface(loaded.mesh, kTruthPoints, seed));
@@ -44,23 +44,23 @@ Status ReadMesh(const Path& file, ModelData* truth) {
   return {};
 }
 
-Status ReadTruth(const Path& folder, ModelData* truth) {
+Status ReadDibrTruth(const Path& folder, ModelData* truth) {
   const Path voxels = folder / "model-0.45.binvox", mesh = folder / "model-0.45.obj";
   TILEGRAD_ASSIGN(io::BinvoxGrid grid, io::LoadBinvox(voxels));
   if (grid.side != kOccupancyResolution)
     return DataLoss("{}: {}^3 voxels, expected {}^3", voxels.string(), grid.side,
                     kOccupancyResolution);
   truth->occupancy = std::move(grid.voxels);
-  return PathExists(mesh) ? ReadMesh(mesh, truth) : Status();
+  return PathExists(mesh) ? ReadDibrMesh(mesh, truth) : Status();
 }
 
-Result<RenderedModel> ReadModel(const Path& folder) {
+Result<RenderedModel> ReadDibrModel(const Path& folder) {
   RenderedModel model;
   for (int v = 0; v < kRenderedViews; ++v) {
-    TILEGRAD_ASSIGN(const Camera64 camera, ReadCamera(folder / fmt::format("{}.npy", v)));
+    TILEGRAD_ASSIGN(const Camera64 camera, ReadDibrCamera(folder / fmt::format("{}.npy", v)));
     model.views.push_back({folder / fmt::format("{}.png", v), {}, camera});
   }
-  TILEGRAD_TRY(ReadTruth(folder, &model.truth));
+  TILEGRAD_TRY(ReadDibrTruth(folder, &model.truth));
   return model;
 }
 
@@ -73,7 +73,7 @@ Result<std::unique_ptr<ModelSource>> DibrSource(const Path& folder, const SplitL
   set.credit = "Renders of ShapeNetCore models by Chen et al. (DIB-R, 2019).";
   set.expected = "SYNSET/MODEL/0.png, 0.npy and model-0.45.binvox";
   set.models = folder;
-  set.read = ReadModel;
+  set.read = ReadDibrModel;
   return OpenRenderedSet(std::move(set), list, image_size);
 }
 

@@ -22,10 +22,10 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kHalfExtent = 0.5;
+constexpr double kDvrHalfExtent = 0.5;
 
 // `name` of the file as a 4 x 4 matrix; a file of three rows gets the last.
-Result<Mat4Array> Matrix(const io::NpzArrays& arrays, const std::string& name) {
+Result<Mat4Array> DvrMatrix(const io::NpzArrays& arrays, const std::string& name) {
   const auto at = arrays.find(name);
   if (at == arrays.end()) return DataLoss("no array \"{}\"", name);
   TILEGRAD_ASSIGN(const std::vector<double> numbers, NumbersOf(at->second, name));
@@ -36,7 +36,7 @@ Result<Mat4Array> Matrix(const io::NpzArrays& arrays, const std::string& name) {
   return out;
 }
 
-Mat4Array Product(const Mat4Array& a, const Mat4Array& b) {
+Mat4Array MatrixProduct(const Mat4Array& a, const Mat4Array& b) {
   Mat4Array out{};
   for (std::size_t i = 0; i < 16; ++i) {
     for (std::size_t k = 0; k < 4; ++k) out[i] += a[i / 4 * 4 + k] * b[4 * k + i % 4];
@@ -49,13 +49,13 @@ double Determinant3(const Mat4Array& m) {
          m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-Result<Camera64> CameraAt(const io::NpzArrays& arrays, int view) {
-  TILEGRAD_ASSIGN(const Mat4Array k, Matrix(arrays, fmt::format("camera_mat_{}", view)));
-  TILEGRAD_ASSIGN(Mat4Array world, Matrix(arrays, fmt::format("world_mat_{}", view)));
+Result<Camera64> DvrCamera(const io::NpzArrays& arrays, int view) {
+  TILEGRAD_ASSIGN(const Mat4Array k, DvrMatrix(arrays, fmt::format("camera_mat_{}", view)));
+  TILEGRAD_ASSIGN(Mat4Array world, DvrMatrix(arrays, fmt::format("world_mat_{}", view)));
   const std::string scale_name = fmt::format("scale_mat_{}", view);
   if (arrays.contains(scale_name)) {
-    TILEGRAD_ASSIGN(const Mat4Array scale, Matrix(arrays, scale_name));
-    world = Product(world, scale);
+    TILEGRAD_ASSIGN(const Mat4Array scale, DvrMatrix(arrays, scale_name));
+    world = MatrixProduct(world, scale);
   }
   const double scale = std::cbrt(Determinant3(world));  // depth counts in units of the object
   OpenCvCamera out;
@@ -68,7 +68,7 @@ Result<Camera64> CameraAt(const io::NpzArrays& arrays, int view) {
   return FromOpenCv(out);
 }
 
-Status ReadPoints(const Path& file, ModelData* truth) {
+Status ReadDvrPoints(const Path& file, ModelData* truth) {
   TILEGRAD_ASSIGN(const io::NpyArray array, io::LoadNpzArray(file, "points"));
   TILEGRAD_ASSIGN(const std::vector<double> numbers, NumbersOf(array, "points"));
   if (array.shape.size() != 2 || array.shape[1] != 3 || numbers.empty())
@@ -76,31 +76,31 @@ Status ReadPoints(const Path& file, ModelData* truth) {
   std::vector<glm::vec3> all;
   for (std::size_t i = 0; i < numbers.size(); i += 3)
     all.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
-  TILEGRAD_ASSIGN(truth->occupancy, VoxelizePoints(all, kHalfExtent, kOccupancyResolution));
+  TILEGRAD_ASSIGN(truth->occupancy, VoxelizePoints(all, kDvrHalfExtent, kOccupancyResolution));
   // Each is drawn anew, so any of them are as good as the first.
-  const auto scale = static_cast<float>(CameraRule{}.half_extent / kHalfExtent);
+  const auto scale = static_cast<float>(CameraRule{}.half_extent / kDvrHalfExtent);
   const std::size_t count = std::min<std::size_t>(all.size(), kTruthPoints);
   for (std::size_t i = 0; i < count; ++i)
     truth->points.push_back(scale * all[i * all.size() / count]);
   return {};
 }
 
-Result<RenderedModel> ReadModel(const Path& folder) {
+Result<RenderedModel> ReadDvrModel(const Path& folder) {
   const Path cameras = folder / "cameras.npz";
   TILEGRAD_ASSIGN(const io::NpzArrays arrays, io::LoadNpz(cameras));
   RenderedModel model;
   for (int v = 0; v < kRenderedViews; ++v) {
-    const auto camera = CameraAt(arrays, v);
+    const auto camera = DvrCamera(arrays, v);
     if (!camera.ok()) return camera.status().Within(cameras.string());
     const std::string name = fmt::format("{:04}.png", v);
     model.views.push_back({folder / "image" / name, folder / "mask" / name, *camera});
   }
-  TILEGRAD_TRY(ReadPoints(folder / "pointcloud.npz", &model.truth));
+  TILEGRAD_TRY(ReadDvrPoints(folder / "pointcloud.npz", &model.truth));
   return model;
 }
 
 // The lists in the classes' folders; SoftRas' where there are both.
-Result<std::vector<Path>> FindLists(const Path& folder) {
+Result<std::vector<Path>> FindDvrLists(const Path& folder) {
   TILEGRAD_ASSIGN(const auto synsets, ListFolder(folder));
   std::vector<Path> lists;
   for (const Path& synset : synsets) {
@@ -128,9 +128,9 @@ Result<std::unique_ptr<ModelSource>> DvrSource(const Path& folder, const SplitLi
   set.expected = "SYNSET/MODEL/image, mask, cameras.npz and pointcloud.npz";
   set.models = folder;
   set.like = NmrCameras();
-  set.read = ReadModel;
+  set.read = ReadDvrModel;
   if (list.size() > 0) return OpenRenderedSet(std::move(set), list, image_size);
-  TILEGRAD_ASSIGN(const std::vector<Path> files, FindLists(folder));
+  TILEGRAD_ASSIGN(const std::vector<Path> files, FindDvrLists(folder));
   TILEGRAD_ASSIGN(const SplitList own, SplitList::Read(files));
   return OpenRenderedSet(std::move(set), own, image_size);
 }

@@ -79,10 +79,10 @@ Status TakeOccupancy(const NpzArrays& arrays, std::vector<std::uint8_t>* out) {
 }
 
 // Of a camera in a file: rotation, translation, fx, fy, cx, cy.
-constexpr std::size_t kCameraNumbers = 16;
+constexpr std::size_t kModelCameraNumbers = 16;
 
 ArrayShape CameraShape(const DatasetInfo& info) {
-  return {static_cast<std::size_t>(info.views), kCameraNumbers};
+  return {static_cast<std::size_t>(info.views), kModelCameraNumbers};
 }
 
 NpyArray CamerasToNpy(const DatasetInfo& info, const std::vector<Camera>& cameras) {
@@ -106,7 +106,7 @@ Result<std::vector<Camera>> CamerasFromNpy(const NpyArray& array, const DatasetI
     c.fy = at[13];
     c.cx = at[14];
     c.cy = at[15];
-    at += kCameraNumbers;
+    at += kModelCameraNumbers;
     TILEGRAD_TRY(Validate(CameraCast<double>(c)).Within("array \"cameras\""));
   }
   return cameras;

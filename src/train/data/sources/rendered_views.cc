@@ -20,7 +20,7 @@ ImageU8 HardMask(const ImageU8& mask) {
   return out;
 }
 
-Result<std::vector<std::uint8_t>> LoadView(const RenderedView& view, int size) {
+Result<std::vector<std::uint8_t>> LoadRenderedView(const RenderedView& view, int size) {
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(view.image));
   if (!view.mask.empty()) {
     TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(view.mask));
@@ -72,7 +72,7 @@ class RenderedViews : public ModelSource {
     TILEGRAD_ASSIGN(RenderedModel model, set_.read(entries_[entry].file));
     ModelData data = std::move(model.truth);
     for (const RenderedView& view : model.views) {
-      const auto planes = LoadView(view, image_size_);
+      const auto planes = LoadRenderedView(view, image_size_);
       if (!planes.ok()) return planes.status().Within(view.image.string());
       data.images.insert(data.images.end(), planes->begin(), planes->end());
       TILEGRAD_TRY(Validate(view.camera).Within(view.image.string()));

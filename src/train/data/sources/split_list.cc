@@ -13,7 +13,7 @@
 namespace tilegrad::train {
 namespace {
 
-std::optional<Split> SplitOf(std::string_view name) {
+std::optional<Split> SplitNamed(std::string_view name) {
   if (name == "train") return Split::kTrain;
   if (name == "val" || name == "validation") return Split::kValidation;
   if (name == "test") return Split::kTest;
@@ -27,7 +27,7 @@ std::optional<Split> SplitOfFile(const Path& file) {
   for (const char* split : {"train", "val", "test"}) {
     if (name.find(split) == std::string::npos) continue;
     if (found) return std::nullopt;
-    found = SplitOf(split);
+    found = SplitNamed(split);
   }
   return found;
 }
@@ -39,7 +39,7 @@ bool IsSynset(std::string_view text) {
 }
 
 // Synset and model of what a line begins with; the synset is empty where it names none.
-std::pair<std::string, std::string> ModelOf(std::string_view text) {
+std::pair<std::string, std::string> ListedModel(std::string_view text) {
   const auto parts = SplitText(text, '/');
   for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
     if (IsSynset(parts[i])) return {std::string(parts[i]), std::string(parts[i + 1])};
@@ -82,16 +82,16 @@ class SplitListReader {
   bool ReadLine(const std::string& line, int number) {
     const auto columns = SplitText(line, ',');
     if (columns.size() == 5) {  // the first line has their names
-      const auto split = SplitOf(columns[4]);
+      const auto split = SplitNamed(columns[4]);
       if (split) list_->Add({std::string(columns[1]), std::string(columns[3])}, *split);
       return split || number == 1;
     }
     std::istringstream words(line);
     std::string model, split, more;
     if (!(words >> model)) return true;
-    const auto found = words >> split ? SplitOf(split) : split_;
+    const auto found = words >> split ? SplitNamed(split) : split_;
     if (!found || words >> more) return false;
-    auto key = ModelOf(model);
+    auto key = ListedModel(model);
     if (key.first.empty()) key.first = synset_;
     list_->Add(key, *found);
     return true;
@@ -100,7 +100,7 @@ class SplitListReader {
   Status ReadJson(const std::string& text) {
     TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(text, place_));
     for (const auto& [key, value] : json.items()) {
-      const auto split = SplitOf(key);
+      const auto split = SplitNamed(key);
       if (split && value.is_object()) {
         AddSynsets(value, *split);
       } else if (IsSynset(key)) {

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+// Published sets in miniature: made into a dataset, trained on for 20 steps, evaluated by their own
+// rule. The mesh that a set was rendered from, through the dataset's cameras, meets its masks.
+#include <gtest/gtest.h>
+
+#include "io/binvox.h"
+#include "render/picture/mesh_pictures.h"
+#include "support/temp_folder.h"
+#include "train/data/build/build.h"
+#include "train/data/sources/miniatures.h"
+#include "train/data/sources/split_list.h"
+#include "train/eval/scores.h"
+#include "train/metrics/metrics.h"
+#include "train/predictor.h"
+#include "train/tasks/task.h"
+#include "train/tiny_run.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train::rendered_views_test {
+
+using namespace miniatures;
+
+constexpr double kMaskIou = 0.98;
+
+using Source = std::unique_ptr<ModelSource>;
+
+class RenderedSets : public TempFolderTest {
+ protected:
+  Path Set() const { return folder_ / "set"; }
+  Path Data() const { return folder_ / "data"; }
+
+  Result<BuildSummary> Build(const Source& source, bool allow_broken = false) const {
+    BuildOptions options;
+    options.split.test_share = 0.2;
+    options.allow_broken = allow_broken;
+    return BuildDataset(*source, options, Data(), Workers(2), {}, stop_);
+  }
+
+  // Of all views of all models together.
+  void ExpectMasks(const std::vector<MiniatureModel>& models) const {
+    const Dataset dataset = Ok(Dataset::Open(Data())).value();
+    ASSERT_EQ(dataset.models().size(), models.size());
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      const ModelData data = Ok(dataset.Load(static_cast<int>(m))).value();
+      LitRenderer renderer;
+      const auto ours = Ok(renderer.Render(models[m].mesh, CamerasOf(dataset.info(), data.cameras),
+                                           dataset.info().image_size));
+      EXPECT_GE(MaskIou(data.images, *ours, dataset.info().image_size), kMaskIou) << models[m].id;
+    }
+  }
+  static double MaskIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
+                        int size) {
+    const auto pixels = static_cast<std::size_t>(size * size);
+    std::size_t both = 0, either = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      if (i / pixels % 4 != 3) continue;
+      both += a[i] >= 128 && b[i] >= 128;
+      either += a[i] >= 128 || b[i] >= 128;
+    }
+    return static_cast<double>(both) / static_cast<double>(either);
+  }
+
+  // The set's voxels against those of the meshes by its rule, and surface points against theirs.
+  void ExpectTruth(const std::vector<MiniatureModel>& models, VoxelRule rule,
+                   double least_iou) const {
+    const Dataset dataset = Ok(Dataset::Open(Data())).value();
+    const double half_extent = dataset.info().camera.half_extent;
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      const ModelData data = Ok(dataset.Load(static_cast<int>(m))).value();
+      const Shape truth = Ok(TruthShape(data, rule, {rule, half_extent})).value(),
+                  mesh = Ok(ShapeOf(models[m].mesh, 1, {rule, half_extent})).value();
+      const Score score = Compare(mesh, truth);
+      EXPECT_GE(score.iou, least_iou) << models[m].id;
+      if (data.points.empty()) continue;
+      EXPECT_GT(score.f_score.value(), 0.9) << models[m].id;
+    }
+  }
+
+  Evaluation TrainAndEvaluate(std::optional<VoxelRule> rule = std::nullopt) const {
+    const Workers workers(2);
+    TrainJob job;
+    job.data = Data();
+    job.run = folder_ / "run";
+    job.config = Ok(ParseConfig(kTinyConfig + "steps = 20\n", "tiny")).value();
+    if (!PathExists(job.run)) Ok(Train(job, workers, {}, stop_).status());
+    const auto predictor = Ok(Predictor::Load(job.run, workers));
+    TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
+    evaluation.voxels = rule;
+    return Ok(predictor->task().Evaluate(evaluation, workers, {}, stop_)).value();
+  }
+  void ExpectEvaluation(const char* rule) const {
+    const Evaluation scores = TrainAndEvaluate();
+    EXPECT_EQ(scores.voxels, rule);
+    EXPECT_EQ(scores.rows.back().method, "tilegrad");
+    EXPECT_GT(scores.rows.back().mean.iou, 0);
+    EXPECT_EQ(scores.unusable_predictions, 0);
+    EXPECT_EQ(scores.models.size(), 2u);
+  }
+
+  StopFlag stop_ = false;
+};
+
+TEST_F(RenderedSets, Choy) {
+  const auto models = MiniatureModels(0.45f);
+  WriteChoy(Set(), models);
+  const auto summary = Ok(Build(Ok(ChoySource(Set(), {}, 64)).value()));
+  EXPECT_EQ(summary->info.classes, (std::vector<std::string>{"car", "chair"}));
+  // The first four of five of a class, by name.
+  for (std::size_t m = 0; m < models.size(); ++m)
+    EXPECT_EQ(summary->models[m].split, m % 5 < 4 ? Split::kTrain : Split::kTest);
+  ExpectMasks(models);
+  ExpectTruth(models, VoxelRule::kBinvox, 0.98);
+  ExpectEvaluation("binvox");
+}
+
+TEST_F(RenderedSets, ChoyBySplitListsOfPixel2Mesh) {
+  std::vector<MiniatureModel> models = MiniatureModels(0.45f);
+  models.resize(3);
+  WriteChoy(Set(), models);
+  const auto line = [&](std::size_t m) {
+    return "Data/ShapeNetP2M/" + models[m].synset + "/" + models[m].id + "/rendering/00.dat\n";
+  };
+  const SplitList list =
+      Ok(SplitList::Read({Write("train_list.txt", line(0)), Write("test_list.txt", line(2))}))
+          .value();
+  const auto summary = Ok(Build(Ok(ChoySource(Set(), list, 32)).value()));
+  ASSERT_EQ(summary->models.size(), 2u);
+  EXPECT_EQ(summary->models[0].split, Split::kTrain);
+  EXPECT_EQ(summary->models[1].split, Split::kTest);
+  EXPECT_EQ(summary->info.image_size, 32);
+}
+
+TEST_F(RenderedSets, Dvr) {
+  const auto models = MiniatureModels(0.5f);
+  WriteDvr(Set(), models);
+  const auto summary = Ok(Build(Ok(DvrSource(Set(), {}, 64)).value()));
+  EXPECT_EQ(summary->models[2].split, Split::kTrain);
+  EXPECT_EQ(summary->models[3].split, Split::kValidation);
+  EXPECT_EQ(summary->models[4].split, Split::kTest);
+  ExpectMasks(models);
+  ExpectTruth(models, VoxelRule::kOurs, 0.95);
+  ExpectEvaluation("ours");
+}
+
+TEST_F(RenderedSets, Dibr) {
+  const auto models = MiniatureModels(0.45f);
+  WriteDibr(Set(), models);
+  std::string train, test;
+  for (std::size_t m = 0; m < models.size(); ++m)
+    (m % 5 < 4 ? train : test) += models[m].synset + "_" + models[m].id + "_0.png\n";
+  const SplitList list =
+      Ok(SplitList::Read({Write("train_list.txt", train), Write("test_list.txt", test)})).value();
+  Ok(Build(Ok(DibrSource(Set(), list, 64)).value()).status());
+  ExpectMasks(models);
+  ExpectTruth(models, VoxelRule::kBinvox, 0.98);
+  ExpectEvaluation("binvox");
+  // With a mesh, any rule has a truth.
+  const Evaluation ours = TrainAndEvaluate(VoxelRule::kOurs),
+                   nmr = TrainAndEvaluate(VoxelRule::kNmr);
+  EXPECT_EQ(ours.voxels, "ours");
+  EXPECT_NE(ours.rows.back().mean.iou, nmr.rows.back().mean.iou);
+}
+
+TEST_F(RenderedSets, Nmr) {
+  const auto models = MiniatureModels(0.5f);
+  WriteNmr(Set(), models);
+  Ok(Build(Ok(NmrSource(Set())).value()).status());
+  // The dataset has them by split: only their order differs.
+  const Dataset dataset = Ok(Dataset::Open(Data())).value();
+  EXPECT_EQ(dataset.Select(Split::kTest).size(), 2u);
+  std::vector<MiniatureModel> sorted = {models[4], models[0], models[1], models[2], models[3],
+                                        models[9], models[5], models[6], models[7], models[8]};
+  ExpectMasks(sorted);
+  ExpectTruth(sorted, VoxelRule::kNmr, 1);
+  ExpectEvaluation("nmr");
+}
+
+// --- Broken members: each costs itself ---
+
+// A truncated picture, a missing file, and a class without models.
+class BrokenMembersOfSets : public RenderedSets {
+ protected:
+  static void Truncate(const Path& file) {
+    std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  }
+  void ExpectTwoBroken(const Source& source, const std::string& truncated,
+                       const std::string& missing) const {
+    const auto refused = Build(source);
+    ExpectMessage(refused.status(), "2 of 10 cannot be used, more than 1 %");
+    ExpectMessage(refused.status(), "--allow-broken");
+    const auto summary = Ok(Build(source, true));
+    EXPECT_EQ(summary->models.size(), 8u);
+    ASSERT_EQ(summary->rejected.size(), 2u);
+    ExpectIn(summary->rejected[0].reason, truncated);
+    ExpectIn(summary->rejected[1].reason, missing);
+    ExpectIn(summary->broken.Summary(), "car/", "chair/");
+    ASSERT_EQ(summary->ignored.size(), 1u);
+    ExpectIn(summary->ignored[0].file + " " + summary->ignored[0].reason, "04256520",
+             "holds no model");
+  }
+};
+
+TEST_F(BrokenMembersOfSets, Choy) {
+  const auto models = MiniatureModels(0.45f);
+  WriteChoy(Set(), models);
+  const Path renders = Set() / "ShapeNetRendering";
+  Truncate(renders / models[1].synset / models[1].id / "rendering/07.png");
+  std::filesystem::remove(Set() / "ShapeNetVox32" / models[7].synset / models[7].id /
+                          "model.binvox");
+  std::filesystem::create_directories(renders / "04256520");
+  ExpectTwoBroken(Ok(ChoySource(Set(), {}, 64)).value(), "07.png", "model.binvox");
+}
+
+TEST_F(BrokenMembersOfSets, Dvr) {
+  const auto models = MiniatureModels(0.5f);
+  WriteDvr(Set(), models);
+  Truncate(Set() / models[1].synset / models[1].id / "mask/0007.png");
+  std::filesystem::remove(Set() / models[7].synset / models[7].id / "cameras.npz");
+  std::filesystem::create_directories(Set() / "04256520");
+  ExpectTwoBroken(Ok(DvrSource(Set(), {}, 64)).value(), "0007.png", "cameras.npz");
+}
+
+TEST_F(BrokenMembersOfSets, Dibr) {
+  const auto models = MiniatureModels(0.45f);
+  WriteDibr(Set(), models);
+  Truncate(Set() / models[1].synset / models[1].id / "7.png");
+  std::filesystem::remove(Set() / models[7].synset / models[7].id / "7.npy");
+  std::filesystem::create_directories(Set() / "04256520");
+  ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "7.png", "7.npy");
+}
+
+// What is there, but makes no sense.
+TEST_F(BrokenMembersOfSets, NumbersThatAreNoCamera) {
+  std::vector<MiniatureModel> models = MiniatureModels(0.45f);
+  models.resize(2);
+  WriteChoy(Set(), models);
+  const std::string folder = "set/ShapeNetRendering/" + models[0].synset + "/" + models[0].id;
+  const Source source = Ok(ChoySource(Set(), {}, 64)).value();
+  Write(folder + "/rendering/rendering_metadata.txt", "1 2 0 nan 25\n");
+  ExpectMessage(source->Load(0).status(), "line 1: expected five numbers");
+  Write(folder + "/rendering/rendering_metadata.txt", "1 2 0 0.7 25\n");
+  ExpectMessage(source->Load(0).status(), "1 views, expected 24");
+  EXPECT_TRUE(source->Load(1).ok());
+  const Source large = Ok(ChoySource(Set(), {}, 256)).value();
+  ExpectMessage(large->Load(1).status(), "137 x 137 pixels");
+  EXPECT_EQ(ChoySource(folder_, {}, 64).status().code(), StatusCode::kNotFound);
+}
+
+TEST(BrokenMembers, OnePercentIsAllowed) {
+  BrokenMembers broken;
+  EXPECT_TRUE(broken.Check(0, false).ok());
+  EXPECT_EQ(broken.Summary(), "");
+  broken.Add("car/a", "a.png: cut off");
+  EXPECT_TRUE(broken.Check(100, false).ok());
+  ExpectMessage(broken.Check(99, false), "car/a");
+  EXPECT_TRUE(broken.Check(99, true).ok());
+  broken.Add("car/b", "b.png: cut off");
+  broken.Add("car/c", "empty");
+  EXPECT_EQ(broken.Summary(), "      2  cut off (car/a, ...)\n      1  empty (car/c)\n");
+}
+
+}  // namespace tilegrad::train::rendered_views_test
