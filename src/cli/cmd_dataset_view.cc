@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
+#include "io/binvox.h"
 #include "io/image_file.h"
 #include "render/picture/composite.h"
 #include "train/data/dataset.h"
@@ -18,7 +19,7 @@ namespace tilegrad::cli {
 namespace {
 
 struct ViewOptions {
-  std::string data, model, class_name, split = "test", out = "view.png";
+  std::string data, model, class_name, split = "test", out = "view.png", voxels;
   int view = 0;
   bool force = false;
 };
@@ -64,6 +65,18 @@ Result<int> ChooseModel(const train::Dataset& dataset, const ViewOptions& option
                   options.data, options.model);
 }
 
+// The model's solid as the dataset has it, in a cube around the origin in which it is as large as
+// in the dataset.
+Status WriteVoxels(const ViewOptions& options, const train::Dataset& dataset, int model) {
+  if (options.voxels.empty()) return {};
+  TILEGRAD_ASSIGN(train::ModelData data, dataset.Load(model));
+  const double half = dataset.info().camera.half_extent;
+  const Bytes bytes = io::EncodeBinvox(
+      {train::kOccupancyResolution, {-half, -half, -half}, 2 * half, std::move(data.occupancy)});
+  return WriteGuarded(OutputGuard(options.force), options.voxels,
+                      [&] { return WriteFileAtomic(options.voxels, bytes); });
+}
+
 Status WriteView(const ViewOptions& options) {
   TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(options.data));
   if (options.view >= dataset.info().views)
@@ -77,6 +90,7 @@ Status WriteView(const ViewOptions& options) {
       std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
   TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
                             [&] { return io::SavePng(options.out, StraightRgba(image, size)); }));
+  TILEGRAD_TRY(WriteVoxels(options, dataset, model));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
   const std::string& of_class = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
   Print("{}: {} ({}), view {}\n", options.out, info.name, of_class, options.view);
@@ -102,6 +116,8 @@ void AddDatasetView(CommandList* list) {
                {Excludes{{"--model"}}, OneOf{{"train", "validation", "test"}}});
   command->Add("--view", &options->view, "which view", {NotNegative()});
   command->Add("--out", &options->out, "PNG file", {EndsIn(".png")});
+  command->Add("--voxels", &options->voxels, "also write the model's 32^3 voxels there",
+               {EndsIn(".binvox")});
   AddForceOption(command, &options->force);
 }
 

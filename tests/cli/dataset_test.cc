@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "io/binvox.h"
 #include "io/npz.h"
 #include "support/run_program.h"
 
@@ -44,6 +45,32 @@ TEST_F(DatasetTest, TheAxisThatIsUpTurnsTheModel) {
   EXPECT_FALSE(PicturesOf("lying", Axes::kZUp) == upright);
   ExpectRefused(Dataset("y") + " --up z", 2);  // that is another dataset
   ExpectRefused("dataset --source folder --up w --input " + folder_.string(), 2, "--up");
+}
+
+TEST_F(DatasetTest, VoxelsOfAModelAsBinvox) {
+  PicturesOf("y");
+  const std::string view = "dataset-view --data " + In("y_data") + " --model wedge/a --out " +
+                           In("a.png") + " --voxels " + In("a.binvox");
+  ExpectDone(view);
+  const auto grid = Ok(io::LoadBinvox(folder_ / "a.binvox"));
+  EXPECT_EQ(grid->voxels, Ok(io::LoadNpzArray(folder_ / "y_data/models/wedge/a.npz", "occupancy"))
+                              ->As<std::uint8_t>()
+                              .value());
+  EXPECT_EQ(grid->scale, 0.9);
+  EXPECT_EQ(grid->translate, (std::array{-0.45, -0.45, -0.45}));
+  ExpectRefused(view, 2, "a.png");
+}
+
+TEST_F(DatasetTest, PublishedSetsHaveViewsAndSplitsOfTheirOwn) {
+  const std::string set = " --input " + folder_.string() + " --out " + In("out");
+  ExpectError("dataset --source choy --views 3" + set, "24 views", "--views");
+  ExpectError("dataset --source nmr --size 32" + set, "64 pixels", "--size");
+  ExpectError("dataset --source dvr --test-share 0.1" + set, "--source dvr has a split of its own");
+  ExpectError("dataset --source dibr --up z" + set, "--up");
+  ExpectError("dataset --source folder --allow-broken" + set, "--allow-broken");
+  ExpectError("dataset --source nmr --split-list a" + set, "--split-list");
+  ExpectError("dataset --source choy" + set, "ShapeNetRendering");
+  ExpectError("dataset --source choy --split-list " + In("none.txt") + set, "none.txt");
 }
 
 TEST_F(DatasetTest, SourcesThatDoNotGoTogether) {
