@@ -129,7 +129,7 @@ Result<std::unique_ptr<ModelSource>> DvrSource(const Path& folder, const SplitLi
   set.models = folder;
   set.like = NmrCameras();
   set.read = ReadDvrModel;
-  if (list.size() > 0) return OpenRenderedSet(std::move(set), list, image_size);
+  if (!list.empty()) return OpenRenderedSet(std::move(set), list, image_size);
   TILEGRAD_ASSIGN(const std::vector<Path> files, FindDvrLists(folder));
   TILEGRAD_ASSIGN(const SplitList own, SplitList::Read(files));
   return OpenRenderedSet(std::move(set), own, image_size);

@@ -151,7 +151,7 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Sp
   }
   if (entries.empty()) {
     return NotFound("{}: no models{}; expected <synset>/<model>/models/model_normalized.obj",
-                    folder.string(), list.size() > 0 ? " that the list names" : "");
+                    folder.string(), !list.empty() ? " that the list names" : "");
   }
   return std::unique_ptr<ModelSource>(
       std::make_unique<FileModels>("shapenet", "3D models: ShapeNetCore (Chang et al. 2015).",

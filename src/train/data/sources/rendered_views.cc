@@ -2,6 +2,7 @@
 #include "train/data/sources/rendered_views.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "io/image_file.h"
@@ -33,6 +34,72 @@ Result<std::vector<std::uint8_t>> LoadRenderedView(const RenderedView& view, int
   return PrepareCutout(image, size, Framing::kKeep);
 }
 
+// What is in a picture, by the outermost points.
+struct PictureBox {
+  double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};  // x, y
+
+  void Add(double x, double y) {
+    low[0] = std::min(low[0], x);
+    low[1] = std::min(low[1], y);
+    high[0] = std::max(high[0], x);
+    high[1] = std::max(high[1], y);
+  }
+  bool IsNear(const PictureBox& other, double pixels) const {
+    for (int k = 0; k < 2; ++k) {
+      if (!(std::abs(low[k] - other.low[k]) <= pixels)) return false;
+      if (!(std::abs(high[k] - other.high[k]) <= pixels)) return false;
+    }
+    return true;
+  }
+};
+
+PictureBox BoxOfMask(std::span<const std::uint8_t> alpha, int size) {
+  PictureBox box;
+  for (std::size_t p = 0; p < alpha.size(); ++p) {
+    const int pixel = static_cast<int>(p);
+    if (alpha[p] >= 128) box.Add(pixel % size + 0.5, pixel / size + 0.5);
+  }
+  return box;
+}
+
+PictureBox BoxOfVoxels(std::span<const std::uint8_t> occupancy, const Camera& camera,
+                       double voxel) {
+  PictureBox box;
+  constexpr int n = kOccupancyResolution;
+  for (std::size_t i = 0; i < occupancy.size(); ++i) {
+    if (occupancy[i] == 0) continue;
+    const int at = static_cast<int>(i), index[3] = {at / (n * n), at / n % n, at % n};
+    double p[3];
+    for (int r = 0; r < 3; ++r) {
+      p[r] = camera.translation[r];
+      for (int k = 0; k < 3; ++k)
+        p[r] += camera.rotation[3 * r + k] * voxel * (index[k] + 0.5 - 0.5 * n);
+    }
+    box.Add(camera.cx + camera.fx * p[0] / -p[2], camera.cy - camera.fy * p[1] / -p[2]);
+  }
+  return box;
+}
+
+// Voxels, camera and picture are of one object: outlines in the first view differ by three voxels
+// at most. Otherwise the set's numbers mean something else than we think.
+Status CheckTogether(const ModelData& data, double half_extent, int size) {
+  constexpr double kVoxelsApart = 3;
+  const auto pixels = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  const Camera& camera = data.cameras[0];
+  const double voxel = 2 * half_extent / kOccupancyResolution;
+  const double per_voxel = camera.fx * voxel / -camera.translation[2];
+  const PictureBox mask = BoxOfMask(std::span(data.images).subspan(3 * pixels, pixels), size),
+                   voxels = BoxOfVoxels(data.occupancy, camera, voxel);
+  if (mask.IsNear(voxels, kVoxelsApart * per_voxel)) return {};
+  return DataLoss(
+      "the voxels are elsewhere than the first picture shows, or of another size: columns {:.0f} "
+      "to "
+      "{:.0f} and rows {:.0f} to {:.0f} of {}, the picture has {:.0f} to {:.0f} and {:.0f} to "
+      "{:.0f}",
+      voxels.low[0], voxels.high[0], voxels.low[1], voxels.high[1], size, mask.low[0], mask.high[0],
+      mask.low[1], mask.high[1]);
+}
+
 class RenderedViews : public ModelSource {
  public:
   RenderedViews(RenderedSet set, int image_size) : set_(std::move(set)), image_size_(image_size) {}
@@ -44,7 +111,7 @@ class RenderedViews : public ModelSource {
     }
     if (entries_.empty())
       return NotFound("{}: no models{}; expected {}", set_.models.string(),
-                      list.size() > 0 ? " that the list names" : "", set_.expected);
+                      list.empty() ? "" : " that the list names", set_.expected);
     if (entries_.size() < list.size()) {
       ignored_.push_back(
           {set_.models.string(), fmt::format("{} of {} models of the list are missing",
@@ -79,6 +146,8 @@ class RenderedViews : public ModelSource {
       data.cameras.push_back(
           ScaledCamera(CameraCast<float>(view.camera), static_cast<float>(image_size_)));
     }
+    TILEGRAD_TRY(
+        CheckTogether(data, set_.like.half_extent, image_size_).Within(entries_[entry].file));
     return SourceModel{std::move(data)};
   }
 

@@ -129,8 +129,7 @@ class SplitListReader {
 Result<SplitList> SplitList::Read(const std::vector<Path>& files) {
   SplitList list;
   for (const Path& file : files) TILEGRAD_TRY(SplitListReader(file, &list).Read());
-  if (!files.empty() && list.models_.empty() && list.classes_.empty())
-    return DataLoss("{}: lists no models", files[0].string());
+  if (!files.empty() && list.empty()) return DataLoss("{}: lists no models", files[0].string());
   return list;
 }
 

@@ -35,7 +35,8 @@ class SplitList {
   // the file and the line.
   static Result<SplitList> Read(const std::vector<Path>& files);
 
-  // Everything is used if there is no list.
+  bool empty() const { return models_.empty() && classes_.empty(); }
+  // Everything is used if it is empty.
   Listing Of(const std::string& synset, const std::string& model) const;
   // How many models it lists, each once.
   std::size_t size() const { return models_.size(); }

@@ -63,7 +63,7 @@ std::vector<std::uint8_t> Carved(const Mesh& mesh) {
   return Ok(VoxelizeCarved(mesh, kOccupancyResolution)).value();
 }
 
-// --- 3D-R2N2: lib/blender_renderer.py and tools/render_models.py ---
+// --- 3D-R2N2: its blender_renderer and render_models ---
 
 struct BlenderView {
   double azimuth, elevation, in_plane, distance;

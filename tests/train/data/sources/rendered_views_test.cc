@@ -72,7 +72,8 @@ class RenderedSets : public TempFolderTest {
       const Score score = Compare(mesh, truth);
       EXPECT_GE(score.iou, least_iou) << models[m].id;
       if (data.points.empty()) continue;
-      EXPECT_GT(score.f_score.value(), 0.9) << models[m].id;
+      // Of two draws of 2,500 points each, some three quarters are within 0.02 of one another.
+      EXPECT_GT(score.f_score.value(), 0.6) << models[m].id;
     }
   }
 
@@ -227,6 +228,23 @@ TEST_F(BrokenMembersOfSets, Dibr) {
   std::filesystem::remove(Set() / models[7].synset / models[7].id / "7.npy");
   std::filesystem::create_directories(Set() / "04256520");
   ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "7.png", "7.npy");
+}
+
+// A header of another scale than the renders: no cameras are better than wrong ones.
+TEST_F(BrokenMembersOfSets, VoxelsOfAnotherSize) {
+  std::vector<MiniatureModel> models = MiniatureModels(0.45f);
+  models.resize(2);
+  WriteChoy(Set(), models);
+  const Path file = Set() / "ShapeNetVox32" / models[0].synset / models[0].id / "model.binvox";
+  const Source source = Ok(ChoySource(Set(), {}, 64)).value();
+  io::BinvoxGrid grid = Ok(io::LoadBinvox(file)).value();
+  EXPECT_TRUE(source->Load(0).ok());
+  grid.scale *= 1.5;
+  Ok(WriteFileAtomic(file, io::EncodeBinvox(grid)));
+  ExpectMessage(source->Load(0).status(), "or of another size");
+  std::fill(grid.voxels.begin(), grid.voxels.end(), std::uint8_t{0});
+  Ok(WriteFileAtomic(file, io::EncodeBinvox(grid)));
+  ExpectMessage(source->Load(0).status(), "or of another size");
 }
 
 // What is there, but makes no sense.
