@@ -36,8 +36,8 @@ class RenderedSets : public TempFolderTest {
     return BuildDataset(*source, options, Data(), Workers(2), {}, stop_);
   }
 
-  // Of all views of all models together.
-  void ExpectMasks(const std::vector<MiniatureModel>& models) const {
+  // Of all views of each model together.
+  void ExpectMasks(const std::vector<MiniatureModel>& models, double least = kMaskIou) const {
     const Dataset dataset = Ok(Dataset::Open(Data())).value();
     ASSERT_EQ(dataset.models().size(), models.size());
     for (std::size_t m = 0; m < models.size(); ++m) {
@@ -45,7 +45,7 @@ class RenderedSets : public TempFolderTest {
       LitRenderer renderer;
       const auto ours = Ok(renderer.Render(models[m].mesh, CamerasOf(dataset.info(), data.cameras),
                                            dataset.info().image_size));
-      EXPECT_GE(MaskIou(data.images, *ours, dataset.info().image_size), kMaskIou) << models[m].id;
+      EXPECT_GE(MaskIou(data.images, *ours, dataset.info().image_size), least) << models[m].id;
     }
   }
   static double MaskIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
@@ -104,12 +104,16 @@ class RenderedSets : public TempFolderTest {
 TEST_F(RenderedSets, Choy) {
   const auto models = MiniatureModels(0.45f);
   WriteChoy(Set(), models);
+  Ok(Build(Ok(ChoySource(Set(), {}, 137)).value()).status());
+  ExpectMasks(models);
+  std::filesystem::remove_all(Data());
   const auto summary = Ok(Build(Ok(ChoySource(Set(), {}, 64)).value()));
   EXPECT_EQ(summary->info.classes, (std::vector<std::string>{"car", "chair"}));
   // The first four of five of a class, by name.
   for (std::size_t m = 0; m < models.size(); ++m)
     EXPECT_EQ(summary->models[m].split, m % 5 < 4 ? Split::kTrain : Split::kTest);
-  ExpectMasks(models);
+  // Averaged down, thin legs of chairs are otherwise on the border of half a pixel.
+  ExpectMasks(models, 0.94);
   ExpectTruth(models, VoxelRule::kBinvox, 0.98);
   ExpectEvaluation("binvox");
 }
