@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside three baselines.
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -23,13 +24,13 @@ const std::map<std::string, train::Split> kSplits = {{"test", train::Split::kTes
                                                      {"validation", train::Split::kValidation},
                                                      {"train", train::Split::kTrain}};
 
-const std::map<std::string, train::VoxelRule> kVoxelRules = {{"ours", train::VoxelRule::kOurs},
-                                                             {"binvox", train::VoxelRule::kBinvox},
-                                                             {"nmr", train::VoxelRule::kNmr}};
+const std::vector<std::string> kVoxelRules(std::begin(train::kVoxelRuleNames),
+                                           std::end(train::kVoxelRuleNames));
 
 std::optional<train::VoxelRule> RuleOf(const std::string& name) {
   if (name.empty()) return std::nullopt;
-  return kVoxelRules.at(name);
+  const auto at = std::find(kVoxelRules.begin(), kVoxelRules.end(), name);
+  return static_cast<train::VoxelRule>(at - kVoxelRules.begin());
 }
 
 struct EvalOptions {
@@ -167,7 +168,7 @@ void AddEval(CommandList* list) {
   command->Add("--voxels", &options->voxels,
                "by whose rule the voxels of the 3D IoU are made: ours, binvox's (-cb -dc -aw, the "
                "paper's) or N3MR's; with it scores are printed only [that of the dataset's own]",
-               {NoDefault{}, OneOf{{"ours", "binvox", "nmr"}}});
+               {NoDefault{}, OneOf{kVoxelRules}});
   command->Add(
       "--compare", &options->compare,
       "folder of another run that was scored on the same models: each measure's difference "
