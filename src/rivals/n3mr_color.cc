@@ -152,11 +152,9 @@ void ShadePixel(const N3mrColorJob<T>& job, int column, int row, N3mrPlanesT<T>*
   T color[3];
   for (int c = 0; c < 3; ++c) color[c] = static_cast<T>(job.colors.background[c]);
   planes->values[kCoverage * pixels + p] = owner < 0 ? T(0) : T(1);
-  planes->depth[p] = static_cast<T>(job.options.far_plane);
   if (owner >= 0) {
     const N3mrFaceT<T>& face = job.image.faces[static_cast<std::size_t>(owner)];
     const OwnPixel<T> at(face, column, row, job.image.inner);
-    planes->depth[p] = at.z;
     const std::size_t cube = 3 * job.colors.texels() * static_cast<std::size_t>(face.source);
     MixTexels(TexelsOf(job, face, at), &job.textures[cube], color);
   }
@@ -203,22 +201,17 @@ void PrepareLines(const SweepImages<T>& swept, N3mrPlanesT<T>* planes) {
     transpose(PlaneOf(swept.d_values, c, pixels), PlaneOf(planes->d_columns, c, pixels));
 }
 
-// The exact parts of a face's adjoint: texels and depth.
+// The exact adjoint of a face's texels.
 template <class T>
-void AddExactParts(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
-                   const N3mrPlanesT<T>& planes, std::int32_t f, T* d_corners, T* d_cube) {
+void AddTexelAdjoints(const N3mrColorJob<T>& job, const N3mrPlanesT<T>& planes, std::int32_t f,
+                      T* d_cube) {
   const N3mrFaceT<T>& face = job.image.faces[static_cast<std::size_t>(f)];
   const std::size_t pixels = job.image.owner.size();
   ForOwnPixels(job.image, f, [&](std::size_t p, int column, int row) {
     const OwnPixel<T> at(face, column, row, job.image.inner);
-    if (!d_images.color.empty()) {
-      const T g[3] = {planes.d_values[p], planes.d_values[pixels + p],
-                      planes.d_values[2 * pixels + p]};
-      MixTexelsAdjoint(TexelsOf(job, face, at), g, d_cube);
-    }
-    if (d_images.depth.empty()) return;
-    AddDepthAdjoint(face, at.w, at.z, planes.d_depth[p], job.options.Scale(job.image.size),
-                    d_corners);
+    const T g[3] = {planes.d_values[p], planes.d_values[pixels + p],
+                    planes.d_values[2 * pixels + p]};
+    MixTexelsAdjoint(TexelsOf(job, face, at), g, d_cube);
   });
 }
 
@@ -229,8 +222,6 @@ void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes) {
   const std::size_t pixels = image.owner.size();
   planes->values.resize(4 * pixels);
   planes->d_values.resize(4 * pixels);
-  planes->depth.resize(pixels);
-  planes->d_depth.resize(pixels);
   planes->row_sums.resize(pixels);
   planes->column_sums.resize(pixels);
   planes->d_columns.resize(4 * pixels);
@@ -253,7 +244,6 @@ void N3mrReducePlanes(const N3mrColorJob<T>& job, const N3mrPlanesT<T>& planes,
   for (std::size_t c = 0; c < 3; ++c)
     reduce(PlaneOf(planes.values, c, pixels), PlaneOf(out.color, c, plane));
   reduce(PlaneOf(planes.values, kCoverage, pixels), out.alpha);
-  reduce(planes.depth, out.depth);
 }
 
 template <class T>
@@ -266,7 +256,6 @@ void N3mrPrepareColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const
   for (std::size_t c = 0; c < 3; ++c)
     spread(PlaneOf(d_images.color, c, plane), PlaneOf(planes->d_values, c, pixels));
   spread(d_images.alpha, PlaneOf(planes->d_values, kCoverage, pixels));
-  spread(d_images.depth, planes->d_depth);
   PrepareLines(SweptPlanes(job, d_images, *planes), planes);
 }
 
@@ -282,7 +271,7 @@ void N3mrColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_
     std::fill_n(&out.d_textures[texels * f], texels, T(0));
     const std::int32_t drawn = job.image.drawn_of[f];
     if (drawn < 0 || !OwnsAPixel(job.image, drawn)) continue;
-    AddExactParts(job, d_images, planes, drawn, d_corners, &out.d_textures[texels * f]);
+    if (!d_images.color.empty()) AddTexelAdjoints(job, planes, drawn, &out.d_textures[texels * f]);
     if (swept.channels == 0) continue;
     ColorSweep<T>(job, swept, planes, drawn).AddTo(d_corners);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Colours and depth of N3MR. Each face owns a cube of texels [s][s][s], axis k belonging to corner
+// Colours of N3MR. Each face owns a cube of texels [s][s][s], axis k belonging to corner
 // k; a pixel looks it up at u_k = w_k z / z_k (s - 1), perspective-correct weights, and mixes the
 // eight texels around. A cube of one colour is a colour of the face.
 #pragma once
@@ -78,24 +78,6 @@ void MixTexelsAdjoint(const N3mrTexels<T>& at, const T g[3], T* d_cube) {
   }
 }
 
-// The exact adjoint of depth at a pixel: adds to d_corners [3,3] of the face's source. w: weights
-// that are not clipped or lie in [0, 1]; `scale`: N3mrOptions::Scale.
-template <class T>
-void AddDepthAdjoint(const N3mrFaceT<T>& face, const T w[3], const T& z, const T& d_z, double scale,
-                     T* d_corners) {
-  T d_b[3], own[kCornerNumbers] = {};
-  for (int k = 0; k < 3; ++k) {
-    const T over = z / face.at.z[k];
-    own[3 * k + 2] = d_z * w[k] * over * over;
-    d_b[k] = -(d_z * z * over);
-  }
-  AddBarycentricAdjoint(face.at, face.area2, w, d_b, own);
-  for (int k = 0; k < 3; ++k) {
-    for (int c = 0; c < 3; ++c)
-      d_corners[3 * face.SourceCorner(k) + c] += own[3 * k + c] * static_cast<T>(scale);
-  }
-}
-
 // What is drawn, or, as an adjoint, what was asked for and pushes: an empty span is absent. The
 // sweep looks at all that is there in one sum, so the gradient of colour and alpha together is not
 // the sum of the gradients of each.
@@ -103,14 +85,12 @@ template <class T>
 struct N3mrImages {
   std::span<T> color;  // [3,size,size]
   std::span<T> alpha;  // [size,size]
-  std::span<T> depth;  // [size,size]; the far plane where nothing is, averaged with the rest
 };
 
-// Planes of a drawing, [inner,inner] each, and their adjoints: r, g, b, coverage; depth.
+// Planes of a drawing, [inner,inner] each, and their adjoints: r, g, b, coverage.
 template <class T>
 struct N3mrPlanesT {
   AlignedVector<T> values, d_values;  // [4]
-  AlignedVector<T> depth, d_depth;
   // Of what the sweep sums over: the sum of values times adjoints by row; that by column, and the
   // adjoints by column.
   AlignedVector<T> row_sums, column_sums, d_columns;  // d_columns: [4]

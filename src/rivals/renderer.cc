@@ -192,7 +192,7 @@ void ImageStateT<T>::N3mr(const Options& options, int size, const Workers::Part&
     if (color) N3mrShade(job, rows, &n3mr_planes_);
   });
   N3mrAlpha<T>(options.n3mr, &n3mr_, out.alpha);
-  if (color) N3mrReducePlanes<T>(job, n3mr_planes_, {out.color, {}, {}});
+  if (color) N3mrReducePlanes<T>(job, n3mr_planes_, {out.color, {}});
 }
 
 template <class T>
@@ -207,7 +207,7 @@ void ImageStateT<T>::N3mrAdjoint(const Options& options, const Workers::Part& pa
     });
   }
   const N3mrColorJob<T> job{options.n3mr, options.n3mr_colors, n3mr_, textures_};
-  const N3mrImages<const T> pushes{d_images.color, d_images.alpha, {}};
+  const N3mrImages<const T> pushes{d_images.color, d_images.alpha};
   N3mrPrepareColorBackward(job, pushes, &n3mr_planes_);
   ForRanges(part, faces, kFacesAtOnce, [&](std::size_t begin, std::size_t end) {
     N3mrColorBackward<T>(job, pushes, n3mr_planes_, begin, end, {d_corners_, d_textures_});
@@ -310,7 +310,6 @@ Status Validate(const Options& options) {
     return InvalidArgument("SoftRas: dist_eps is {}, but must lie in (0, 0.5)", soft.dist_eps);
   TILEGRAD_TRY(CheckPlanes("SoftRas", soft.near_plane, soft.far_plane));
   TILEGRAD_TRY(Positive("SoftRas: gamma", options.softras_colors.gamma));
-  TILEGRAD_TRY(CheckResolution("SoftRas: resolution", options.softras_colors.resolution, 1, 64));
   TILEGRAD_TRY(Positive("N3MR: eps", options.n3mr.eps));
   TILEGRAD_TRY(CheckResolution("N3MR: resolution", options.n3mr_colors.resolution, 2, 32));
   return CheckPlanes("N3MR", options.n3mr.near_plane, options.n3mr.far_plane);

@@ -27,12 +27,8 @@ struct Options {
 
   // Texels of a face, and whether they are the colours of its corners; else all have the face's
   // colour, the mean of its corners'.
-  std::size_t texels() const {
-    return rule == Rule::kSoftRas ? softras_colors.texels() : n3mr_colors.texels();
-  }
-  bool corner_colors() const {
-    return rule == Rule::kSoftRas && softras_colors.texture == SoftTexture::kVertex;
-  }
+  std::size_t texels() const { return rule == Rule::kSoftRas ? kSoftTexels : n3mr_colors.texels(); }
+  bool corner_colors() const { return rule == Rule::kSoftRas; }
 };
 
 // InvalidArgument names the first number out of its range.

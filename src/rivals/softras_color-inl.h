@@ -17,17 +17,13 @@ namespace tilegrad::rivals {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using SoftIntTag = hn::RebindToSigned<SoftTag>;
-
-// A difference of nearness (SoftNearness) times `bits` is the exponent to base 2 of a ratio of
-// weights.
+// A difference of nearness, -z, times `bits` is the exponent to base 2 of a ratio of weights.
 struct ColorScale {
   float bits;
   float slope;  // d(weight)/d(nearness) / weight
-  bool inverse;
 
-  ColorScale(const SoftRasOptions& o, const SoftRasColors& c) : inverse(c.inverse_depth) {
-    const double range = NearnessOf(o, c).range;
+  ColorScale(const SoftRasOptions& o, const SoftRasColors& c) {
+    const double range = o.far_plane - o.near_plane;
     slope = static_cast<float>(1 / (range * c.gamma));
     bits = static_cast<float>(1.4426950408889634 / (range * c.gamma));
   }
@@ -38,8 +34,7 @@ struct ColorLanes {
   SoftLanes soft;
   SoftMask counts;  // the pixels where it may have colour
   SoftVec w[3], sum, z, nearness;
-  SoftVec share[3], color[3];
-  hn::Vec<SoftIntTag> texel;  // kSurface
+  SoftVec color[3];
 };
 
 // 2^(difference * bits) for differences <= 0.
@@ -49,8 +44,7 @@ HWY_INLINE SoftVec RelativeWeight(const ColorScale& scale, SoftVec difference) {
   return tilegrad::HWY_NAMESPACE::Exp2Neg(d, bits).power;
 }
 
-HWY_INLINE void SetDepth(const SoftRasFace& f, const SoftScale& soft, const ColorScale& scale,
-                         ColorLanes* out) {
+HWY_INLINE void SetDepth(const SoftRasFace& f, const SoftScale& soft, ColorLanes* out) {
   const SoftTag d;
   SoftVec over_z = hn::Zero(d);
   out->sum = hn::Zero(d);
@@ -63,68 +57,35 @@ HWY_INLINE void SetDepth(const SoftRasFace& f, const SoftScale& soft, const Colo
   out->z = hn::Div(out->sum, over_z);
   out->counts = hn::And(out->soft.live, hn::And(hn::Ge(out->z, hn::Set(d, soft.near_plane)),
                                                 hn::Le(out->z, hn::Set(d, soft.far_plane))));
-  out->nearness = scale.inverse ? hn::Div(hn::Set(d, 1.0f), out->z) : hn::Neg(out->z);
-}
-
-// SoftTexel of each lane.
-HWY_INLINE hn::Vec<SoftIntTag> TexelLanes(const ColorLanes& at, int resolution) {
-  const SoftTag d;
-  const SoftIntTag di;
-  const SoftVec scale = hn::Set(d, static_cast<float>(resolution));
-  const auto last = hn::Set(di, resolution - 1), r = hn::Set(di, resolution);
-  const SoftVec u = hn::Mul(at.w[0], scale), v = hn::Mul(at.w[1], scale);
-  const auto x = hn::Min(hn::ConvertTo(di, u), last), y = hn::Min(hn::ConvertTo(di, v), last);
-  const SoftVec rest = hn::Sub(hn::Add(u, v), hn::ConvertTo(d, hn::Add(x, y)));
-  const auto lower = hn::RebindMask(di, hn::Le(rest, hn::Set(d, 1.0f + 1e-5f)));
-  const auto straight = hn::Add(hn::Mul(y, r), x);
-  const auto mirrored = hn::Add(hn::Mul(hn::Sub(last, y), r), hn::Sub(last, x));
-  // Lanes that do not count may hold anything.
-  const auto texel = hn::IfThenElse(lower, straight, mirrored);
-  return hn::IfThenElseZero(hn::RebindMask(di, at.counts), texel);
+  out->nearness = hn::Neg(out->z);
 }
 
 // textures: of the face.
-HWY_INLINE void SetColor(const SoftRasColors& colors, const float* textures, ColorLanes* out) {
+HWY_INLINE void SetColor(const float* textures, ColorLanes* out) {
   const SoftTag d;
-  if (colors.texture == SoftTexture::kVertex) {
-    for (int c = 0; c < 3; ++c) {
-      out->color[c] = hn::Mul(out->w[0], hn::Set(d, textures[c]));
-      out->color[c] = hn::MulAdd(out->w[1], hn::Set(d, textures[3 + c]), out->color[c]);
-      out->color[c] = hn::MulAdd(out->w[2], hn::Set(d, textures[6 + c]), out->color[c]);
-    }
-    return;
+  for (int c = 0; c < 3; ++c) {
+    out->color[c] = hn::Mul(out->w[0], hn::Set(d, textures[c]));
+    out->color[c] = hn::MulAdd(out->w[1], hn::Set(d, textures[3 + c]), out->color[c]);
+    out->color[c] = hn::MulAdd(out->w[2], hn::Set(d, textures[6 + c]), out->color[c]);
   }
-  const SoftIntTag di;
-  out->texel = TexelLanes(*out, colors.resolution);
-  const auto at = hn::Mul(out->texel, hn::Set(di, 3));
-  for (int c = 0; c < 3; ++c)
-    out->color[c] = hn::GatherIndex(d, textures, hn::Add(at, hn::Set(di, c)));
 }
 
 template <SoftDistance kDistance>
-HWY_INLINE ColorLanes ColorFaceAt(const SoftRasFace& f, const SoftRasColors& colors,
-                                  const SoftScale& soft, const ColorScale& scale,
+HWY_INLINE ColorLanes ColorFaceAt(const SoftRasFace& f, const SoftScale& soft,
                                   const float* textures, SoftVec px, SoftVec py) {
   ColorLanes out;
   out.soft = SoftFaceAt<kDistance>(f, soft, px, py);
-  SetDepth(f, soft, scale, &out);
-  if (colors.color == SoftColor::kHard) {
-    const SoftVec least = hn::Min(hn::Min(out.soft.b[0], out.soft.b[1]), out.soft.b[2]);
-    out.counts = hn::And(out.counts, hn::Ge(least, hn::Zero(SoftTag())));
-  }
-  SetColor(colors, textures, &out);
+  SetDepth(f, soft, &out);
+  SetColor(textures, &out);
   return out;
 }
 
 // The planes of one vector of pixels.
 struct MixedPixels {
   float *nearest, *total, *color[3];
-  std::int32_t* cover;
 
   HWY_INLINE MixedPixels(SoftRasColorImage* image, std::size_t at)
-      : nearest(image->nearest.data() + at),
-        total(image->total.data() + at),
-        cover(image->cover.data() + at) {
+      : nearest(image->nearest.data() + at), total(image->total.data() + at) {
     const std::size_t plane = image->total.size();
     for (std::size_t c = 0; c < 3; ++c) color[c] = image->color.data() + c * plane + at;
   }
@@ -148,19 +109,6 @@ HWY_INLINE void MixFace(const ColorLanes& at, const ColorScale& scale, const Mix
   }
 }
 
-HWY_INLINE void CoverFace(const ColorLanes& at, std::int32_t face, const MixedPixels& to) {
-  const SoftTag d;
-  const SoftIntTag di;
-  const SoftMask nearer = hn::And(at.counts, hn::Gt(at.nearness, hn::LoadU(d, to.nearest)));
-  hn::BlendedStore(at.nearness, nearer, d, to.nearest);
-  hn::BlendedStore(hn::Set(di, face), hn::RebindMask(di, nearer), di, to.cover);
-  for (int c = 0; c < 3; ++c) hn::BlendedStore(at.color[c], nearer, d, to.color[c]);
-}
-
-HWY_INLINE bool HasColor(const SoftRasFace& f, const SoftRasColors& colors) {
-  return colors.double_side || f.inverse_area < 0;
-}
-
 template <SoftDistance kDistance>
 HWY_INLINE void ForwardColorFaces(const SoftRasColorJob& job, RowRange rows,
                                   SoftRasColorImage* mixed) {
@@ -168,17 +116,9 @@ HWY_INLINE void ForwardColorFaces(const SoftRasColorJob& job, RowRange rows,
   const ColorScale scale(job.options, job.colors);
   for (std::size_t f = 0; f < job.image.faces.size(); ++f) {
     const SoftRasFace& face = job.image.faces[f];
-    if (!HasColor(face, job.colors)) continue;
-    const float* const textures = job.textures.data() + 3 * job.colors.texels() * f;
+    const float* const textures = job.textures.data() + 3 * kSoftTexels * f;
     ForFaceVectors(face, rows, job.image, [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
-      const ColorLanes here =
-          ColorFaceAt<kDistance>(face, job.colors, soft, scale, textures, px, py);
-      const MixedPixels to(mixed, at);
-      if (job.colors.color == SoftColor::kSoftmax) {
-        MixFace(here, scale, to);
-      } else {
-        CoverFace(here, static_cast<std::int32_t>(f), to);
-      }
+      MixFace(ColorFaceAt<kDistance>(face, soft, textures, px, py), scale, MixedPixels(mixed, at));
     });
   }
 }
@@ -222,34 +162,20 @@ struct ColorPush {
   }
 };
 
-// A face and where the adjoint of its texels goes.
 struct ColorFace {
   const SoftRasColorJob& job;
   const SoftRasFace& face;
   ColorScale scale;
   const float* textures;  // of the face
-  float* d_textures;
 };
 
 // To the texels of a face, of the lanes that count.
-HWY_INLINE void AddTexels(const SoftRasColors& colors, const ColorLanes& at, SoftVec weight,
-                          const ColorPush& push, ColorSums* sums, float* d_textures) {
-  const SoftTag d;
-  if (colors.texture == SoftTexture::kVertex) {
-    for (int k = 0; k < 3; ++k) {
-      const SoftVec share = hn::IfThenElseZero(at.counts, hn::Mul(weight, at.w[k]));
-      for (int c = 0; c < 3; ++c)
-        sums->vertex[k][c] = hn::MulAdd(share, push.g[c], sums->vertex[k][c]);
-    }
-    return;
-  }
-  HWY_ALIGN std::int32_t texel[hn::MaxLanes(SoftTag())];
-  HWY_ALIGN float part[hn::MaxLanes(SoftTag())];
-  hn::Store(at.texel, SoftIntTag(), texel);
-  for (int c = 0; c < 3; ++c) {
-    hn::Store(hn::Mul(weight, push.g[c]), d, part);
-    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane)
-      d_textures[3 * texel[lane] + c] += part[lane];
+HWY_INLINE void AddTexels(const ColorLanes& at, SoftVec weight, const ColorPush& push,
+                          ColorSums* sums) {
+  for (int k = 0; k < 3; ++k) {
+    const SoftVec share = hn::IfThenElseZero(at.counts, hn::Mul(weight, at.w[k]));
+    for (int c = 0; c < 3; ++c)
+      sums->vertex[k][c] = hn::MulAdd(share, push.g[c], sums->vertex[k][c]);
   }
 }
 
@@ -280,18 +206,17 @@ HWY_INLINE void AddDepthMoves(const ColorFace& of, const ColorLanes& at, SoftVec
   const SoftTag d;
   const SoftVec d_zz = hn::IfThenElseZero(at.counts, hn::Mul(d_z, hn::Mul(at.z, at.z)));
   for (int k = 0; k < 3; ++k) sums->over_z[k] = hn::MulAdd(d_zz, at.w[k], sums->over_z[k]);
-  const SoftRasColors& colors = of.job.colors;
-  if (!colors.position_gradient) return;
+  if (!of.job.colors.position_gradient) return;
   SoftVec d_w[3];
   for (int k = 0; k < 3; ++k) {
     d_w[k] = hn::Mul(d_zz, hn::Set(d, -1.0f / of.face.z[k]));
-    for (int c = 0; c < 3 && colors.texture == SoftTexture::kVertex; ++c)
+    for (int c = 0; c < 3; ++c)
       d_w[k] = hn::MulAdd(hn::Mul(weight, push.g[c]), hn::Set(d, of.textures[3 * k + c]), d_w[k]);
   }
   AddWeightMoves(of.face, at, d_w, &sums->corners);
 }
 
-// One vector of a softmax.
+// One vector of the mixture.
 template <SoftDistance kDistance>
 HWY_INLINE void AddMixture(const ColorFace& of, const ColorLanes& at,
                            const SoftRasColorImage& mixed, std::size_t pixel, ColorSums* sums) {
@@ -305,7 +230,7 @@ HWY_INLINE void AddMixture(const ColorFace& of, const ColorLanes& at,
   SoftVec along = hn::Neg(push.mean);
   for (int c = 0; c < 3; ++c) along = hn::MulAdd(push.g[c], at.color[c], along);
   along = hn::IfThenElseZero(at.counts, along);
-  AddTexels(of.job.colors, at, weight, push, sums, of.d_textures);
+  AddTexels(at, weight, push, sums);
   if constexpr (kDistance != SoftDistance::kHard) {
     const SoftVec slope = hn::Mul(
         hn::Mul(at.soft.miss, hn::Set(d, 1 / static_cast<float>(of.job.options.sigma))), weight);
@@ -316,31 +241,18 @@ HWY_INLINE void AddMixture(const ColorFace& of, const ColorLanes& at,
       AddBarycentric(of.face, at.soft, d_d, &sums->corners);
     }
   }
-  // d(nearness)/dz is -1, or -1/z^2.
-  SoftVec d_z = hn::Mul(hn::Mul(weight, along), hn::Set(d, -of.scale.slope));
-  if (of.scale.inverse) d_z = hn::Mul(d_z, hn::Mul(at.nearness, at.nearness));
+  const SoftVec d_z = hn::Mul(hn::Mul(weight, along), hn::Set(d, -of.scale.slope));
   AddDepthMoves(of, at, d_z, weight, push, sums);
 }
 
-// One vector of the nearest face's own colours.
-HWY_INLINE void AddCover(const ColorFace& of, const ColorLanes& at, std::int32_t face,
-                         const SoftRasColorImage& mixed, std::size_t pixel, ColorSums* sums) {
-  const SoftTag d;
-  const SoftIntTag di;
-  const auto own = hn::Eq(hn::LoadU(di, &mixed.cover[pixel]), hn::Set(di, face));
-  const SoftVec weight = hn::IfThenElseZero(hn::RebindMask(d, own), hn::Set(d, 1.0f));
-  AddTexels(of.job.colors, at, weight, ColorPush(mixed, pixel), sums, of.d_textures);
-}
-
-HWY_INLINE void StoreSums(const SoftRasFace& f, const SoftRasColors& colors, const ColorSums& sums,
-                          float* d_corners, float* d_textures) {
+HWY_INLINE void StoreSums(const SoftRasFace& f, const ColorSums& sums, float* d_corners,
+                          float* d_textures) {
   const SoftTag d;
   const auto total = [&](SoftVec v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
   for (int k = 0; k < 3; ++k) {
     d_corners[3 * k] += total(sums.corners.x[k]);
     d_corners[3 * k + 1] += total(sums.corners.y[k]);
     d_corners[3 * k + 2] += total(sums.over_z[k]) / (f.z[k] * f.z[k]);
-    if (colors.texture != SoftTexture::kVertex) continue;
     for (int c = 0; c < 3; ++c) d_textures[3 * k + c] = total(sums.vertex[k][c]);
   }
 }
@@ -350,24 +262,20 @@ HWY_INLINE void BackwardColorFace(const SoftRasColorJob& job, const SoftRasColor
                                   std::size_t f, const SoftRasColorAdjoints& out) {
   const SoftRasFace& face = job.image.faces[f];
   const SoftScale soft(job.options);
-  const std::size_t numbers = 3 * job.colors.texels();
+  const std::size_t numbers = 3 * kSoftTexels;
   const ColorFace of{job, face, ColorScale(job.options, job.colors),
-                     job.textures.data() + numbers * f, out.d_textures.data() + numbers * f};
-  for (std::size_t i = 0; i < numbers; ++i) of.d_textures[i] = 0;
-  if (!HasColor(face, job.colors) || face.row_begin >= face.row_end) return;
+                     job.textures.data() + numbers * f};
+  float* const d_textures = out.d_textures.data() + numbers * f;
+  for (std::size_t i = 0; i < numbers; ++i) d_textures[i] = 0;
+  if (face.row_begin >= face.row_end) return;
   ColorSums sums;
   ClearSums(&sums);
-  ForFaceVectors(
-      face, {0, job.image.size}, job.image, [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
-        const ColorLanes here =
-            ColorFaceAt<kDistance>(face, job.colors, soft, of.scale, of.textures, px, py);
-        if (job.colors.color == SoftColor::kSoftmax) {
-          AddMixture<kDistance>(of, here, mixed, at, &sums);
-        } else {
-          AddCover(of, here, static_cast<std::int32_t>(f), mixed, at, &sums);
-        }
-      });
-  StoreSums(face, job.colors, sums, out.d_corners.data() + kCornerNumbers * f, of.d_textures);
+  ForFaceVectors(face, {0, job.image.size}, job.image,
+                 [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
+                   const ColorLanes here = ColorFaceAt<kDistance>(face, soft, of.textures, px, py);
+                   AddMixture<kDistance>(of, here, mixed, at, &sums);
+                 });
+  StoreSums(face, sums, out.d_corners.data() + kCornerNumbers * f, d_textures);
 }
 
 void BackwardColors(const SoftRasColorJob& job, const SoftRasColorImage& mixed, std::size_t begin,

@@ -10,7 +10,6 @@
 
 #if HWY_ONCE
 #include <algorithm>
-#include <limits>
 
 namespace tilegrad::rivals {
 namespace {
@@ -29,14 +28,14 @@ void ForPixels(const SoftRasImage& image, RowRange rows, const Visit& visit) {
 
 // Every pixel shows the background.
 void StartMixing(const SoftRasColorJob& job, RowRange rows, SoftRasColorImage* mixed) {
-  const bool soft = job.colors.color == SoftColor::kSoftmax;
-  const auto background = static_cast<float>(NearnessOf(job.options, job.colors).background);
+  const double range = job.options.far_plane - job.options.near_plane;
+  const auto background =
+      static_cast<float>(job.colors.BackgroundDepth() * range - job.options.far_plane);
   const std::size_t first = static_cast<std::size_t>(rows.begin) * job.image.stride;
   const std::size_t count = static_cast<std::size_t>(rows.end - rows.begin) * job.image.stride;
-  const auto fill = [&](auto* plane, auto value) { std::fill_n(plane + first, count, value); };
-  fill(mixed->nearest.data(), soft ? background : -std::numeric_limits<float>::infinity());
+  const auto fill = [&](float* plane, float value) { std::fill_n(plane + first, count, value); };
+  fill(mixed->nearest.data(), background);
   fill(mixed->total.data(), 1.0f);
-  fill(mixed->cover.data(), std::int32_t{-1});
   for (std::size_t c = 0; c < 3; ++c) {
     fill(mixed->color.data() + c * job.image.kept.size(),
          static_cast<float>(job.colors.background[c]));
@@ -49,7 +48,6 @@ void ReserveSoftRasColors(const SoftRasImage& image, SoftRasColorImage* mixed) {
   const std::size_t plane = image.kept.size();
   mixed->nearest.resize(plane);
   mixed->total.resize(plane);
-  mixed->cover.resize(plane);
   mixed->color.resize(3 * plane);
   mixed->push.resize(4 * plane);
 }

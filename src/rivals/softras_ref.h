@@ -17,7 +17,6 @@ struct SoftFaceRef {
   FaceCorners<T> at;
   T area2;
   bool left_out;
-  bool Front() const { return RealPart(area2) < 0; }  // as published: clockwise, y up
 
   SoftFaceRef(std::span<const T> corners, std::size_t face)
       : at(CornersOf(corners.data(), face)), area2(DoubledArea(at)) {

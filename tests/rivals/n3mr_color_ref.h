@@ -50,7 +50,6 @@ void N3mrSceneForwardRef(const N3mrSceneRef<T>& scene, const N3mrImages<T>& out)
   const N3mrDrawingRef<T> drawing(scene.corners, scene.size, scene.options);
   const std::size_t pixels = drawing.owner.size(), plane = out.color.size() / 3;
   if (!out.alpha.empty()) ReduceN3mr<T>(scene.options, scene.size, CoverageOf(drawing), out.alpha);
-  if (!out.depth.empty()) ReduceN3mr<T>(scene.options, scene.size, drawing.depth, out.depth);
   if (out.color.empty()) return;
   const std::vector<T> planes = ColorPlanesRef(scene, drawing);
   for (std::size_t c = 0; c < 3; ++c) {
@@ -72,25 +71,19 @@ struct N3mrPushesRef {
   }
 };
 
-// The exact parts: texels and depth.
+// The exact part: texels.
 template <class T>
-void AddExactPartsRef(const N3mrSceneRef<T>& scene, const N3mrDrawingRef<T>& drawing,
-                      std::span<const T> d_color, std::span<const T> d_depth,
-                      const N3mrColorAdjoints<T>& out) {
+void AddTexelAdjointsRef(const N3mrSceneRef<T>& scene, const N3mrDrawingRef<T>& drawing,
+                         std::span<const T> d_color, std::span<T> d_textures) {
   const std::size_t pixels = drawing.owner.size();
   for (std::size_t p = 0; p < pixels; ++p) {
     if (drawing.owner[p] < 0) continue;
     const N3mrFaceT<T>& face = drawing.faces[static_cast<std::size_t>(drawing.owner[p])];
     const T* const w = drawing.weights[p].data();
-    if (!d_color.empty()) {
-      const T g[3] = {d_color[p], d_color[pixels + p], d_color[2 * pixels + p]};
-      MixTexelsAdjoint(
-          N3mrTexelsAt(face, w, drawing.depth[p], scene.colors.resolution, scene.options.eps), g,
-          &out.d_textures[scene.CubeOf(face)]);
-    }
-    if (d_depth.empty()) continue;
-    AddDepthAdjoint(face, w, drawing.depth[p], d_depth[p], scene.options.Scale(scene.size),
-                    &out.d_corners[kCornerNumbers * static_cast<std::size_t>(face.source)]);
+    const T g[3] = {d_color[p], d_color[pixels + p], d_color[2 * pixels + p]};
+    MixTexelsAdjoint(
+        N3mrTexelsAt(face, w, drawing.depth[p], scene.colors.resolution, scene.options.eps), g,
+        &d_textures[scene.CubeOf(face)]);
   }
 }
 
@@ -101,7 +94,6 @@ void N3mrSceneBackwardRef(const N3mrSceneRef<T>& scene, const N3mrImages<const T
   const N3mrDrawingRef<T> drawing(scene.corners, scene.size, scene.options);
   const std::size_t pixels = drawing.owner.size(), plane = d_images.color.size() / 3;
   N3mrPushesRef<T> pushes;
-  std::vector<T> d_depth(d_images.depth.empty() ? 0 : pixels);
   if (!d_images.color.empty()) {
     const std::vector<T> planes = ColorPlanesRef(scene, drawing);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -109,10 +101,9 @@ void N3mrSceneBackwardRef(const N3mrSceneRef<T>& scene, const N3mrImages<const T
                  d_images.color.subspan(c * plane, plane));
     }
   }
-  const std::size_t colors = pushes.values.size();
+  if (!pushes.values.empty())
+    AddTexelAdjointsRef<T>(scene, drawing, pushes.d_values, out.d_textures);
   if (!d_images.alpha.empty()) pushes.Add(scene, CoverageOf(drawing), d_images.alpha);
-  if (!d_depth.empty()) ReduceN3mrAdjoint<T>(scene.options, scene.size, d_images.depth, d_depth);
-  AddExactPartsRef<T>(scene, drawing, std::span(pushes.d_values).first(colors), d_depth, out);
   const int channels = static_cast<int>(pushes.values.size() / pixels);
   const SweepImages<T> images{drawing.inner, channels, pushes.values, pushes.d_values,
                               drawing.owner};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// N3MR's colours and depth: numbers worked out by hand, independent numbers of the published
+// N3MR's colours: numbers worked out by hand, independent numbers of the published
 // kernels, complex step for what is a derivative, and the fast code against the reference.
 #include "rivals/n3mr_color.h"
 
@@ -14,37 +14,35 @@ using namespace test;  // NOLINT: of the tests of one folder
 
 using Complex = std::complex<double>;
 
-enum Asked { kColor = 1, kAlpha = 2, kDepth = 4 };
+enum Asked { kColor = 1, kAlpha = 2 };
 
-// Images and gradients of a scene; `d`: dL/d(r, g, b, alpha, depth), planes of the image.
+// Images and gradients of a scene; `d`: dL/d(r, g, b, alpha), planes of the image.
 template <class T>
 struct Result {
-  std::vector<T> color, alpha, depth, d_corners, d_textures;
+  std::vector<T> color, alpha, d_corners, d_textures;
 
   Result(const N3mrSceneRef<T>& scene, std::size_t pixels)
       : color(3 * pixels),
         alpha(pixels),
-        depth(pixels),
         d_corners(scene.corners.size()),
         d_textures(scene.textures.size()) {}
-  N3mrImages<T> Images() { return {color, alpha, depth}; }
+  N3mrImages<T> Images() { return {color, alpha}; }
   N3mrColorAdjoints<T> Adjoints() { return {d_corners, d_textures}; }
 };
 
 template <class T>
 N3mrImages<const T> PushesOf(const std::vector<T>& d, int asked) {
   const std::span<const T> all = d;
-  const std::size_t pixels = d.size() / 5;
+  const std::size_t pixels = d.size() / 4;
   N3mrImages<const T> out;
   if ((asked & kColor) != 0) out.color = all.first(3 * pixels);
   if ((asked & kAlpha) != 0) out.alpha = all.subspan(3 * pixels, pixels);
-  if ((asked & kDepth) != 0) out.depth = all.last(pixels);
   return out;
 }
 
 template <class T>
 Result<T> Reference(const N3mrSceneRef<T>& scene, const std::vector<T>& d, int asked) {
-  Result<T> out(scene, d.size() / 5);
+  Result<T> out(scene, d.size() / 4);
   N3mrSceneForwardRef(scene, out.Images());
   N3mrSceneBackwardRef(scene, PushesOf(d, asked), out.Adjoints());
   return out;
@@ -53,7 +51,7 @@ Result<T> Reference(const N3mrSceneRef<T>& scene, const std::vector<T>& d, int a
 // Rows in three parts, faces in two.
 template <class T>
 Result<T> Fast(const N3mrSceneRef<T>& scene, const std::vector<T>& d, int asked) {
-  Result<T> out(scene, d.size() / 5);
+  Result<T> out(scene, d.size() / 4);
   std::fill(out.d_textures.begin(), out.d_textures.end(), T(7));
   N3mrImageT<T> image;
   N3mrPlanesT<T> planes;
@@ -75,10 +73,7 @@ Result<T> Fast(const N3mrSceneRef<T>& scene, const std::vector<T>& d, int asked)
 }
 
 int AskedOf(const std::string& outputs) {
-  return outputs == "rgb"         ? kColor
-         : outputs == "rgb_alpha" ? kColor | kAlpha
-         : outputs == "depth"     ? kDepth
-                                  : kAlpha;
+  return outputs == "rgb" ? kColor : outputs == "alpha" ? kAlpha : kColor | kAlpha;
 }
 
 // A scene of the file at one image, in numbers of T.
@@ -92,7 +87,7 @@ struct SharedScene {
         textures(Numbers<T>(file["textures"][of["texture"].get<std::string>()][n])),
         d(Numbers<T>(inputs["upstream"][n])) {
     scene = {corners, textures, of["image_size"], {}, {}};
-    d.resize(5 * static_cast<std::size_t>(scene.size * scene.size));
+    d.resize(4 * static_cast<std::size_t>(scene.size * scene.size));
     scene.options.reduction =
         of["anti_aliasing"].get<bool>() ? N3mrReduction::kMean : N3mrReduction::kNone;
     scene.options.fill_back = of["fill_back"];
@@ -106,7 +101,7 @@ struct SharedScene {
   }
 };
 
-// Calls check(scene of the file, its inputs, gradient, image) for colours and depth.
+// Calls check(scene of the file, its inputs, gradient, image) for colours.
 template <class Check>
 void ForSharedImages(const Json& file, const Check& check) {
   for (const Json& of : file["scenes"]) {
@@ -115,6 +110,7 @@ void ForSharedImages(const Json& file, const Check& check) {
                              ? file["scenes"][of["inputs_of_scene"].get<std::size_t>()]
                              : of;
     for (const Json& gradient : of["gradients"]) {
+      if (gradient["outputs"] == "depth") continue;
       for (std::size_t n = 0; n < inputs["face_vertices"].size(); ++n) {
         SCOPED_TRACE(of["name"].get<std::string>() + " " + of["anti_aliasing"].dump() + " " +
                      gradient["outputs"].get<std::string>());
@@ -132,12 +128,8 @@ void ExpectShared(const Json& of, const Json& gradient, std::size_t n, const Res
     EXPECT_LT(Difference(got.color, Numbers(of["rgb"][n])), of_image);
   }
   EXPECT_LT(Difference(got.alpha, Numbers(of["alpha"][n])), of_image);
-  if (of.contains("depth")) {
-    EXPECT_LT(Difference(got.depth, Numbers(of["depth"][n])), of_image * 100);  // far is 100
-  }
   const auto want = Numbers(gradient["grad_face_vertices"][n]);
-  const bool depth = gradient["outputs"] == "depth";
-  EXPECT_LT(Difference(depth ? got.d_corners : PlaneParts(got.d_corners), want),
+  EXPECT_LT(Difference(PlaneParts(got.d_corners), want),
             of_gradient * std::max(1e-3, Largest(want)));
   if (!gradient.contains("grad_textures")) return;
   const auto d_textures = Numbers(gradient["grad_textures"][n]);
@@ -157,7 +149,7 @@ TEST(N3mrColors, DoubleGivesTheNumbersOfThePublishedKernels) {
                     ExpectShared(of, gradient, n, Fast(at.scene, at.d, asked), 1e-10, 1e-10);
                     ++cases;
                   });
-  EXPECT_EQ(cases, 24);
+  EXPECT_EQ(cases, 22);
 }
 
 // A cube of 2 at its face's middle, depths equal: u = 1/3 each, so corner (0,0,0) of the cube
@@ -202,41 +194,28 @@ struct RandomScene {
     N3mrColors colors{.resolution = 3, .background = {0.1, 0.6, 0.3}};
     corners = RandomCorners<T>(faces, extent, &rng);
     textures = Random<T>(faces * colors.texels() * 3, 0, 1, &rng);
-    d = Random<T>(5 * static_cast<std::size_t>(size * size), -1, 1, &rng);
+    d = Random<T>(4 * static_cast<std::size_t>(size * size), -1, 1, &rng);
     scene = {corners, textures, size, {.reduction = reduction}, colors};
   }
 };
 
-// Complex step: 1e-10 as for SoftRas. Depth by all numbers of corners, colours by texels.
-TEST(N3mrColors, ExactGradientsAreDerivatives) {
+// Complex step: 1e-10 as for SoftRas.
+TEST(N3mrColors, GradientsOfTexelsAreDerivatives) {
   for (const N3mrReduction reduction : {N3mrReduction::kMean, N3mrReduction::kBilinear}) {
     const RandomScene<double> at(reduction, 6, 0.6, 7);
-    const auto depth = Reference(at.scene, at.d, kDepth);
     const auto color = Reference(at.scene, at.d, kColor);
-    std::vector<double> d_corners(at.corners.size()), d_textures(at.textures.size());
-    const std::size_t pixels = at.d.size() / 5;
-    const auto derivative = [&](std::size_t corner, std::size_t texel, int asked) {
-      std::vector<Complex> corners(at.corners.begin(), at.corners.end());
+    std::vector<double> d_textures(at.textures.size());
+    const std::vector<Complex> corners(at.corners.begin(), at.corners.end());
+    for (std::size_t i = 0; i < d_textures.size(); ++i) {
       std::vector<Complex> textures(at.textures.begin(), at.textures.end());
-      if (corner < corners.size()) corners[corner] += Complex(0, 1e-30);
-      if (texel < textures.size()) textures[texel] += Complex(0, 1e-30);
-      const N3mrSceneRef<Complex> scene{corners, textures, at.scene.size, at.scene.options,
-                                        at.scene.colors};
-      std::vector<Complex> planes(5 * pixels);
-      const std::span<Complex> all = planes;
-      N3mrSceneForwardRef<Complex>(scene, {all.first(3 * pixels), {}, all.last(pixels)});
-      double sum = 0;
-      const std::size_t begin = asked == kDepth ? 4 * pixels : 0;
-      for (std::size_t p = begin; p < begin + (asked == kDepth ? 1 : 3) * pixels; ++p)
-        sum += at.d[p] * planes[p].imag() / 1e-30;
-      return sum;
-    };
-    for (std::size_t i = 0; i < d_corners.size(); ++i)
-      d_corners[i] = derivative(i, at.textures.size(), kDepth);
-    for (std::size_t i = 0; i < d_textures.size(); ++i)
-      d_textures[i] = derivative(at.corners.size(), i, kColor);
-    EXPECT_GT(Largest(d_corners), 0.1);
-    EXPECT_LT(Difference(depth.d_corners, d_corners), 1e-10 * Largest(d_corners));
+      textures[i] += Complex(0, 1e-30);
+      std::vector<Complex> planes(3 * at.d.size() / 4);
+      N3mrSceneForwardRef<Complex>(
+          {corners, textures, at.scene.size, at.scene.options, at.scene.colors}, {planes, {}});
+      for (std::size_t p = 0; p < planes.size(); ++p)
+        d_textures[i] += at.d[p] * planes[p].imag() / 1e-30;
+    }
+    EXPECT_GT(Largest(d_textures), 0.1);
     EXPECT_LT(Difference(color.d_textures, d_textures), 1e-10 * Largest(d_textures));
   }
 }
@@ -245,17 +224,15 @@ TEST(N3mrColors, ExactGradientsAreDerivatives) {
 TEST(N3mrColors, FastIsTheReference) {
   for (const N3mrReduction reduction :
        {N3mrReduction::kNone, N3mrReduction::kMean, N3mrReduction::kBilinear}) {
-    for (const int asked : {int{kColor}, kColor | kAlpha, kAlpha | kDepth}) {
+    for (const int asked : {int{kColor}, int{kAlpha}, kColor | kAlpha}) {
       const RandomScene<double> exact(reduction, 40, 0.3, 19);
       const RandomScene<float> narrow(reduction, 40, 0.3, 19);
       const auto want = Reference(exact.scene, exact.d, asked);
       const auto fast = Fast(exact.scene, exact.d, asked);
       const auto got = Fast(narrow.scene, narrow.d, asked);
       EXPECT_LT(Difference(fast.color, want.color), 1e-11);
-      EXPECT_LT(Difference(fast.depth, want.depth), 1e-10);
       EXPECT_LT(Difference(got.color, want.color), 1e-4);
       EXPECT_LT(Difference(got.alpha, want.alpha), 1e-5);
-      EXPECT_LT(Difference(got.depth, want.depth), 1e-3);  // of 100
       EXPECT_LT(Difference(fast.d_corners, want.d_corners), 1e-10 * Largest(want.d_corners));
       EXPECT_LT(Difference(got.d_corners, want.d_corners), 1e-3 * Largest(want.d_corners));
       EXPECT_LE(Difference(got.d_textures, want.d_textures), 1e-3 * Largest(want.d_textures));

@@ -137,36 +137,31 @@ TEST(RivalRenderer, GradientsGoThroughTheCamera) {
   EXPECT_LE(20 * off, checked);
 }
 
-// Each face has one colour, of its corners: N3MR's way, and SoftRas's with one texel.
+// N3MR gives each face one colour, the mean of its corners.
 TEST(RivalRenderer, ColorsOfFacesAreMeansOfTheirCorners) {
   const Workers workers(1);
   Scene<float> scene(1, 16);
   scene.colors.assign(scene.positions.size(), 0.0f);
   for (std::size_t i = 0; i < scene.colors.size(); i += 3) scene.colors[i] = 0.75f;  // red
-  std::vector<Options> rules(3);
-  rules[0].rule = Rule::kN3mr;
-  rules[0].n3mr.reduction = N3mrReduction::kNone;
-  rules[1].softras_colors.texture = SoftTexture::kSurface;
-  rules[1].softras_colors.color = SoftColor::kHard;
-  rules[2].softras_colors.color = SoftColor::kHard;  // of vertices, which are all the same here
-  for (const Options& options : rules) {
-    std::vector<float> d(4 * scene.pixels());
-    std::fill(d.begin() + static_cast<std::ptrdiff_t>(scene.pixels()), d.end(), 1.0f);
-    const auto got = Render(scene, options, d, workers);
-    const std::size_t pixels = scene.Batch().pixels();
-    const std::size_t middle = static_cast<std::size_t>(8 * scene.size + 8);
-    EXPECT_NEAR(got.color[middle], 0.75, 1e-5);
-    EXPECT_EQ(got.color[pixels + middle], 0);
-    EXPECT_EQ(got.color[0], 0);  // background
-    // Each covered pixel shares 1 among vertices, in every channel.
-    double covered = 0, sum = 0;
-    for (std::size_t n = 0; n < kImages; ++n) {
-      for (std::size_t p = 0; p < pixels; ++p) covered += got.color[3 * n * pixels + p] > 0 ? 1 : 0;
-    }
-    for (const float g : got.d_colors) sum += g;
-    EXPECT_NEAR(sum, 3 * covered, 1e-3 * covered);
-    EXPECT_GT(covered, 100);
+  Options options;
+  options.rule = Rule::kN3mr;
+  options.n3mr.reduction = N3mrReduction::kNone;
+  std::vector<float> d(4 * scene.pixels());
+  std::fill(d.begin() + static_cast<std::ptrdiff_t>(scene.pixels()), d.end(), 1.0f);
+  const auto got = Render(scene, options, d, workers);
+  const std::size_t pixels = scene.Batch().pixels();
+  const std::size_t middle = static_cast<std::size_t>(8 * scene.size + 8);
+  EXPECT_NEAR(got.color[middle], 0.75, 1e-5);
+  EXPECT_EQ(got.color[pixels + middle], 0);
+  EXPECT_EQ(got.color[0], 0);  // background
+  // Each covered pixel shares 1 among vertices, in every channel.
+  double covered = 0, sum = 0;
+  for (std::size_t n = 0; n < kImages; ++n) {
+    for (std::size_t p = 0; p < pixels; ++p) covered += got.color[3 * n * pixels + p] > 0 ? 1 : 0;
   }
+  for (const float g : got.d_colors) sum += g;
+  EXPECT_NEAR(sum, 3 * covered, 1e-3 * covered);
+  EXPECT_GT(covered, 100);
 }
 
 // As the kernels' own tests, through a camera whose rounding (1e-7) meets a slope of alpha of
@@ -267,8 +262,6 @@ TEST(RivalRenderer, ErrorsNameTheOptionThatIsOutOfRange) {
             "SoftRas: dist_eps is 0.5, but must lie in (0, 0.5)");
   EXPECT_EQ(message([](Options& o) { o.softras_colors.gamma = NAN; }),
             "SoftRas: gamma is nan, but must be positive and finite");
-  EXPECT_EQ(message([](Options& o) { o.softras_colors.resolution = 65; }),
-            "SoftRas: resolution is 65; 1 to 64 are possible");
   EXPECT_EQ(message([](Options& o) { o.n3mr.near_plane = 200; }),
             "N3MR: near 200 and far 100 must be 0 < near < far");
   EXPECT_EQ(message([](Options& o) { o.n3mr.eps = -1; }),
