@@ -51,7 +51,7 @@ class Workspace(unittest.TestCase):
     def check(self):
         """The package in the target folder is the one that runs."""
         files = {str(path.relative_to(self.target)) for path in self.target.rglob("*")}
-        for name in ("tilegrad/__init__.py", "tilegrad/_core.pyi", "tilegrad/py.typed",
+        for name in ("tilegrad/__init__.py", "tilegrad/compat/kaolin/__init__.py", "tilegrad/py.typed",
                      f"tilegrad-{tilegrad.__version__}.dist-info/METADATA"):
             self.assertIn(name, files)
         code = "import tilegrad; print(tilegrad.__file__)"
