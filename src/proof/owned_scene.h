@@ -96,7 +96,7 @@ struct OwnedScene {
 // OwnedScene of anything with the same members, so gradients are visited in the same order.
 template <class T, class Visit>
 void ForEachNumber(OwnedScene<T>& s, const Visit& visit) {
-  const auto all = [&](const char* name, auto& values) {
+  const auto all = [&](const char* name, auto&& values) {
     for (auto& v : values) visit(name, v);
   };
   all("positions", s.mesh.positions);
@@ -107,13 +107,7 @@ void ForEachNumber(OwnedScene<T>& s, const Visit& visit) {
   all("light_directions", s.light_directions);
   all("sh", s.sh);
   for (auto& t : s.textures) all("texture", t.texels);
-  for (auto& u : s.surfaces) {
-    all("base_color", u.base_color);
-    all("ambient", u.ambient);
-    all("diffuse", u.diffuse);
-    all("specular", u.specular);
-    visit("shininess", u.shininess);
-  }
+  for (auto& u : s.surfaces) ForEachSurfacePart(all, u);
   for (auto& l : s.lights) {
     all("light", l.direction);
     visit("intensity", l.intensity);

@@ -8,11 +8,7 @@
 #include "base/clocks.h"
 #include "base/error.h"
 #include "render/checks.h"
-#include "render/pipeline/pipeline.h"
-#include "render/shading/inputs.h"
-#include "render/shading/merge.h"
 #include "render/shading/report.h"
-#include "render/shading/stage.h"
 #include "render/validate.h"
 
 namespace tilegrad {
@@ -41,131 +37,90 @@ GradientWishes WishesOf(const FrameGradients& d_frame, std::span<const SceneGrad
 
 }  // namespace
 
-struct Engine::Impl {
-  explicit Impl(const Workers& w)
-      : workers(&w), pipeline(w), stage(static_cast<std::size_t>(w.count())), inputs(w), merge(w) {}
+Engine::Engine(const Workers& workers)
+    : workers_(&workers),
+      pipeline_(workers),
+      stage_(static_cast<std::size_t>(workers.count())),
+      inputs_(workers),
+      merge_(workers) {}
 
-  // Streams for the pipeline: side by side for the stage, or as they are.
-  Status SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
-                   bool user_only);
-  Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& request,
-                FrameImages* frame);
-
-  // The pipeline's backward pass, with the stage if there is one. False: a number is not finite.
-  bool RunBackward(const RenderOptions& options, const FrameImages& frame,
-                   const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
-  Status Backward(std::span<const Scene> scenes, const RenderOptions& options,
-                  const FrameImages& frame, const FrameGradients& d_frame,
-                  const GradientTargets<float>& targets);
-
-  PlanReport Explain() const;
-
-  const Workers* workers;
-  Pipeline pipeline;
-  ShadeStage stage;
-  bool staged = false, was_backward = false;  // of the last call
-  ForwardPlan forward;
-  BackwardPlan backward;
-  ShadeInputs inputs;
-  GradientMerge merge;
-  double merge_ms = 0;
-};
-
-Status Engine::Impl::SetInputs(std::span<const Scene> scenes, const StreamSets& sets,
-                               bool colors_only, bool user_only) {
-  if (staged) return inputs.Pack(scenes, sets);
-  inputs.UsePlain(scenes, colors_only, user_only);
+Status Engine::SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
+                         bool user_only) {
+  if (staged_) return inputs_.Pack(scenes, sets);
+  inputs_.UsePlain(scenes, colors_only, user_only);
   return {};
 }
 
-Status Engine::Impl::Render(std::span<const Scene> scenes, const RenderOptions& options,
-                            const Outputs& request, FrameImages* frame) {
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers));
-  forward = PlanForward(parts, request);
-  staged = forward.staged() && !scenes.empty();
-  was_backward = false;
-  merge_ms = 0;
-  inputs.Begin(scenes, staged && forward.steps.texture);
-  TILEGRAD_TRY(SetInputs(scenes, {forward.varyings, forward.varyings[Varying::kNormal]},
-                         forward.colors_only, forward.user_only));
+Status Engine::Render(std::span<const Scene> scenes, const RenderOptions& options,
+                      const Outputs& request, FrameImages* frame) {
+  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers_));
+  forward_ = PlanForward(parts, request);
+  staged_ = forward_.staged() && !scenes.empty();
+  was_backward_ = false;
+  merge_ms_ = 0;
+  inputs_.Begin(scenes, staged_ && forward_.steps.texture);
+  TILEGRAD_TRY(SetInputs(scenes, {forward_.varyings, forward_.varyings[Varying::kNormal]},
+                         forward_.colors_only, forward_.user_only));
   SizeFrame(scenes.size(), parts.user_channels, options, request, frame);
   Pipeline::Attributes attributes;
-  if (staged) {
-    stage.BeginForward(forward, inputs.scenes(), options, frame);
-    attributes.stage = &stage;
+  if (staged_) {
+    stage_.BeginForward(forward_, inputs_.scenes(), options, frame);
+    attributes.stage = &stage_;
   } else {
     std::fill(frame->uv.begin(), frame->uv.end(), 0.0f);  // wanted, but of a scene that has none
-    if (forward.colors_only) attributes.image = &frame->color;
-    if (forward.user_only) attributes.image = &frame->attributes;
+    if (forward_.colors_only) attributes.image = &frame->color;
+    if (forward_.user_only) attributes.image = &frame->attributes;
   }
-  pipeline.Render(inputs.views(), options, attributes, frame);
+  pipeline_.Render(inputs_.views(), options, attributes, frame);
   return parts.may_overflow ? ValidateImages(*frame) : Status();
 }
 
-PlanReport Engine::Impl::Explain() const {
-  CallWork call{pipeline.stats(), pipeline.times(), staged ? stage.work() : ShadeWork(),
-                inputs.work()};
-  call.scene.merge_ms = merge_ms;
-  return was_backward ? ReportBackward(backward, call) : ReportForward(forward, call);
-}
-
-Status Engine::Impl::Backward(std::span<const Scene> scenes, const RenderOptions& options,
-                              const FrameImages& frame, const FrameGradients& d_frame,
-                              const GradientTargets<float>& targets) {
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers));
-  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, frame, d_frame, targets.scenes()));
-  backward = PlanBackward(parts, WishesOf(d_frame, targets.scenes()));
-  staged = backward.staged() && !scenes.empty();
-  was_backward = true;
-  inputs.Begin(scenes, staged && backward.steps.texture);
-  const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
-  const bool same = backward.pulled == backward.recomputed;
-  TILEGRAD_TRY(SetInputs(scenes, {backward.pulled, normals, same ? nullptr : &backward.recomputed},
-                         backward.colors_only, backward.user_only));
-  if (staged) stage.BeginBackward(backward, inputs.scenes(), options, d_frame);
-  const bool sound =
-      RunBackward(options, frame, d_frame, merge.Begin(backward, inputs.views(), targets));
-  if (!sound) {
-    TILEGRAD_TRY(CheckNumbers("d_frame.alpha", d_frame.alpha));
-    TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
-  }
-  StageClock clock;
-  merge.Run({backward, inputs, staged ? &stage : nullptr, targets});
-  clock.Lap(&merge_ms);
-  TILEGRAD_TRY(targets.CheckSums());
-  return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody wants
-}
-
-bool Engine::Impl::RunBackward(const RenderOptions& options, const FrameImages& frame,
-                               const FrameGradients& d_frame,
-                               std::span<PipelineGradients> d_views) {
-  PipelineCotangents d_images{{}, d_frame.alpha};
-  if (backward.colors_only) d_images.attributes = d_frame.color;
-  if (backward.user_only) d_images.attributes = d_frame.attributes;
-  const bool sound = pipeline.Backward(inputs.views(), options, frame, d_images, d_views,
-                                       staged ? &stage : nullptr);
-  if (staged) return sound && stage.sound();
-  // Cotangents that pull nothing have been looked at by nobody.
-  const bool seen = backward.colors_only || backward.user_only;
-  return sound && (seen || ValidateCotangents(d_frame, frame.face_ids).ok());
-}
-
-Engine::Engine(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
-Engine::~Engine() = default;
-Engine::Engine(Engine&&) noexcept = default;
-Engine& Engine::operator=(Engine&&) noexcept = default;
-
-Status Engine::Render(std::span<const Scene> scenes, const RenderOptions& options,
-                      const Outputs& request, FrameImages* frame) {
-  return impl_->Render(scenes, options, request, frame);
+PlanReport Engine::Explain() const {
+  CallWork call{pipeline_.stats(), pipeline_.times(), staged_ ? stage_.work() : ShadeWork(),
+                inputs_.work()};
+  call.scene.merge_ms = merge_ms_;
+  return was_backward_ ? ReportBackward(backward_, call) : ReportForward(forward_, call);
 }
 
 Status Engine::Backward(std::span<const Scene> scenes, const RenderOptions& options,
                         const FrameImages& frame, const FrameGradients& d_frame,
                         GradientTargets<float>* targets) {
-  return impl_->Backward(scenes, options, frame, d_frame, *targets);
+  TILEGRAD_ASSIGN(const SceneParts parts, ValidateScenes(scenes, options, *workers_));
+  TILEGRAD_TRY(ValidateBackward<float>(scenes, options, frame, d_frame, targets->scenes()));
+  backward_ = PlanBackward(parts, WishesOf(d_frame, targets->scenes()));
+  staged_ = backward_.staged() && !scenes.empty();
+  was_backward_ = true;
+  inputs_.Begin(scenes, staged_ && backward_.steps.texture);
+  const bool normals = backward_.pulled[Varying::kNormal] || backward_.recomputed[Varying::kNormal];
+  const bool same = backward_.pulled == backward_.recomputed;
+  TILEGRAD_TRY(SetInputs(scenes,
+                         {backward_.pulled, normals, same ? nullptr : &backward_.recomputed},
+                         backward_.colors_only, backward_.user_only));
+  if (staged_) stage_.BeginBackward(backward_, inputs_.scenes(), options, d_frame);
+  const bool sound =
+      RunBackward(options, frame, d_frame, merge_.Begin(backward_, inputs_.views(), *targets));
+  if (!sound) {
+    TILEGRAD_TRY(CheckNumbers("d_frame.alpha", d_frame.alpha));
+    TILEGRAD_TRY(ValidateCotangents(d_frame, frame.face_ids));
+  }
+  StageClock clock;
+  merge_.Run({backward_, inputs_, staged_ ? &stage_ : nullptr, *targets});
+  clock.Lap(&merge_ms_);
+  TILEGRAD_TRY(targets->CheckSums());
+  return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody wants
 }
 
-PlanReport Engine::Explain() const { return impl_->Explain(); }
+bool Engine::RunBackward(const RenderOptions& options, const FrameImages& frame,
+                         const FrameGradients& d_frame, std::span<PipelineGradients> d_views) {
+  PipelineCotangents d_images{{}, d_frame.alpha};
+  if (backward_.colors_only) d_images.attributes = d_frame.color;
+  if (backward_.user_only) d_images.attributes = d_frame.attributes;
+  const bool sound = pipeline_.Backward(inputs_.views(), options, frame, d_images, d_views,
+                                        staged_ ? &stage_ : nullptr);
+  if (staged_) return sound && stage_.sound();
+  // Cotangents that pull nothing have been looked at by nobody.
+  const bool seen = backward_.colors_only || backward_.user_only;
+  return sound && (seen || ValidateCotangents(d_frame, frame.face_ids).ok());
+}
 
 }  // namespace tilegrad

@@ -4,13 +4,16 @@
 // have and the caller does not ask for is not computed.
 #pragma once
 
-#include <memory>
 #include <span>
 
 #include "base/parallel.h"
 #include "render/frame_images.h"
 #include "render/gradient_targets.h"
+#include "render/pipeline/pipeline.h"
+#include "render/shading/inputs.h"
+#include "render/shading/merge.h"
 #include "render/shading/plan.h"
+#include "render/shading/stage.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
@@ -20,9 +23,6 @@ namespace tilegrad {
 class Engine {
  public:
   explicit Engine(const Workers& workers);  // keeps a reference
-  ~Engine();
-  Engine(Engine&&) noexcept;
-  Engine& operator=(Engine&&) noexcept;
 
   // As RendererT::Render. After an error `frame` is left unspecified.
   Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& outputs,
@@ -38,8 +38,22 @@ class Engine {
   PlanReport Explain() const;  // the last call
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  // Streams for the pipeline: side by side for the stage, or as they are.
+  Status SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
+                   bool user_only);
+  // The pipeline's backward pass, with the stage if there is one. False: a number is not finite.
+  bool RunBackward(const RenderOptions& options, const FrameImages& frame,
+                   const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
+
+  const Workers* workers_;
+  Pipeline pipeline_;
+  ShadeStage stage_;
+  bool staged_ = false, was_backward_ = false;  // of the last call
+  ForwardPlan forward_;
+  BackwardPlan backward_;
+  ShadeInputs inputs_;
+  GradientMerge merge_;
+  double merge_ms_ = 0;
 };
 
 // The same calls in double, of the naive renderer (render/reference.h). Images are its units of

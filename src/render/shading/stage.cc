@@ -14,6 +14,111 @@ namespace {
 
 using shade::RunPlane;
 
+// The pixels of `rows` (kBinSize wide) that show a face, in their order, surface after surface.
+// `face_surfaces` [F] of `source_face` [mesh faces], or empty: all 0.
+void FindSegments(const raster::FaceRows& rows, int columns,
+                  std::span<const std::int32_t> source_face,
+                  std::span<const std::int32_t> face_surfaces,
+                  std::vector<PixelSegment>* segments) {
+  segments->clear();
+  const auto surface_of = [&](std::int32_t face) -> std::int32_t {
+    if (face_surfaces.empty()) return 0;
+    return face_surfaces[static_cast<std::size_t>(source_face[static_cast<std::size_t>(face)])];
+  };
+  for (int i = rows.row_begin; i < rows.row_end; ++i) {
+    const std::int32_t* const faces = rows.row(i);
+    const std::int32_t at = (i - rows.row_begin) * raster::kBinSize;
+    for (std::int32_t j = 0; j < columns;) {
+      if (faces[j] == raster::kNoFace) {
+        ++j;
+        continue;
+      }
+      const std::int32_t first = j, surface = surface_of(faces[j]);
+      while (j < columns && faces[j] != raster::kNoFace && surface_of(faces[j]) == surface) ++j;
+      segments->push_back({surface, at + first, j - first});
+    }
+  }
+  if (face_surfaces.empty()) return;
+  std::sort(segments->begin(), segments->end(), [](const auto& a, const auto& b) {
+    return a.surface != b.surface ? a.surface < b.surface : a.at < b.at;
+  });
+}
+
+// Calls visit(run) for the runs that segments make.
+template <class Visit>
+void ForEachRun(std::span<const PixelSegment> segments, const Visit& visit) {
+  for (std::size_t i = 0; i < segments.size();) {
+    std::size_t end = i, count = 0;
+    while (end < segments.size() && segments[end].surface == segments[i].surface &&
+           count + static_cast<std::size_t>(segments[end].count) <= shade::kRunPixels) {
+      count += static_cast<std::size_t>(segments[end++].count);
+    }
+    visit(PixelRun{segments.subspan(i, end - i), count});
+    i = end;
+  }
+}
+
+// Calls visit(place in the run, pixel of the strip) for each pixel of a run.
+template <class Visit>
+void ForEachRunPixel(const PixelRun& run, const Visit& visit) {
+  std::size_t to = 0;
+  for (const PixelSegment& s : run.segments) {
+    for (std::int32_t i = 0; i < s.count; ++i) visit(to++, s.at + i);
+  }
+}
+
+// Where pixels of a strip stand in a plane of an image: rows of `row` floats.
+struct StripRows {
+  std::ptrdiff_t row;
+  std::ptrdiff_t operator()(std::int32_t at) const {  // of a pixel of the strip
+    return static_cast<std::ptrdiff_t>(at >> raster::kBinBits) * row +
+           (at & (raster::kBinSize - 1));
+  }
+};
+
+std::size_t PaddedEnd(std::size_t count) {
+  return (count + shade::kRunPad - 1) / shade::kRunPad * shade::kRunPad;
+}
+
+// Repeats the last of `count` values to the end of its vector.
+void PadRun(std::size_t count, RunPlane* p) {
+  std::fill(p->at + count, p->at + PaddedEnd(count), p->at[count - 1]);
+}
+
+// The same with zeros, as cotangents want it.
+void PadRunWithZeros(std::size_t count, RunPlane* p) {
+  std::fill(p->at + count, p->at + PaddedEnd(count), 0.0f);
+}
+
+void GatherPixels(const PixelRun& run, const float* plane, const StripRows& rows, float* to) {
+  for (const PixelSegment& s : run.segments) {
+    const float* const from = plane + rows(s.at);
+    to = std::copy(from, from + s.count, to);
+  }
+}
+
+// to <- the run's pixels of `plane`, whose first is the strip's first pixel; copies of the last one
+// fill the last vector.
+void GatherRun(const PixelRun& run, const float* plane, const StripRows& rows, RunPlane* to) {
+  GatherPixels(run, plane, rows, to->at);
+  PadRun(run.count, to);
+}
+
+// The same; 0 fills the last vector.
+void GatherCotangents(const PixelRun& run, const float* plane, const StripRows& rows,
+                      RunPlane* to) {
+  GatherPixels(run, plane, rows, to->at);
+  PadRunWithZeros(run.count, to);
+}
+
+void ScatterRun(const PixelRun& run, const RunPlane& from, const StripRows& rows, float* plane) {
+  const float* next = from.at;
+  for (const PixelSegment& s : run.segments) {
+    std::copy(next, next + s.count, plane + rows(s.at));
+    next += s.count;
+  }
+}
+
 // Channels [0, n) of `from` to the planes of `to`.
 void GatherChannels(const PixelRun& run, const PixelStrip& strip, int first,
                     std::span<RunPlane> to) {

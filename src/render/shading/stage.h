@@ -1,23 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading as a stage of the renderer: the pixels of a strip are gathered into runs (run.h)
-// and written to the images; on the way back, to cotangents of what was interpolated, and sums for
-// each band.
+// Shading as a stage of the renderer: the foreground pixels of a strip are gathered into runs of
+// one surface (run.h), shaded and scattered to the images; on the way back, to cotangents of what
+// was interpolated, and sums for each band.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "render/frame_images.h"
 #include "render/pipeline/pixel_stage.h"
-#include "render/shading/pixel_segments.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
 
 namespace tilegrad {
+
+// Neighbours in a row of a strip whose faces have one surface.
+struct PixelSegment {
+  std::int32_t surface;
+  std::int32_t at;     // of the first pixel in the strip
+  std::int32_t count;  // up to kRunPixels
+};
+
+// Segments of one surface, of kRunPixels at most together.
+struct PixelRun {
+  std::span<const PixelSegment> segments;
+  std::size_t count;  // pixels
+  std::int32_t surface() const { return segments[0].surface; }
+};
 
 // A scene of the batch, ready for its pixels.
 struct StageScene {
