@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, Optional
+from typing import Any, Optional, Sequence
 
 import numpy as np
 
@@ -16,6 +16,15 @@ from tilegrad._paths import name_of
 
 _D = _core.CAMERA
 Parts = dict[str, np.ndarray]
+# The numbers of a camera of other programs, in the order of _core.camera_from and camera_to.
+_CONVENTIONS: dict[str, dict[str, tuple[int, ...]]] = {
+    "opencv": {"k": (3, 3), "rotation": (3, 3), "translation": (3,)},
+    "colmap": {"quaternion": (4,), "translation": (3,), "fx": (), "fy": (), "cx": (), "cy": ()},
+    "opengl": {"projection": (4, 4), "model_view": (4, 4)},
+    "kaolin": {"rotation": (3, 3), "position": (3,), "projection": (3,)},
+    "pytorch3d": {"r": (3, 3), "t": (3,), "focal_length": (2,), "principal_point": (2,)},
+    "nerf": {"camera_to_world": (4, 4), "fl_x": (), "fl_y": (), "cx": (), "cy": ()},
+}
 
 
 class Camera(Packed):
@@ -144,9 +153,8 @@ class Camera(Packed):
         size: as of Camera.
         """
         function = "Camera.from_opencv"
-        rows = Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
-                     translation=(translation, (3,)))
-        return _converted("opencv", rows, known_size(function, size), half=is_half(function, pixel_centre))
+        return _converted("opencv", (k, rotation, translation), known_size(function, size),
+                          half=is_half(function, pixel_centre))
 
     @classmethod
     def from_colmap(cls, quaternion, translation, fx, fy, cx, cy, *,
@@ -156,10 +164,8 @@ class Camera(Packed):
         quaternion: (4,) or (N, 4): w, x, y, z, world to camera, of any length > 0.
         translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,). size: as of Camera.
         """
-        rows = Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
-                     translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
-                     cy=(cy, ()))
-        return _converted("colmap", rows, known_size("Camera.from_colmap", size))
+        return _converted("colmap", (quaternion, translation, fx, fy, cx, cy),
+                          known_size("Camera.from_colmap", size))
 
     @classmethod
     def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
@@ -168,9 +174,8 @@ class Camera(Packed):
         projection, model_view: (4, 4) or (N, 4, 4), for column vectors; what glGetFloatv fills is
         the transpose. width, height: pixels of the image.
         """
-        function = "Camera.from_opengl"
-        rows = Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
-        return _converted("opengl", rows, size_of(function, width, height))
+        return _converted("opengl", (projection, model_view),
+                          size_of("Camera.from_opengl", width, height))
 
     @classmethod
     def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
@@ -179,10 +184,8 @@ class Camera(Packed):
         rotation: (3, 3) or (N, 3, 3); position: (3,) or (N, 3), where the camera stands;
         projection: (3,) or (N, 3), camera_proj, its last number -1. width, height: pixels.
         """
-        function = "Camera.from_kaolin"
-        rows = Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
-                     projection=(projection, (3,)))
-        return _converted("kaolin", rows, size_of(function, width, height))
+        return _converted("kaolin", (rotation, position, projection),
+                          size_of("Camera.from_kaolin", width, height))
 
     @classmethod
     def from_pytorch3d(cls, r, t, focal_length, principal_point=(0, 0), *, width: int,
@@ -192,10 +195,8 @@ class Camera(Packed):
         r: (3, 3) or (N, 3, 3), for row vectors; t: (3,) or (N, 3);
         focal_length, principal_point: (2,) or (N, 2), NDC. width, height: pixels of the image.
         """
-        function = "Camera.from_pytorch3d"
-        rows = Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
-                     principal_point=(principal_point, (2,)))
-        return _converted("pytorch3d", rows, size_of(function, width, height))
+        return _converted("pytorch3d", (r, t, focal_length, principal_point),
+                          size_of("Camera.from_pytorch3d", width, height))
 
     @classmethod
     def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy, *,
@@ -205,48 +206,38 @@ class Camera(Packed):
         camera_to_world: (4, 4) or (N, 4, 4), transform_matrix. fl_x, fl_y, cx, cy: pixels.
         size: as of Camera.
         """
-        rows = Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
-                     fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
-        return _converted("nerf", rows, known_size("Camera.from_nerf", size))
+        return _converted("nerf", (camera_to_world, fl_x, fl_y, cx, cy),
+                          known_size("Camera.from_nerf", size))
 
     # And back: dictionaries of the arguments of the constructors above.
 
     def to_opencv(self, *, pixel_centre: str = "integer") -> Parts:
         """k, rotation, translation, as from_opencv takes them."""
-        half = is_half("Camera.to_opencv", pixel_centre)
-        return self._parts(_core.camera_to("opencv", self._rows(), half=half), k=(3, 3),
-                           rotation=(3, 3), translation=(3,))
+        return self._parts("opencv", half=is_half("Camera.to_opencv", pixel_centre))
 
     def to_colmap(self) -> Parts:
         """quaternion, translation, fx, fy, cx, cy, as from_colmap takes them."""
-        return self._parts(_core.camera_to("colmap", self._rows()), quaternion=(4,),
-                           translation=(3,), fx=(), fy=(), cx=(), cy=())
+        return self._parts("colmap")
 
     def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
         """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
         near_plane; rendering here has none."""
         size = self._sized("Camera.to_opengl", width, height)
         far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
-        rows = _core.camera_to("opengl", self._rows(), size, far_plane=far_plane)
-        return self._parts(rows, projection=(4, 4), model_view=(4, 4))
+        return self._parts("opengl", size, far_plane=far_plane)
 
     def to_kaolin(self, *, width: int, height: int) -> Parts:
         """rotation, position, projection, as from_kaolin takes them. ValueError if the principal
         point is not the middle of the image."""
-        size = self._sized("Camera.to_kaolin", width, height)
-        return self._parts(_core.camera_to("kaolin", self._rows(), size), rotation=(3, 3),
-                           position=(3,), projection=(3,))
+        return self._parts("kaolin", self._sized("Camera.to_kaolin", width, height))
 
     def to_pytorch3d(self, *, width: int, height: int) -> Parts:
         """r, t, focal_length, principal_point, as from_pytorch3d takes them."""
-        size = self._sized("Camera.to_pytorch3d", width, height)
-        return self._parts(_core.camera_to("pytorch3d", self._rows(), size), r=(3, 3), t=(3,),
-                           focal_length=(2,), principal_point=(2,))
+        return self._parts("pytorch3d", self._sized("Camera.to_pytorch3d", width, height))
 
     def to_nerf(self) -> Parts:
         """camera_to_world, fl_x, fl_y, cx, cy, as from_nerf takes them."""
-        return self._parts(_core.camera_to("nerf", self._rows()), camera_to_world=(4, 4), fl_x=(),
-                           fl_y=(), cx=(), cy=())
+        return self._parts("nerf")
 
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
         """The same view, of an image of width x height pixels, on one of to_width x to_height:
@@ -262,17 +253,21 @@ class Camera(Packed):
     def _rows(self) -> np.ndarray:
         return np.ascontiguousarray(self.numbers, np.float64).reshape(-1, self._SIZE)
 
-    def _parts(self, rows: np.ndarray, **shapes: tuple[int, ...]) -> Parts:
+    def _parts(self, convention: str, *size: Size, **extra: Any) -> Parts:
+        rows = _core.camera_to(convention, self._rows(), *size, **extra)
         lead, first, parts = self.numbers.shape[:-1], 0, {}
-        for name, shape in shapes.items():
+        for name, shape in _CONVENTIONS[convention].items():
             end = first + math.prod(shape)
             parts[name] = rows[:, first:end].reshape(lead + shape)
             first = end
         return parts
 
 
-def _converted(convention: str, rows: Rows, size: Optional[Size], **extra: Any) -> Camera:
+def _converted(convention: str, values: Sequence[Any], size: Optional[Size], **extra: Any) -> Camera:
     """Of another program's numbers."""
+    shapes = _CONVENTIONS[convention]
+    rows = Rows(f"Camera.from_{convention}",
+                **{name: (value, shapes[name]) for name, value in zip(shapes, values)})
     if size is not None:
         extra["size"] = size
     return Camera.of_numbers(

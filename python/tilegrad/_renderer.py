@@ -58,6 +58,19 @@ _OUTPUTS = ("color", "alpha")
 RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
 
 
+class Image:
+    """An image of a frame, if it was rendered: a view of the renderer's memory."""
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, frame: Optional["Frame"], owner: type) -> Any:
+        return self if frame is None else frame._view(self.name)
+
+
 class Frame(Pictured):
     """The images of N scenes, row 0 on top, and what backward needs.
 
@@ -72,40 +85,13 @@ class Frame(Pictured):
         self._frame, self._scenes, self._single, self._outputs = frame, scenes, single, outputs
         self._views: dict[str, np.ndarray] = {}
 
-    @property
-    def color(self) -> np.ndarray:
-        """(N, 3, H, W); 0 at background pixels."""
-        return self._view("color")
-
-    @property
-    def alpha(self) -> np.ndarray:
-        """(N, H, W), 0 to 1; 1 where there is a face."""
-        return self._view("alpha")
-
-    @property
-    def attributes(self) -> np.ndarray:
-        """(N, C, H, W); 0 at background pixels."""
-        return self._view("attributes")
-
-    @property
-    def depth(self) -> np.ndarray:
-        """(N, H, W), world units; +infinity at background pixels."""
-        return self._view("depth")
-
-    @property
-    def normals(self) -> np.ndarray:
-        """(N, 3, H, W), unit, world, as shading uses them; 0 at background pixels."""
-        return self._view("normals")
-
-    @property
-    def uv(self) -> np.ndarray:
-        """(N, 2, H, W); 0 at background pixels."""
-        return self._view("uv")
-
-    @property
-    def barycentrics(self) -> np.ndarray:
-        """(N, 2, H, W), weights of corners 1 and 2 of the face; 0 at background pixels."""
-        return self._view("barycentrics")
+    color = Image("(N, 3, H, W); 0 at background pixels.")
+    alpha = Image("(N, H, W), 0 to 1; 1 where there is a face.")
+    attributes = Image("(N, C, H, W); 0 at background pixels.")
+    depth = Image("(N, H, W), world units; +infinity at background pixels.")
+    normals = Image("(N, 3, H, W), unit, world, as shading uses them; 0 at background pixels.")
+    uv = Image("(N, 2, H, W); 0 at background pixels.")
+    barycentrics = Image("(N, 2, H, W), weights of corners 1 and 2 of the face; 0 at background pixels.")
 
     @property
     def face_ids(self) -> np.ndarray:
