@@ -300,6 +300,15 @@ const BadCall kBadCalls[] = {
     {"options.width is 0", [](auto&, auto& o) { o.width = 0; }},
     {"options.delta is -1", [](auto&, auto& o) { o.delta = -1; }},
     {"options.max_alpha_error is 2", [](auto&, auto& o) { o.max_alpha_error = 2; }},
+    {"scene 1: camera.cy is nan", [](auto& s, auto&) { s.camera.cy = NAN; }},
+    {"scene 1: camera.near_plane is nan", [](auto& s, auto&) { s.camera.near_plane = NAN; }},
+    {"options.delta is nan", [](auto&, auto& o) { o.delta = NAN; }},
+    {"options.max_alpha_error is nan", [](auto&, auto& o) { o.max_alpha_error = NAN; }},
+    {"options.paper_box is -1, must be finite and >= 0",
+     [](auto&, auto& o) {
+       o.alpha_rule = AlphaRule::kPaper;
+       o.paper_box = -1;
+     }},
     {"options.culling is 2", [](auto&, auto& o) { o.culling = static_cast<FaceCulling>(2); }},
 };
 
@@ -317,6 +326,41 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
         << "got: " << status.message() << "\nexpected: " << call.expected;
     EXPECT_EQ(frame.images().width, 0);
   }
+}
+
+// At the first and last place of an array and in the middle: parts of it are looked through by
+// themselves.
+TEST(ApiErrors, NumbersThatAreNoneAreNamedWhereverTheyStand) {
+  TestScene<float> s(Lighting::kNone);
+  Camera& camera = s.scene.camera;
+  std::vector<float> d_alpha(34 * 29), d_attributes(2 * 34 * 29), d_positions(48);
+  const SceneGradients d{.positions = d_positions};
+  Renderer renderer;
+  Frame frame;
+  const auto message = [&] {
+    const Status status = renderer.Render({&s.scene, 1}, kTestOptions, {}, &frame);
+    if (!status.ok()) return status.message();
+    return renderer.Backward(frame, {.alpha = d_alpha, .attributes = d_attributes}, {&d, 1})
+        .message();
+  };
+  const std::pair<std::string, std::span<float>> arrays[] = {
+      {"scene 0: positions", s.positions},
+      {"scene 0: attributes", s.attributes},
+      {"scene 0: camera.rotation", camera.rotation},
+      {"scene 0: camera.translation", camera.translation},
+      {"d_frame.attributes", d_attributes},
+      {"d_frame.alpha", d_alpha}};
+  for (const auto& [name, values] : arrays) {
+    for (const std::size_t i : {std::size_t{0}, values.size() / 2, values.size() - 1}) {
+      for (const float bad : {NAN, INFINITY, -INFINITY}) {
+        const float kept = std::exchange(values[i], bad);
+        EXPECT_NE(message().find(name + "[" + std::to_string(i) + "] is "), std::string::npos)
+            << name << ' ' << i;
+        values[i] = kept;
+      }
+    }
+  }
+  EXPECT_EQ(message(), "");
 }
 
 // Vertices that no face has are packed with the others.
@@ -402,6 +446,15 @@ void ExpectDepthOfBackgroundIsNotRead() {
 TEST(ApiBackward, CotangentsOfDepthAreNotReadAtTheBackground) {
   ExpectDepthOfBackgroundIsNotRead<float>();
   ExpectDepthOfBackgroundIsNotRead<double>();
+}
+
+TEST(ApiErrors, DoubleRefusesWhatFloatCannotHold) {
+  TestScene<double> s(Lighting::kNone);
+  s.positions[4] = 1e300;
+  RendererT<double> renderer;
+  FrameT<double> frame;
+  EXPECT_EQ(renderer.Render({&s.scene, 1}, kTestOptions, {}, &frame).message(),
+            "scene 0: positions[4] is inf");
 }
 
 TEST(ApiErrors, OfTheWayBackAndOfRenderers) {

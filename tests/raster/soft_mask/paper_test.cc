@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The paper's rule against golden numbers of a published implementation (see the README beside
-// them), and against a complex step.
+// The paper's rule by hand and against a complex step. Golden numbers of a published
+// implementation: tests/python/test_kaolin.py, GoldenSoftMask.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,98 +8,8 @@
 
 #include "base/rng.h"
 #include "raster/soft_mask/paper_ref.h"
-#include "support/shared_data.h"
 
 namespace tilegrad::raster::paper_test {
-
-// One image of the vectors: faces, ids and pixel centres in NDC.
-template <class T>
-struct Image {
-  std::vector<NdcFace<T>> faces;
-  Json ids;
-  int width, height;
-
-  Image(const Json& v, std::size_t batch)
-      : ids(v["selected_face_idx"][batch]), width(v["width"]), height(v["height"]) {
-    for (const Json& corners : v["face_vertices_image"][batch]) {
-      NdcFace<T> face;
-      for (std::size_t k = 0; k < 3; ++k) {
-        face.x[k] = T(corners[k][0].get<double>());
-        face.y[k] = T(corners[k][1].get<double>());
-      }
-      faces.push_back(face);
-    }
-  }
-  bool background(int i, int j) const { return ids[i][j].get<int>() < 0; }
-  T X(int j) const { return T(2 * j + 1 - width) / T(width); }
-  T Y(int i) const { return T(height - 2 * i - 1) / T(height); }
-  T Alpha(int i, int j, const PaperSoftMask& rule) const {
-    return background(i, j) ? PaperAlphaRef<T>(faces, X(j), Y(i), rule) : T(1);
-  }
-};
-
-// Per-pixel gradient of the loss of the vectors: 1 - mean over images of sum(ab) / sum(a+b-ab).
-template <class T>
-std::vector<T> IouGradient(const Image<T>& image, const PaperSoftMask& rule, int batch) {
-  T inside = T(0), all = T(1e-10);
-  std::vector<T> target;
-  for (int i = 0; i < image.height; ++i) {
-    for (int j = 0; j < image.width; ++j) {
-      const bool hit = j + 5 < image.width && !image.background(i, j + 5);
-      const T a = image.Alpha(i, j, rule), b = T(hit ? 1 : 0);
-      target.push_back(b);
-      inside += a * b;
-      all += a + b - a * b;
-    }
-  }
-  for (T& b : target) b = -(b * all - inside * (T(1) - b)) / (all * all) / T(batch);
-  return target;
-}
-
-template <class T>
-void CheckCase(const Json& v, const Json& c, double mask_tolerance, double gradient_tolerance) {
-  PaperSoftMask rule;
-  rule.inverse_delta = c["sigmainv"];
-  rule.box = c["boxlen"];
-  rule.max_faces = v["knum"];
-  const auto batch = v["face_vertices_image"].size();
-  double largest = 0;
-  for (const Json& g : c["grad_face_vertices_image_golden"].flatten()) {
-    largest = std::max(largest, std::abs(g.get<double>()));
-  }
-  ASSERT_GT(largest, 0);
-  for (std::size_t b = 0; b < batch; ++b) {
-    const Image<T> image(v, b);
-    std::vector<NdcFace<T>> d_faces(image.faces.size());
-    const auto d_alpha = IouGradient(image, rule, static_cast<int>(batch));
-    for (int i = 0; i < image.height; ++i) {
-      for (int j = 0; j < image.width; ++j) {
-        EXPECT_NEAR(image.Alpha(i, j, rule), c["soft_mask_golden"][b][i][j].get<double>(),
-                    mask_tolerance);
-        if (!image.background(i, j)) continue;
-        PaperAlphaRefBackward<T>(image.faces, image.X(j), image.Y(i), rule,
-                                 d_alpha[static_cast<std::size_t>(i * image.width + j)], d_faces);
-      }
-    }
-    for (std::size_t f = 0; f < d_faces.size(); ++f) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Json& golden = c["grad_face_vertices_image_golden"][b][f][k];
-        EXPECT_NEAR(d_faces[f].x[k], golden[0].get<double>(), gradient_tolerance * largest);
-        EXPECT_NEAR(d_faces[f].y[k], golden[1].get<double>(), gradient_tolerance * largest);
-      }
-    }
-  }
-}
-
-TEST(SoftMaskPaper, GoldenNumbers) {
-  TILEGRAD_VECTORS_OR_SKIP(vectors, "01_dibr_soft_mask_simple.json");
-  ASSERT_EQ(vectors["cases"].size(), 4u);
-  for (const Json& c : vectors["cases"]) {
-    SCOPED_TRACE("sigmainv " + c["sigmainv"].dump() + " boxlen " + c["boxlen"].dump());
-    CheckCase<double>(vectors, c, 1e-10, 1e-8);
-    CheckCase<float>(vectors, c, 1e-5, 1e-3);
-  }
-}
 
 // At most as many faces as the box admits, in order: the second face cannot matter.
 TEST(SoftMaskPaper, TakesTheFirstFacesOnly) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // AlphaRule::kPaper through the Renderer: the reference in double, and that it is what it says it
 // is (cut off, and dependent on the order of the faces). Golden numbers:
-// raster/soft_mask/paper_test.cc.
+// tests/python/test_kaolin.py.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -133,22 +133,6 @@ TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
     most = std::max(most, std::abs(static_cast<double>(forward.alpha()[i] - backward.alpha()[i])));
   }
   EXPECT_GT(most, 0.1);
-}
-
-TEST(PaperAlpha, BadOptionsAndGradientsAreErrors) {
-  RenderOptions options = PaperOptions();
-  Rng rng(7);
-  Drawn drawn(test::TriangleSoup(3, 0.2, options.width, options.height, &rng), options);
-  std::vector<float> d_alpha(drawn.alpha().size()), d_positions(drawn.mesh.positions.size());
-  d_alpha[3] = std::numeric_limits<float>::quiet_NaN();
-  const SceneGradients d{.positions = d_positions};
-  Renderer renderer;
-  EXPECT_EQ(renderer.Backward(drawn.frame, {.alpha = d_alpha}, {&d, 1}).message(),
-            "d_frame.alpha[3] is nan");
-  options.paper_box = -1;
-  const Scene view = drawn.mesh.View();
-  EXPECT_EQ(renderer.Render({&view, 1}, options, {}, &drawn.frame).message(),
-            "options.paper_box is -1, must be finite and >= 0");
 }
 
 }  // namespace tilegrad::paper_test

@@ -155,19 +155,4 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
   }
 }
 
-TEST(Topologies, AnIndexOutOfRangeIsNamedAndForgotten) {
-  Pool pool;
-  const Workers workers(1);
-  Renderer renderer = RendererOn(workers);
-  Frame frame;
-  const std::string before = Bytes(&renderer, pool.Views({0, 1, 3}));
-  const std::int32_t good = std::exchange(pool.faces[2][7], 1 << 20);
-  const Status status = renderer.Render(pool.Views({0, 1, 3}), Options(), {}, &frame);
-  ASSERT_FALSE(status.ok());
-  EXPECT_NE(status.message().find("faces"), std::string::npos) << status.message();
-  EXPECT_NE(status.message().find('7'), std::string::npos) << status.message();
-  pool.faces[2][7] = good;
-  EXPECT_TRUE(Bytes(&renderer, pool.Views({0, 1, 3})) == before);
-}
-
 }  // namespace tilegrad::topologies_test
