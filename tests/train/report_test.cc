@@ -53,9 +53,8 @@ class ReportTest : public TempFolderTest {
     job.config.schedule.steps = 3;
     job.data = data;
     job.run = job_.run = folder_ / "run";
-    const auto trained = Train(
-        job, workers_, [](const Progress&) {}, stop_);
-    EXPECT_TRUE(trained.ok()) << trained.status().message();
+    const auto trained = Ok(Train(
+        job, workers_, [](const Progress&) {}, stop_));
     job_.data = data;
     job_.out = folder_ / "page.html";
   }
@@ -65,8 +64,7 @@ class ReportTest : public TempFolderTest {
         job_, workers_, [](const Progress&) {}, stop_);
   }
   std::string Page() {
-    const auto summary = Make();
-    EXPECT_TRUE(summary.ok()) << summary.status().message();
+    const auto summary = Ok(Make());
     return summary.ok() ? ReadText(job_.out).value() : "";
   }
   void Evaluate(double own) { ASSERT_TRUE(WriteEvaluation(job_.run, Scores(own)).ok()); }

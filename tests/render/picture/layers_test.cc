@@ -11,6 +11,7 @@
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/picture.h"
 #include "scene/camera.h"
+#include "support/expect.h"
 
 namespace tilegrad::layers_test {
 
@@ -69,8 +70,7 @@ class Layers : public testing::Test {
     request.cover = made.cover();
     const Workers workers(1);
     Picture picture;
-    const Status status = PictureRenderer(workers).Render(scene, request, &picture);
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(PictureRenderer(workers).Render(scene, request, &picture));
     return picture;
   }
   static glm::vec4 At(const Picture& p, int x, int y) {
@@ -211,16 +211,14 @@ TEST_F(Layers, SoftAlphaKnowsNoHoles) {
 TEST_F(Layers, DatasetsCutMasksOutAndDrawGlassOpaque) {
   AddWall(1, Glass(kRed, 0.25f), &mesh_);
   LitRenderer renderer;
-  auto glass = renderer.RenderStraight(mesh_, FromAbove(), kSize);
-  ASSERT_TRUE(glass.ok());
+  auto glass = Ok(renderer.RenderStraight(mesh_, FromAbove(), kSize));
   EXPECT_EQ(glass->at(4, 4)[3], 255);
   AddAlphaTexture({0, 255}, &mesh_);
   mesh_.materials[0].base_color_texture = 0;
   mesh_.materials[0].nearest = true;
   mesh_.materials[0].base_color.a = 1;
   mesh_.materials[0].alpha_mode = AlphaMode::kMask;
-  const auto cut = renderer.RenderStraight(mesh_, FromAbove(), kSize);
-  ASSERT_TRUE(cut.ok());
+  const auto cut = Ok(renderer.RenderStraight(mesh_, FromAbove(), kSize));
   EXPECT_EQ(cut->at(1, 4)[3], 0);
   EXPECT_EQ(cut->at(6, 4)[3], 255);
 }

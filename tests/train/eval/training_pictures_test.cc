@@ -133,8 +133,7 @@ TEST_F(TrainingPicturesTest, WhatCannotBeFramedIsLeftOut) {
   picture_ = opaque;
   const TrainingPictures none = Make(2);
   EXPECT_EQ(none.count(), 4);
-  const auto match = none.Nearest(Stripes());
-  ASSERT_TRUE(match.ok());
+  const auto match = Ok(none.Nearest(Stripes()));
   EXPECT_FALSE(*match);
 }
 
@@ -156,8 +155,7 @@ TEST_F(TrainingPicturesTest, ReadsWhatItWrote) {
 }
 
 TEST_F(TrainingPicturesTest, RunsOfEarlierVersionsHaveNoneAndBrokenOnesAreErrors) {
-  const auto none = TrainingPictures::Read(folder_ / "old");
-  ASSERT_TRUE(none.ok()) << none.status().message();
+  const auto none = Ok(TrainingPictures::Read(folder_ / "old"));
   EXPECT_FALSE(*none);
   ASSERT_TRUE(Make(8).Write(folder_ / "run").ok());
   const Bytes whole = ReadFile(folder_ / "run/thumbnails.npz").value();

@@ -23,19 +23,16 @@ class PaperConfigs : public TempFolderTest {
     RunOn(data, name, std::move(settings));
   }
   void RunOn(const Path& data, const std::string& name, std::vector<std::string> settings = {}) {
-    auto config = FindConfig(name);
-    ASSERT_TRUE(config.ok()) << config.status().message();
+    auto config = Ok(FindConfig(name));
     settings.insert(settings.end(), {"schedule.steps=20", "schedule.batch=2"});
-    const Status set = OverrideFields(settings, config->Fields());
-    ASSERT_TRUE(set.ok()) << set.message();
+    Ok(OverrideFields(settings, config->Fields()));
     TrainJob job;
     job.config = std::move(*config);
     job.data = data;
     job.run = folder_ / "runs" / name;
     const Workers workers(2);
     const StopFlag stop = false;
-    const auto outcome = Train(job, workers, {}, stop);
-    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    const auto outcome = Ok(Train(job, workers, {}, stop));
     EXPECT_EQ(outcome->last_step, 20);
   }
   std::string Of(const std::string& key, const std::string& run) const {

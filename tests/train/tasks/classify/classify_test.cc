@@ -80,10 +80,7 @@ Status WriteColored(const Path& folder, const std::vector<std::string>& classes)
 
 class ClassifyTest : public TempFolderTest {
  protected:
-  void SetUp() override {
-    const Status written = WriteColored(folder_ / "data", {"blue", "green", "red"});
-    ASSERT_TRUE(written.ok()) << written.message();
-  }
+  void SetUp() override { Ok(WriteColored(folder_ / "data", {"blue", "green", "red"})); }
   Result<RunOutcome> TrainIn(const Path& run, int workers, const StopFlag& stop,
                              const ProgressSink& progress = kSilent) {
     TrainJob job;
@@ -94,13 +91,11 @@ class ClassifyTest : public TempFolderTest {
     return Train(job, Workers(workers), progress, stop);
   }
   Path Trained() {
-    const auto outcome = TrainIn(folder_ / "run", 2, stop_);
-    EXPECT_TRUE(outcome.ok()) << outcome.status().message();
+    const auto outcome = Ok(TrainIn(folder_ / "run", 2, stop_));
     return folder_ / "run";
   }
   std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    EXPECT_TRUE(found.ok()) << found.status().message();
+    auto found = Ok(LoadNewestCheckpoint(context_, folder_ / run));
     return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
   }
 
@@ -117,8 +112,7 @@ TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
     stop = p.stage == "training" && ++seen > 20;
   });
   EXPECT_EQ(part.status().code(), StatusCode::kCancelled);
-  const auto rest = TrainIn(folder_ / "parts", 3, stop_);
-  ASSERT_TRUE(rest.ok()) << rest.status().message();
+  const auto rest = Ok(TrainIn(folder_ / "parts", 3, stop_));
   EXPECT_GT(rest->first_step, 0);
   const auto left = Final("whole"), right = Final("parts");
   ASSERT_EQ(left.size(), right.size());
@@ -134,12 +128,10 @@ TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
 TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   const Path run = Trained();
   EXPECT_TRUE(std::filesystem::exists(run / "samples" / "step_00000060.png"));
-  const auto log = ReadLog(run);
-  ASSERT_TRUE(log.ok());
+  const auto log = Ok(ReadLog(run));
   EXPECT_LT(log->back().values[0].second, 0.7 * log->front().values[0].second);
 
-  const auto predictor = Predictor::Load(run, workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const auto predictor = Ok(Predictor::Load(run, workers_));
   EXPECT_TRUE(predictor->template_mesh().positions.empty());
   ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * kSize * kSize)).status(),
                 "predicts no meshes");
@@ -150,8 +142,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   EXPECT_NEAR(evaluation->rows[0].mean.main(), 1.0 / 3, 1e-12);
   EXPECT_GT(evaluation->rows[2].mean.main(), 0.9);
   ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
-  const auto back = ReadEvaluation(run);
-  ASSERT_TRUE(back.ok()) << back.status().message();
+  const auto back = Ok(ReadEvaluation(run));
   EXPECT_EQ((*back)->rows[2].mean.accuracy, evaluation->rows[2].mean.accuracy);
   EXPECT_EQ(ReadText(run / "eval.json")->find("\"iou\""), std::string::npos);
   const std::string table = FormatTable(*evaluation);
@@ -160,8 +151,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   EXPECT_EQ(table.find("IoU"), std::string::npos) << table;
 
   const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
-  const auto report = WriteReport(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(report.ok()) << report.status().message();
+  const auto report = Ok(WriteReport(job, workers_, kSilent, stop_));
   const std::string page = ReadText(job.out).value();
   for (const char* part :
        {"to tell what an object is", "a mean accuracy of", "nearest training picture",
@@ -172,8 +162,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
 
 TEST_F(ClassifyTest, OtherClassesAreRefused) {
   const Path run = Trained();
-  const auto predictor = Predictor::Load(run, workers_);
-  ASSERT_TRUE(predictor.ok());
+  const auto predictor = Ok(Predictor::Load(run, workers_));
   ASSERT_TRUE(WriteColored(folder_ / "other", {"blue", "red"}).ok());
   std::filesystem::remove(run / "training_models.txt");  // which would be refused before
   ExpectMessage(predictor->task()
@@ -223,8 +212,7 @@ TEST_F(ClassifyTest, PicturesAreMovedAndMirrored) {
 TEST_F(ClassifyTest, ServesAPerceptualLoss) {
   const Path run = Trained();
   nn::Context context(workers_, nn::DType::kF64);  // whatever the run was trained in
-  const auto features = LoadPerceptualNetwork(context, {.file = run, .first_level = 1});
-  ASSERT_TRUE(features.ok()) << features.status().message();
+  const auto features = Ok(LoadPerceptualNetwork(context, {.file = run, .first_level = 1}));
   Rng rng(1);
   nn::Tensor numbers = context.Empty({2, 3, 16, 16});
   nn::FillUniform(numbers, rng, 0, 1);
@@ -272,8 +260,7 @@ TEST_F(ClassifyTest, PerceptualNetworkFromSafetensors) {
   }
   const Path file = folder_ / "narrow.safetensors";
   ASSERT_TRUE(nn::WriteSafetensors(file, {weights, {}}).ok());
-  const auto features = LoadPerceptualNetwork(context_, {.kind = "vgg16", .file = file});
-  ASSERT_TRUE(features.ok()) << features.status().message();
+  const auto features = Ok(LoadPerceptualNetwork(context_, {.kind = "vgg16", .file = file}));
   const nn::Var images = nn::Constant(context_, context_.Full({1, 3, 64, 64}, 0.5));
   EXPECT_EQ((*features)(images).size(), 5u);
   EXPECT_TRUE(context_.status().ok());

@@ -24,15 +24,13 @@ class GanTaskTest : public TempFolderTest {
     EXPECT_TRUE(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes).ok());
   }
   void TrainTextures() {
-    auto config = ParseConfig(kTinyTextured, "tiny.toml");
-    ASSERT_TRUE(config.ok()) << config.status().message();
+    auto config = Ok(ParseConfig(kTinyTextured, "tiny.toml"));
     ValueOf<std::int64_t>(*config, "schedule.steps") = 2;
     TrainJob job;
     job.config = std::move(*config);
     job.data = folder_ / "data";
     job.run = folder_ / "textured";
-    const auto outcome = Train(job, workers_, kSilent, stop_);
-    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    const auto outcome = Ok(Train(job, workers_, kSilent, stop_));
   }
   struct Job {
     std::string run;
@@ -56,8 +54,7 @@ class GanTaskTest : public TempFolderTest {
     return Train(job, Workers(at.workers), watch, stop);
   }
   std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    EXPECT_TRUE(found.ok()) << found.status().message();
+    auto found = Ok(LoadNewestCheckpoint(context_, folder_ / run));
     if (!found.ok()) return {};
     EXPECT_EQ(found->checkpoint.info.step, 12);
     return std::move(found->checkpoint.tensors);
@@ -79,14 +76,12 @@ void ExpectSameBits(const std::vector<nn::NamedTensor>& a, const std::vector<nn:
 
 TEST_F(GanTaskTest, StoppedInEachStageAndContinuedEndsInTheSameBits) {
   ASSERT_NO_FATAL_FAILURE(TrainTextures());
-  const auto whole = TrainGan({"whole"});
-  ASSERT_TRUE(whole.ok()) << whole.status().message();
+  const auto whole = Ok(TrainGan({"whole"}));
   const auto first = TrainGan({.run = "stopped", .workers = 1, .stop_at = 4});
   EXPECT_EQ(first.status().code(), StatusCode::kCancelled) << first.status().message();
   const auto second = TrainGan({.run = "stopped", .workers = 2, .stop_at = 9});
   EXPECT_EQ(second.status().code(), StatusCode::kCancelled) << second.status().message();
-  const auto continued = TrainGan({.run = "stopped", .workers = 1});
-  ASSERT_TRUE(continued.ok()) << continued.status().message();
+  const auto continued = Ok(TrainGan({.run = "stopped", .workers = 1}));
   EXPECT_GE(continued->first_step, 9);
   ExpectSameBits(Final("whole"), Final("stopped"));
   const auto a = ReadLog(folder_ / "whole"), b = ReadLog(folder_ / "stopped");
@@ -109,8 +104,7 @@ TEST_F(GanTaskTest, ShapesLearnFirstAndThenStay) {
   ASSERT_NO_FATAL_FAILURE(TrainTextures());
   ASSERT_TRUE(TrainGan({.run = "shape", .settings = {"schedule.steps=6"}}).ok());
   ASSERT_TRUE(TrainGan({"both"}).ok());
-  const auto shape = LoadNewestCheckpoint(context_, folder_ / "shape");
-  ASSERT_TRUE(shape.ok());
+  const auto shape = Ok(LoadNewestCheckpoint(context_, folder_ / "shape"));
   const auto both = Final("both");
   int compared = 0, moved = 0;
   for (const nn::NamedTensor& tensor : shape->checkpoint.tensors) {
@@ -161,14 +155,12 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   std::vector<std::vector<Mesh>> made;
   for (const int count : {1, 2}) {
     const Workers workers(count);
-    const auto predictor = Predictor::Load(run, workers);
-    ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+    const auto predictor = Ok(Predictor::Load(run, workers));
     auto& model = *predictor->model().generator();
     EXPECT_TRUE(model.textured());
     std::vector<float> codes = model.Code(5, 0);
     for (const float x : model.Code(5, 1)) codes.push_back(x);
-    auto meshes = model.Generate(codes);
-    ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+    auto meshes = Ok(model.Generate(codes));
     ASSERT_EQ(meshes->size(), 2u);
     made.push_back(std::move(*meshes));
     ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * 32 * 32)).status(),
@@ -180,8 +172,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   EXPECT_EQ(made[0][0].textures[0].image.width, 32);
 
   const ReportJob page{run, folder_ / "data", folder_ / "page.html", 2};
-  const auto report = WriteReport(page, workers_, kSilent, stop_);
-  ASSERT_TRUE(report.ok()) << report.status().message();
+  const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
   const std::string text = ReadText(page.out).value();
   for (const char* part :
        {"to make textured objects from noise", "Wasserstein estimate", "sample 1 from behind",

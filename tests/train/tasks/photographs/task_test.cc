@@ -83,11 +83,9 @@ TEST_F(PhotographsTask, LearnsShapesThatTheMeanShapeIsNot) {
                .data = "bars",
                .smoothing = 2});
     ASSERT_TRUE(trained.ok()) << trained.status().message();
-    const auto predictor = Predictor::Load(run, workers_);
-    ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+    const auto predictor = Ok(Predictor::Load(run, workers_));
     const TaskEvaluation job{.run = run, .data = folder_ / "bars", .predictor = *predictor};
-    const auto evaluation = predictor->task().Evaluate(job, workers_, kSilent, stop_);
-    ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
     scores[deforms ? 1 : 0] = evaluation->rows[2].mean;
   }
   EXPECT_GT(*scores[1].pck, *scores[0].pck + 0.05);
@@ -97,22 +95,18 @@ TEST_F(PhotographsTask, LearnsShapesThatTheMeanShapeIsNot) {
 TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
   for (const char* texture : {"direct", "flow"}) {
     const Path run = folder_ / texture;
-    const auto trained = Train(texture, {.more = std::string("[loss]\nmask = 2\n") +
-                                                 (texture[0] == 'f' ? "color_moves = false\n" : ""),
-                                         .steps = 60});
-    ASSERT_TRUE(trained.ok()) << trained.status().message();
-    const auto log = ReadLog(run);
-    ASSERT_TRUE(log.ok());
+    const auto trained =
+        Ok(Train(texture, {.more = std::string("[loss]\nmask = 2\n") +
+                                   (texture[0] == 'f' ? "color_moves = false\n" : ""),
+                           .steps = 60}));
+    const auto log = Ok(ReadLog(run));
     EXPECT_LT(log->back().values[0].second, log->front().values[0].second);
-    const auto predictor = Predictor::Load(run, workers_);
-    ASSERT_TRUE(predictor.ok()) << predictor.status().message();
-    const auto meshes = predictor->Predict(std::vector<std::uint8_t>(4 * 16 * 16, 128));
-    ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+    const auto predictor = Ok(Predictor::Load(run, workers_));
+    const auto meshes = Ok(predictor->Predict(std::vector<std::uint8_t>(4 * 16 * 16, 128)));
     EXPECT_EQ((*meshes)[0].textures[0].image.width, 32);
 
     const TaskEvaluation job{.run = run, .data = folder_ / "cub", .predictor = *predictor};
-    const auto evaluation = predictor->task().Evaluate(job, workers_, kSilent, stop_);
-    ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
     ASSERT_EQ(evaluation->rows.size(), 3u);
     const Score& ours = evaluation->rows[2].mean;
     EXPECT_GT(*ours.pck, 0.1);  // of 60 steps; LearnsShapesThatTheMeanShapeIsNot learns longer
@@ -129,8 +123,7 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
     EXPECT_EQ((*read)->rows[2].mean.pck, ours.pck);
 
     const ReportJob page{run, folder_ / "cub", folder_ / "page.html", 2};
-    const auto report = WriteReport(page, workers_, kSilent, stop_);
-    ASSERT_TRUE(report.ok()) << report.status().message();
+    const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
     const std::string text = ReadText(page.out).value();
     for (const char* part : {"from one photograph", "10 photographs, one of each object",
                              "2D IoU loss", "Cotangent Laplacian"})
@@ -148,10 +141,8 @@ TEST_F(PhotographsTask, SeveralAzimuthsFindTheCamera) {
   job.config.schedule.steps = 500;
   job.data = folder_ / "cub";
   job.run = folder_ / "eight";
-  const auto trained = train::Train(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(trained.ok()) << trained.status().message();
-  const auto log = ReadLog(job.run);
-  ASSERT_TRUE(log.ok());
+  const auto trained = Ok(train::Train(job, workers_, kSilent, stop_));
+  const auto log = Ok(ReadLog(job.run));
   // Mean over 50 steps from one on.
   const auto azimuth = [&](std::size_t from) {
     double sum = 0;
@@ -163,12 +154,10 @@ TEST_F(PhotographsTask, SeveralAzimuthsFindTheCamera) {
   ASSERT_EQ(log->size(), 500u);
   EXPECT_NEAR(azimuth(0), std::log(8.0), 0.2);  // all alike
   EXPECT_LT(azimuth(450), 0.6 * std::log(8.0));
-  const auto predictor = Predictor::Load(job.run, workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const auto predictor = Ok(Predictor::Load(job.run, workers_));
   const TaskEvaluation evaluation{
       .run = job.run, .data = job.data, .predictor = *predictor, .split = Split::kTrain};
-  const auto scores = predictor->task().Evaluate(evaluation, workers_, kSilent, stop_);
-  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_));
   EXPECT_EQ(scores->rows.size(), 3u);  // nobody knows where the bars' keypoints truly are
 }
 
@@ -194,12 +183,10 @@ TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
   }
   ASSERT_TRUE(WriteCmrLayout(folder_ / "cub", set).ok());
   ASSERT_TRUE(Train("run", {}).ok());
-  const auto predictor = Predictor::Load(folder_ / "run", workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const auto predictor = Ok(Predictor::Load(folder_ / "run", workers_));
   const TaskEvaluation job{
       .run = folder_ / "run", .data = folder_ / "cub", .predictor = *predictor};
-  const auto scores = predictor->task().Evaluate(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  const auto scores = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
   ASSERT_EQ(scores->rows.size(), 4u);
   EXPECT_EQ(scores->rows[0].method, "true keypoints");
   EXPECT_EQ(scores->rows[0].mean.pck, 1);
@@ -241,16 +228,14 @@ TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
 
 TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
   WriteMiniature(folder_ / "p3d", "pascal3d");
-  const auto trained = Train("p3d_run", {.data = "p3d"});
-  ASSERT_TRUE(trained.ok()) << trained.status().message();
+  const auto trained = Ok(Train("p3d_run", {.data = "p3d"}));
   std::string config = TinyConfig();
   config.replace(config.find("size = 16"), 9, "size = 16\ncamera = \"predicted\"");
   TrainJob job;
   job.config = ParseConfig(config, "tiny.toml").value();
   job.data = folder_ / "p3d";
   job.run = folder_ / "camera";
-  const auto outcome = train::Train(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
 }
 
 TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
@@ -270,8 +255,7 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   ASSERT_TRUE(Train("d", {}).ok());
   WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
   ExpectMessage(Train("d", {.steps = 20}).status(), "other photographs");
-  const auto predictor = Predictor::Load(folder_ / "d", workers_);
-  ASSERT_TRUE(predictor.ok());
+  const auto predictor = Ok(Predictor::Load(folder_ / "d", workers_));
   const TaskEvaluation evaluation{
       .run = folder_ / "d", .data = folder_ / "cub", .predictor = *predictor};
   ExpectMessage(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_).status(),
@@ -384,11 +368,9 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
 TEST(PhotographConfigs, AreRead) {
   for (const char* file : {"birds", "cars_photos", "photographs_cmr"}) {
     const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
-    const auto config = ParseConfig(ReadText(path).value(), path.string());
-    ASSERT_TRUE(config.ok()) << config.status().message();
+    const auto config = Ok(ParseConfig(ReadText(path).value(), path.string()));
     EXPECT_EQ(config->name, file);
-    auto copy = ParseConfig(WriteConfig(*config), "its own text");
-    EXPECT_TRUE(copy.ok()) << copy.status().message();
+    auto copy = Ok(ParseConfig(WriteConfig(*config), "its own text"));
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "support/expect.h"
 #include "train/terms.h"
 
 namespace tilegrad::train::textured_image_step_test {
@@ -53,11 +54,9 @@ struct SmallProblem {
 
   explicit SmallProblem(const TexturedImageConfig& c)
       : config(c), stream(JobOf(c), meshes, workers), step(context, c, kSize) {
-    auto drawn = RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 6);
-    EXPECT_TRUE(drawn.ok()) << drawn.status().message();
+    auto drawn = Ok(RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 6));
     batch = std::move(*drawn);
-    auto made = Adversary::Make(context, c.adversary, 5);
-    EXPECT_TRUE(made.ok()) << made.status().message();
+    auto made = Ok(Adversary::Make(context, c.adversary, 5));
     adversary = std::move(*made);
     step.SetAdversary(adversary.get());
   }
@@ -195,8 +194,7 @@ TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
     SmallProblem p(config);
     p.LossNow();
     StepValues values;
-    const auto gradients = p.adversary->CriticGradients({2, 0}, &values);
-    ASSERT_TRUE(gradients.ok()) << gradients.status().message();
+    const auto gradients = Ok(p.adversary->CriticGradients({2, 0}, &values));
     const auto loss = [&] {
       StepValues now;
       EXPECT_TRUE(p.adversary->CriticGradients({2, 0}, &now).ok());

@@ -25,14 +25,12 @@ class TexturedTask : public TempFolderTest {
   Path run_ = folder_ / "run";  // that Train makes
   void Train(const std::string& more) {
     TrainJob job;
-    auto config = ParseConfig(std::string(kTinyTextured) + more, "tiny.toml");
-    ASSERT_TRUE(config.ok()) << config.status().message();
+    auto config = Ok(ParseConfig(std::string(kTinyTextured) + more, "tiny.toml"));
     job.config = std::move(*config);
     ValueOf<std::int64_t>(job.config, "schedule.steps") = 12;
     job.data = folder_ / "data";
     job.run = run_;
-    const auto outcome = train::Train(job, workers_, kSilent, stop_);
-    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
     EXPECT_TRUE(outcome->finished);
   }
 
@@ -45,17 +43,14 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   const Path run = folder_ / "run", data = folder_ / "data";
   EXPECT_TRUE(std::filesystem::exists(run / "stream.png"));
   EXPECT_TRUE(std::filesystem::exists(run / "samples" / "step_00000010.png"));
-  const auto predictor = Predictor::Load(run, workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
-  const auto meshes = predictor->Predict(std::vector<std::uint8_t>(4 * 32 * 32, 128));
-  ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+  const auto predictor = Ok(Predictor::Load(run, workers_));
+  const auto meshes = Ok(predictor->Predict(std::vector<std::uint8_t>(4 * 32 * 32, 128)));
   ASSERT_EQ((*meshes)[0].textures.size(), 1u);
   EXPECT_EQ((*meshes)[0].textures[0].image.width, 64);
   EXPECT_EQ((*meshes)[0].corner_uvs.size(), 3 * (*meshes)[0].faces.size());
 
   const TaskEvaluation job{.run = run, .data = data, .predictor = *predictor, .views_per_model = 3};
-  const auto evaluation = predictor->task().Evaluate(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
   ASSERT_EQ(evaluation->rows.size(), 7u);
   const Score &dark = evaluation->rows[0].mean, &mean = evaluation->rows[1].mean,
               &ours = evaluation->rows[6].mean;
@@ -78,8 +73,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   EXPECT_EQ((*read)->rows[6].mean.light_angle, ours.light_angle);
 
   const ReportJob page{run, data, folder_ / "page.html", 2};
-  const auto report = WriteReport(page, workers_, kSilent, stop_);
-  ASSERT_TRUE(report.ok()) << report.status().message();
+  const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
   const std::string text = ReadText(page.out).value();
   for (const char* part : {"to predict shape, texture and light", "texture + light L1",
                            "true light", "another view", "Angle of the light"}) {
@@ -95,14 +89,11 @@ TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
   ValueOf<std::int64_t>(job.config, "schedule.steps") = 4;
   job.data = folder_ / "data";
   job.run = run_;
-  const auto outcome = train::Train(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
-  const auto predictor = Predictor::Load(run_, workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
+  const auto predictor = Ok(Predictor::Load(run_, workers_));
   const TaskEvaluation evaluation{
       .run = run_, .data = folder_ / "data", .predictor = *predictor, .views_per_model = 2};
-  const auto scores = predictor->task().Evaluate(evaluation, workers_, kSilent, stop_);
-  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_));
   EXPECT_EQ(scores->rows.size(), 7u);
 }
 
@@ -121,14 +112,12 @@ TEST_F(TexturedTask, RulesThatDrawNoTexturesAreErrors) {
 
 TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
   ASSERT_NO_FATAL_FAILURE(Train("[light]\nmodel = \"none\"\n"));
-  const auto predictor = Predictor::Load(folder_ / "run", workers_);
-  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const auto predictor = Ok(Predictor::Load(folder_ / "run", workers_));
   const TaskEvaluation job{.run = folder_ / "run",
                            .data = folder_ / "data",
                            .predictor = *predictor,
                            .views_per_model = 2};
-  const auto evaluation = predictor->task().Evaluate(job, workers_, kSilent, stop_);
-  ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
   ASSERT_EQ(evaluation->rows.size(), 1u);
   EXPECT_FALSE(evaluation->rows[0].mean.light_angle);
 }
@@ -158,8 +147,7 @@ TEST_F(TexturedTask, StartsAsTheNetworkOfAnotherRun) {
     critic += tensor.name.starts_with("critic.adam.m") ? 1 : 0;
   EXPECT_GT(same, 20);
   EXPECT_EQ(critic, 6);  // weights and biases of two halvings and the scores
-  const auto log = ReadLog(run_);
-  ASSERT_TRUE(log.ok());
+  const auto log = Ok(ReadLog(run_));
   std::string names;
   for (const auto& value : log->back().values) names += value.first + " ";
   EXPECT_NE(names.find("adversarial "), std::string::npos) << names;
@@ -183,11 +171,9 @@ TEST(TexturedConfigs, AreRead) {
                                    {"texture_paper", 256},
                                    {"texture_adversarial_paper", 256}}) {
     const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
-    const auto config = ParseConfig(ReadText(path).value(), path.string());
-    ASSERT_TRUE(config.ok()) << config.status().message();
+    const auto config = Ok(ParseConfig(ReadText(path).value(), path.string()));
     EXPECT_EQ(config->name, file);
-    auto copy = ParseConfig(WriteConfig(*config), "its own text");
-    ASSERT_TRUE(copy.ok()) << copy.status().message();
+    auto copy = Ok(ParseConfig(WriteConfig(*config), "its own text"));
     const std::int64_t levels = ValueOf<std::int64_t>(*copy, "network.levels");
     EXPECT_TRUE(CheckImageSize({.levels = levels}, size).ok());
   }
