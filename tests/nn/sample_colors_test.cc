@@ -162,13 +162,4 @@ TEST(SampleColors, ExtremesStayFinite) {
   for (const double x : reference.gradient) EXPECT_TRUE(std::isfinite(x));
 }
 
-TEST(SampleColors, BitsDoNotDependOnWorkers) {
-  const OpResult one = RunOp(DType::kF32, RandomFlows(), 1);
-  for (const int workers : {2, 5}) {
-    const OpResult more = RunOp(DType::kF32, RandomFlows(), workers);
-    EXPECT_EQ(one.colors, more.colors);
-    EXPECT_EQ(one.gradient, more.gradient);
-  }
-}
-
 }  // namespace tilegrad::nn::sample_colors_test

@@ -17,18 +17,6 @@ SMALL = {"width": 5, "height": 4}
 BARE = {"uvs": None, "per_corner": (), "textures": None, "surfaces": None, "face_surfaces": None}
 
 
-class Nothing(unittest.TestCase):
-    def test_uv_of_a_scene_without_is_background(self):
-        for dtype in (np.float32, np.float64):
-            renderer = Renderer(threads=1)
-            renderer.render(patch(dtype), outputs=ALL, **SMALL)  # whose memory the frame gets
-            frame = renderer.render(patch(dtype, "none", **BARE), outputs=("uv", "depth"), **IMAGE)
-            self.assertEqual(frame.uv.shape, (1, 2, 29, 34))
-            self.assertFalse(frame.uv.any())
-            frame.shared("uv")[:] = 1  # memory of its own
-            self.assertTrue((frame.uv == 1).all())
-
-
 class NoImages(unittest.TestCase):
     WRT = ("positions", "camera", "colors", "uvs", "textures", "surfaces", "attributes")
 

@@ -97,27 +97,6 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
   }
 }
 
-TEST(CameraParameters, GiveARotationAndComeBack) {
-  const Camera camera = OrbitCamera({}, 25, 40, 3);
-  const auto back = Ok(CameraFromParameters(ParametersOf(camera), camera.near_plane));
-  for (int i = 0; i < 9; ++i) EXPECT_NEAR(back->rotation[i], camera.rotation[i], 2e-7);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(back->translation[i], camera.translation[i]);
-  EXPECT_EQ(back->fx, camera.fx);
-}
-
-TEST(CameraParameters, PullBackIsTheReference) {
-  CameraParameters p = ParametersOf(OrbitCamera({}, 25, 40, 3));
-  p.rotation[4] += 0.25f;
-  Camera d_camera;
-  for (int i = 0; i < 9; ++i) d_camera.rotation[i] = static_cast<float>(i) - 3;
-  d_camera.fx = 7;
-  CameraParameters expected;
-  const CameraParameters d = PullBack(p, d_camera);
-  CameraFromParametersAdjointRef(p, d_camera, &expected);
-  for (int i = 0; i < 6; ++i) EXPECT_NEAR(d.rotation[i], expected.rotation[i], 1e-5);
-  EXPECT_EQ(d.fx, 7);
-}
-
 TEST(CameraParameters, WhatGivesNoRotationIsRefused) {
   CameraParameters p{.rotation = {1, 2, 3, 2, 4, 6}};
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "parallel");

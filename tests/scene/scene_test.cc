@@ -210,24 +210,6 @@ TEST(Camera, LookAtEqualsOrbit) {
   EXPECT_NEAR(orbit.fx, 32 * 2.1875, 1e-4);  // f = 35/16
 }
 
-// A few roundings of numbers up to 3.
-TEST(Camera, OfDoubleHasTheDigitsOfDouble) {
-  const Camera64 orbit = OrbitCamera<double>(Lens{}, 30, 20, 2);
-  const double eye[3] = {0.1 + 2 * orbit.rotation[6], 0.2 + 2 * orbit.rotation[7],
-                         0.3 + 2 * orbit.rotation[8]};
-  const double target[3] = {0.1, 0.2, 0.3}, up[3] = {0, 1, 0};
-  const Camera64 look = LookAtCamera(Lens{}, eye, target, up);
-  for (int i = 0; i < 9; ++i) EXPECT_NEAR(look.rotation[i], orbit.rotation[i], 2e-15);
-  for (int r = 0; r < 3; ++r) {
-    const double* row = look.rotation + 3 * r;
-    const double seen = row[0] * target[0] + row[1] * target[1] + row[2] * target[2];
-    EXPECT_NEAR(seen + look.translation[r], r == 2 ? -2 : 0, 2e-15);
-    EXPECT_NEAR(row[0] * row[0] + row[1] * row[1] + row[2] * row[2], 1, 1e-15);
-  }
-  EXPECT_NEAR(look.fx, 32 / std::tan(Lens{}.fov_y * M_PI / 360), 1e-13);
-  EXPECT_EQ(look.near_plane, 0.01);
-}
-
 // However short the way to the target and `up` are, they have directions.
 TEST(Camera, LooksFromAnyDistance) {
   for (const double scale : {1e-300, 1e-170, 1.0, 1e170, 1e300}) {
