@@ -31,8 +31,7 @@
 #include <string>
 #include <vector>
 
-#include "api/fingerprint_cases.h"
-#include "api/fingerprint_scenes.h"
+#include "api/variants.h"
 #include "support/source_dir.h"
 
 namespace tilegrad::test::fingerprint_test {
@@ -63,6 +62,10 @@ class Hashes {
   template <class T>
   void Add(const std::string& name, std::span<const T> values) {
     if (!values.empty()) arrays_[name].Add(values);
+  }
+  template <class T>
+  void AddAll(const NamedNumbers<T>& numbers) {
+    for (const auto& [name, values] : numbers) Add(name, std::span<const T>(values));
   }
   // Of all arrays, and their names.
   std::string Text() const {
@@ -103,7 +106,7 @@ struct Table {
   }
   void Write() const {
     std::ofstream file(kFile);
-    file << "# Hashes of the bits of images and gradients of the cases of fingerprint_cases.h, by "
+    file << "# Hashes of the bits of images and gradients of the variants of variants.h, by "
             "target;\n# \"double\" is the scalar reference, - none. Written by "
             "fingerprint_test.cc: a change needs a\n# reason in the commit message.\ncase";
     for (const std::string& target : targets) file << ' ' << target;
@@ -121,78 +124,34 @@ struct Table {
   }
 };
 
-template <class T>
-void AddImages(const ImagesT<T>& images, Hashes* hashes) {
-  hashes->Add("face_ids", images.face_ids);
-  hashes->Add("color", images.color);
-  hashes->Add("alpha", images.alpha);
-  hashes->Add("attributes", images.attributes);
-  hashes->Add("depth", images.depth);
-  hashes->Add("normals", images.normals);
-  hashes->Add("uv", images.uv);
-  hashes->Add("barycentrics", images.barycentrics);
-  if (images.alpha.empty()) return;
-  hashes->Add("alpha_error_bound", std::span<const double>(&images.alpha_error_bound, 1));
-}
-
-// Gradients for each scene of a batch, or one set that all of them share.
-template <class T>
-class BatchGradients {
- public:
-  BatchGradients(const Case& c, std::span<const SceneT<T>> scenes) {
-    for (const SceneT<T>& scene : scenes) {
-      if (owners_.empty() || !c.one_mesh) {
-        owners_.push_back(std::make_unique<WantedGradients<T>>(c, scene));
-      }
-      views_.push_back(owners_.back()->view());
-    }
-  }
-  std::span<const SceneGradientsT<T>> views() const { return views_; }
-  void AddTo(Hashes* hashes) const {
-    for (const auto& owner : owners_) {
-      owner->ForEach([&](const std::string& name, std::span<const T> numbers) {
-        hashes->Add("d_" + name, numbers);
-      });
-    }
-  }
-
- private:
-  std::vector<std::unique_ptr<WantedGradients<T>>> owners_;
-  std::vector<SceneGradientsT<T>> views_;
-};
-
 using Fingerprint = std::map<std::string, std::string>;  // rows of a target
 
+// A small image; or three of several bins and bands, of one mesh from three sides.
 template <class T>
-Fingerprint RunCase(const Case& c, RendererT<T>* renderer, FrameT<T>* frame) {
-  const TestBatch<T> batch(c);
-  Hashes images, d_scenes;
-  const Status rendered = renderer->Render(batch.scenes, c.options, c.outputs, frame);
-  EXPECT_TRUE(rendered.ok()) << c.name << ": " << rendered.message();
-  AddImages(frame->images(), &images);
-  const PulledImages<T> pulled(c, frame->images());
-  const BatchGradients<T> gradients(c, batch.scenes);
-  const Status pulled_back = renderer->Backward(*frame, pulled.view, gradients.views(), c.mode);
-  EXPECT_TRUE(pulled_back.ok()) << c.name << ": " << pulled_back.message();
-  gradients.AddTo(&d_scenes);
-  return {{c.name + "/images", images.Text()}, {c.name + "/gradients", d_scenes.Text()}};
+std::string RunCase(const Variant& variant, bool large, RendererT<T>* renderer, FrameT<T>* frame) {
+  VariantScene<T> v(variant);
+  std::vector<SceneT<T>> scenes(large ? 3 : 1, v.s.scene);
+  for (std::size_t n = 0; n < scenes.size() && large; ++n) {
+    scenes[n].camera.fx = scenes[n].camera.fy = T(160);
+    scenes[n].camera.cx = T(90 + 10 * static_cast<int>(n));
+    scenes[n].camera.cy = T(80);
+    v.options.width = 180;
+    v.options.height = 160;
+    v.options.culling = FaceCulling::kBack;
+  }
+  Hashes hashes;
+  hashes.AddAll(NumbersOf<T>(v, scenes, renderer, frame));
+  hashes.Add("face_ids", frame->images().face_ids);
+  hashes.Add("alpha_error_bound", std::span<const double>(&frame->images().alpha_error_bound, 1));
+  return hashes.Text();
 }
 
 template <class T>
-Fingerprint RunAlone(const Case& c) {
-  RendererT<T> renderer({.threads = 1});
-  FrameT<T> frame;
-  return RunCase(c, &renderer, &frame);
+Fingerprint RunAll(const Variant& variant, int threads, FrameT<T>* frame) {
+  RendererT<T> renderer({.threads = threads});
+  return {{variant.name, RunCase(variant, false, &renderer, frame)},
+          {variant.name + "/large", RunCase(variant, true, &renderer, frame)}};
 }
-
-// Has two threads, and has rendered the cases before: what they left behind may not matter either.
-template <class T>
-struct Reused {
-  RendererT<T> renderer{{.threads = 2}};
-  FrameT<T> frame;
-
-  Fingerprint Run(const Case& c) { return RunCase(c, &renderer, &frame); }
-};
 
 // Of the C library, not of tilegrad.
 std::string HashOfLibm() {
@@ -254,24 +213,17 @@ class ApiFingerprint : public testing::TestWithParam<std::string> {
     }
   }
 
-  void CheckEngine() {
-    Reused<float> reused;
-    for (const Case& c : kFingerprintCases) {
-      const Fingerprint alone = RunAlone<float>(c);
-      EXPECT_EQ(alone, reused.Run(c)) << "bits on " << target_ << " depend on threads";
+  // With one thread and a frame that is new, and with two and one that was used before: neither may
+  // matter.
+  template <class T>
+  void CheckAll() {
+    FrameT<T> used;
+    for (const Variant& variant : kVariants) {
+      FrameT<T> fresh;
+      const Fingerprint alone = RunAll(variant, 1, &fresh);
+      EXPECT_EQ(alone, RunAll(variant, 2, &used)) << "bits on " << target_ << " depend on threads";
       Check(alone);
     }
-  }
-
-  // Which is slow: every other case with two threads.
-  void CheckReference() {
-    Reused<double> reused;
-    bool two_threads = false;
-    for (const Case& c : kFingerprintCases) {
-      Check(two_threads ? reused.Run(c) : RunAlone<double>(c));
-      two_threads = !two_threads;
-    }
-    Check({{"libm", HashOfLibm()}});
   }
 
   const std::string target_ = GetParam();
@@ -284,7 +236,9 @@ TEST_P(ApiFingerprint, BitsAreThoseOfTheFile) {
     GTEST_SKIP() << why;
   }
   if (Writing() && !table_.Has(target_)) table_.targets.push_back(target_);
-  target_ == kReference ? CheckReference() : CheckEngine();
+  if (target_ != kReference) return CheckAll<float>();
+  CheckAll<double>();
+  Check({{"libm", HashOfLibm()}});
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, ApiFingerprint, testing::ValuesIn(Targets()),
