@@ -3,7 +3,7 @@
 # Scenes by `tilegrad render` and by three.js in headless Chromium, side by side in pictures to be looked at: those of Debian's
 # assimp-testmodels (viewer.png), and small ones of our own about alpha, textures, skins and the axis that is up (cases.png). Wants the packages
 # assimp-testmodels, libjs-three and chromium.
-#   tests/viewer/compare.sh [PROGRAM [FOLDER]]
+#   bench/viewer/compare.sh [PROGRAM [FOLDER]]
 set -euo pipefail
 readonly HERE=$(cd "$(dirname "$0")" && pwd)
 readonly PROGRAM=$(realpath "${1:-$HERE/../../build/release/src/cli/tilegrad}")
