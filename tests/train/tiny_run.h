@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdlib>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -133,43 +134,61 @@ T& ValueOf(TrainConfig& config, const std::string& key) {
 
 enum class Meshes { kNone, kBoxes };
 
-inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone, int classes = 1,
-                                int size = 32) {
-  constexpr int kModels = 12, kViews = 4;
+// Models of all classes in turn, four views each.
+struct NoiseData {
+  Meshes meshes = Meshes::kNone;
+  std::vector<std::string> classes = {"noise"};
+  int size = 32, train = 10, test = 2;
+  // Paints a byte of a channel, 0 to 3, of a picture of a class.
+  std::function<int(int class_index, int channel, Rng& rng)> paint = [](int, int, Rng& rng) {
+    return static_cast<int>(rng.Below(256));
+  };
+};
+
+inline Status WriteNoiseData(const Path& folder, const NoiseData& noise) {
+  constexpr int kViews = 4;
   DatasetInfo info;
-  info.source = meshes == Meshes::kNone ? "nmr" : "folder";
-  info.image_size = info.camera.lens.width = info.camera.lens.height = size;
+  info.source = noise.meshes == Meshes::kNone ? "nmr" : "folder";
+  info.image_size = info.camera.lens.width = info.camera.lens.height = noise.size;
   info.views = kViews;
-  for (int c = 0; c < classes; ++c)
-    info.classes.push_back("noise" + (c > 0 ? std::to_string(c) : std::string()));
+  info.classes = noise.classes;
   info.recipe = "0000000000000000";
+  const auto pixels = static_cast<std::size_t>(noise.size * noise.size);
   ModelData data;
-  data.images.resize(std::size_t{kViews} * 4 * static_cast<std::size_t>(size * size));
+  data.images.resize(kViews * 4 * pixels);
   data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
                         kOccupancyResolution);
-  if (meshes == Meshes::kBoxes) {
+  if (noise.meshes == Meshes::kBoxes) {
     data.mesh = Box(glm::vec3(0), {0.9f, 0.4f, 0.6f});
     data.mesh.colors.assign(data.mesh.positions.size(), {0.8f, 0.3f, 0.2f, 1.0f});
     data.points.resize(kTruthPoints);
   }
   std::vector<ModelInfo> models;
   Rng rng(3);
-  for (int m = 0; m < kModels; ++m) {
+  for (int m = 0; m < noise.train + noise.test; ++m) {
     ModelInfo model;
     model.id = model.name = "m" + std::to_string(m);
-    model.class_index = m % classes;
-    model.split = m < 10 ? Split::kTrain : Split::kTest;
-    for (std::uint8_t& byte : data.images) byte = static_cast<std::uint8_t>(rng.Below(256));
+    model.class_index = m % static_cast<int>(noise.classes.size());
+    model.split = m < noise.train ? Split::kTrain : Split::kTest;
+    for (std::size_t i = 0; i < data.images.size(); ++i) {
+      const int channel = static_cast<int>(i / pixels) % 4;
+      data.images[i] = static_cast<std::uint8_t>(noise.paint(model.class_index, channel, rng));
+    }
     const Path file =
         ModelFilePath(folder, info.classes[static_cast<std::size_t>(model.class_index)], model.id);
     std::filesystem::create_directories(file.parent_path());
-    if (Status status = SaveModelFile(file, info, data, {info.recipe, 0, 0}); !status.ok()) {
-      return status;
-    }
+    TILEGRAD_TRY(SaveModelFile(file, info, data, {info.recipe, 0, 0}));
     models.push_back(model);
   }
-  if (Status status = WriteDatasetInfo(folder, info); !status.ok()) return status;
+  TILEGRAD_TRY(WriteDatasetInfo(folder, info));
   return WriteModels(folder, info, models);
+}
+
+inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone, int classes = 1,
+                                int size = 32) {
+  NoiseData noise{.meshes = meshes, .size = size};
+  for (int c = 1; c < classes; ++c) noise.classes.push_back("noise" + std::to_string(c));
+  return WriteNoiseData(folder, noise);
 }
 
 }  // namespace tilegrad::train

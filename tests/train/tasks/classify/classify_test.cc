@@ -13,6 +13,7 @@
 #include "train/predictor.h"
 #include "train/report/report.h"
 #include "train/run/log.h"
+#include "train/same_run.h"
 #include "train/tasks/classify/perceptual_network.h"
 #include "train/tasks/classify/pictures.h"
 #include "train/tiny_run.h"
@@ -35,47 +36,22 @@ log_every = 1
 sample_every = 30
 checkpoint_every = 7
 )";
-constexpr int kSize = 16, kViews = 4;
+constexpr int kSize = 16;
 const ProgressSink kSilent = [](const Progress&) {};
 
 // Noise with more red, green or blue in it, by class.
-void Paint(int class_index, Rng& rng, std::vector<std::uint8_t>* images) {
-  images->resize(std::size_t{kViews} * 4 * kSize * kSize);
-  for (std::size_t i = 0; i < images->size(); ++i) {
-    const auto channel = static_cast<int>(i / (kSize * kSize)) % 4;
-    (*images)[i] = static_cast<std::uint8_t>(rng.Below(150) + (channel == class_index ? 70 : 0));
-    if (channel == 3) (*images)[i] = 255;
-  }
-}
-
 Status WriteColored(const Path& folder, const std::vector<std::string>& classes) {
-  DatasetInfo info;
-  info.source = "folder";
-  info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
-  info.views = kViews;
-  info.classes = classes;
-  info.recipe = "0000000000000000";
-  ModelData data;
-  data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
-                        kOccupancyResolution);
-  data.mesh = Box(glm::vec3(0), {0.9f, 0.4f, 0.6f});
-  data.points.resize(kTruthPoints);
-  std::vector<ModelInfo> models;
-  Rng rng(3);
-  for (int m = 0; m < 7 * static_cast<int>(classes.size()); ++m) {
-    ModelInfo model;
-    model.id = model.name = "m" + std::to_string(m);
-    model.class_index = m % static_cast<int>(classes.size());
-    model.split = m < 5 * static_cast<int>(classes.size()) ? Split::kTrain : Split::kTest;
-    Paint(model.class_index, rng, &data.images);
-    const Path file =
-        ModelFilePath(folder, classes[static_cast<std::size_t>(model.class_index)], model.id);
-    std::filesystem::create_directories(file.parent_path());
-    TILEGRAD_TRY(SaveModelFile(file, info, data, {info.recipe, 0, 0}));
-    models.push_back(model);
-  }
-  TILEGRAD_TRY(WriteDatasetInfo(folder, info));
-  return WriteModels(folder, info, models);
+  const int count = static_cast<int>(classes.size());
+  return WriteNoiseData(folder, {.meshes = Meshes::kBoxes,
+                                 .classes = classes,
+                                 .size = kSize,
+                                 .train = 5 * count,
+                                 .test = 2 * count,
+                                 .paint = [](int class_index, int channel, Rng& rng) {
+                                   const auto noise = static_cast<int>(rng.Below(150));
+                                   return channel == 3 ? 255
+                                                       : noise + (channel == class_index ? 70 : 0);
+                                 }});
 }
 
 class ClassifyTest : public TempFolderTest {
@@ -94,11 +70,6 @@ class ClassifyTest : public TempFolderTest {
     const auto outcome = Ok(TrainIn(folder_ / "run", 2, stop_));
     return folder_ / "run";
   }
-  std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = Ok(LoadNewestCheckpoint(context_, folder_ / run));
-    return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
-  }
-
   Workers workers_{2};
   nn::Context context_{workers_};
   StopFlag stop_ = false;
@@ -114,15 +85,7 @@ TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
   EXPECT_EQ(part.status().code(), StatusCode::kCancelled);
   const auto rest = Ok(TrainIn(folder_ / "parts", 3, stop_));
   EXPECT_GT(rest->first_step, 0);
-  const auto left = Final("whole"), right = Final("parts");
-  ASSERT_EQ(left.size(), right.size());
-  ASSERT_FALSE(left.empty());
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    EXPECT_EQ(left[i].name, right[i].name);
-    ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
-    EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
-        << left[i].name;
-  }
+  ExpectSameBits(context_, folder_ / "whole", folder_ / "parts", 60);
 }
 
 TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
