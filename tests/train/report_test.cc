@@ -120,15 +120,6 @@ TEST_F(ReportTest, DataParsesAndHoldsCurvesAndMeshes) {
   EXPECT_TRUE(json["models"][0]["truth"].is_null());  // this dataset has no meshes
 }
 
-TEST_F(ReportTest, TextOfFilesStaysText) {
-  Evaluate(0.6);
-  const std::string page = Page();
-  EXPECT_EQ(Count(page, "<b onclick"), 0);
-  EXPECT_EQ(Count(page, "</script>"), 2);  // the page's own
-  // Name of the run in title and heading; name, creator and licence of the model in the credits.
-  EXPECT_GE(Count(page, "&lt;/script&gt;&lt;b onclick=&quot;x&quot;&gt;&amp;&#39;"), 6);
-}
-
 TEST_F(ReportTest, DrawsTheModelsInOnePicture) {
   job_.sheet = folder_ / "sheet.png";
   const auto summary = Ok(Make());
