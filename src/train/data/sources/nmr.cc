@@ -62,6 +62,7 @@ class Nmr : public ModelSource {
  public:
   Status Add(NmrPart part) {
     TILEGRAD_ASSIGN(const io::NpyArray voxels, LoadVoxels(part));
+    if (voxels.shape[0] == 0) ignored_.push_back({part.voxels.string(), "holds no model"});
     for (std::size_t i = 0; i < voxels.shape[0]; ++i) {
       const std::string id = fmt::format("{}-{:05}", SplitName(part.split), i);
       entries_.push_back({part.class_name,
@@ -85,6 +86,7 @@ class Nmr : public ModelSource {
     return {"Renders of ShapeNetCore models by Kato et al. (Neural 3D Mesh Renderer, 2018)."};
   }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
+  std::vector<IgnoredFile> ignored() const override { return ignored_; }
 
   std::optional<DatasetInfo> FixedInfo() const override {
     DatasetInfo info;
@@ -131,6 +133,7 @@ class Nmr : public ModelSource {
 
   std::vector<NmrPart> parts_;
   std::vector<SourceEntry> entries_;
+  std::vector<IgnoredFile> ignored_;
   std::map<std::pair<std::string, std::string>, std::pair<std::size_t, std::size_t>> places_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const Arrays> cached_;

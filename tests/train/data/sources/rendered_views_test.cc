@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/binvox.h"
+#include "io/npz.h"
 #include "render/picture/mesh_pictures.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
@@ -232,6 +233,27 @@ TEST_F(BrokenMembersOfSets, Dibr) {
   std::filesystem::remove(Set() / models[7].synset / models[7].id / "7.npy");
   std::filesystem::create_directories(Set() / "04256520");
   ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "7.png", "7.npy");
+}
+
+// Pictures of nothing, and a class without models.
+TEST_F(BrokenMembersOfSets, Nmr) {
+  WriteNmr(Set(), MiniatureModels(0.5f));
+  const Path file = Set() / "03001627_train_images.npz";
+  io::NpzArrays arrays = Ok(io::LoadNpz(file)).value();
+  Bytes& images = arrays["arr_0"].data;
+  std::fill_n(images.begin(), images.size() / 4, std::uint8_t{0});  // the first of four
+  Ok(io::SaveNpz(file, arrays));
+  const std::vector<std::uint8_t> none;
+  Ok(io::SaveNpz(Set() / "04256520_val_voxels.npz",
+                 {{"arr_0", io::MakeNpy<std::uint8_t>({0, 32, 32, 32}, none)}}));
+  Ok(io::SaveNpz(Set() / "04256520_val_images.npz",
+                 {{"arr_0", io::MakeNpy<std::uint8_t>({0, 24, 4, 64, 64}, none)}}));
+  const Source source = Ok(NmrSource(Set())).value();
+  ExpectMessage(Build(source).status(), "1 of 10 cannot be used, more than 1 %: chair/train-00000");
+  const auto summary = Ok(Build(source, true));
+  EXPECT_EQ(summary->models.size(), 9u);
+  ASSERT_EQ(summary->ignored.size(), 1u);
+  ExpectIn(summary->ignored[0].file, "04256520_val");
 }
 
 // A header of another scale than the renders: no cameras are better than wrong ones.
