@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/serialize.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -19,7 +21,6 @@ namespace tilegrad::nn {
 namespace {
 
 using Json = nlohmann::json;
-using OrderedJson = nlohmann::ordered_json;  // slow to search: only for writing
 
 constexpr std::size_t kLengthBytes = 8;
 constexpr std::size_t kMaxHeader = 100u << 20;  // the format's own limit
@@ -220,11 +221,16 @@ Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
 
 namespace {
 
-// Appends a member to a JSON object that begins with `text`. An ordered object of the JSON library
-// would look through all members for each new one.
-void AppendMember(const std::string& name, const OrderedJson& value, std::string* text) {
+void AppendMember(const std::string& name, const std::string& json, std::string* text) {
   if (text->size() > 1) *text += ',';
-  *text += OrderedJson(name).dump() + ':' + value.dump();
+  *text += Json(name).dump() + ':' + json;
+}
+
+std::string EntryJson(const Tensor& value, std::size_t begin, std::size_t end) {
+  std::vector<std::int64_t> extents;
+  for (int axis = 0; axis < value.shape().rank(); ++axis) extents.push_back(value.shape()[axis]);
+  return fmt::format(R"({{"dtype":"{}","shape":[{}],"data_offsets":[{},{}]}})",
+                     NameOf(value.dtype()), fmt::join(extents, ","), begin, end);
 }
 
 }  // namespace
@@ -236,7 +242,7 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
     }
   }
   std::string text = "{";
-  if (!file.metadata.empty()) AppendMember(kMetadata, file.metadata, &text);
+  if (!file.metadata.empty()) AppendMember(kMetadata, Json(file.metadata).dump(), &text);
   std::unordered_set<std::string> names = {kMetadata};
   std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
@@ -244,16 +250,8 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
       return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
     }
     if (!IsUtf8(t.name)) return InvalidArgument("safetensors: a tensor's name is not UTF-8");
-    OrderedJson extents = OrderedJson::array();
-    for (int axis = 0; axis < t.value.shape().rank(); ++axis) {
-      extents.push_back(static_cast<std::uint64_t>(t.value.shape()[axis]));
-    }
     const std::size_t begin = std::exchange(end, end + t.value.bytes());
-    AppendMember(t.name,
-                 {{"dtype", NameOf(t.value.dtype())},
-                  {"shape", std::move(extents)},
-                  {"data_offsets", {begin, end}}},
-                 &text);
+    AppendMember(t.name, EntryJson(t.value, begin, end), &text);
   }
   text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned

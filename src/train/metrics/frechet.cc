@@ -1,51 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/metrics/frechet.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <vector>
 
+#include "base/dense.h"
 #include "base/error.h"
 
 namespace tilegrad::train {
 namespace {
 
 struct NormalFit {
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
+  std::vector<double> mean, covariance;
 };
 
 NormalFit NormalFitOf(const FeatureRows& rows) {
-  const auto n = static_cast<Eigen::Index>(rows.rows()), d = static_cast<Eigen::Index>(rows.width);
-  using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Eigen::MatrixXd x = Eigen::Map<const RowMajor>(rows.values.data(), n, d).cast<double>();
-  NormalFit out;
-  out.mean = x.colwise().mean();
-  x.rowwise() -= out.mean.transpose();
-  out.covariance = x.transpose() * x / static_cast<double>(n - 1);
+  const std::size_t n = rows.rows(), d = rows.width;
+  NormalFit out{std::vector<double>(d), std::vector<double>(d * d)};
+  for (std::size_t r = 0; r < n; ++r)
+    for (std::size_t i = 0; i < d; ++i) out.mean[i] += static_cast<double>(rows.Row(r)[i]);
+  for (double& mean : out.mean) mean /= static_cast<double>(n);
+  std::vector<double> x(d);
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t i = 0; i < d; ++i) x[i] = static_cast<double>(rows.Row(r)[i]) - out.mean[i];
+    for (std::size_t i = 0; i < d; ++i)
+      for (std::size_t j = 0; j < d; ++j) out.covariance[i * d + j] += x[i] * x[j];
+  }
+  for (double& c : out.covariance) c /= static_cast<double>(n - 1);
   return out;
 }
 
 // The eigenvalues of a covariance that rounding has left below 0 are 0.
-Eigen::VectorXd Roots(const Eigen::VectorXd& eigenvalues) {
-  return eigenvalues.cwiseMax(0.0).cwiseSqrt();
+double Root(double eigenvalue) { return std::sqrt(std::max(eigenvalue, 0.0)); }
+
+double Trace(const std::vector<double>& a, std::size_t n) {
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i) sum += a[i * (n + 1)];
+  return sum;
 }
 
 // tr (a b)^(1/2) = tr (s b s)^(1/2) with s = a^(1/2): symmetric, so that no complex numbers come
 // up.
-Result<double> TraceOfRoot(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of_a(a);
-  if (of_a.info() != Eigen::Success)
-    return InternalError("Frechet distance: no eigenvalues of a covariance were found");
-  const Eigen::MatrixXd s = of_a.eigenvectors() * Roots(of_a.eigenvalues()).asDiagonal() *
-                            of_a.eigenvectors().transpose();
-  const Eigen::MatrixXd product = s * b * s;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of_product(
-      0.5 * (product + product.transpose()), Eigen::EigenvaluesOnly);
-  if (of_product.info() != Eigen::Success)
+Result<double> TraceOfRoot(const std::vector<double>& a, const std::vector<double>& b,
+                           std::size_t n) {
+  const auto of_a = SymmetricEigenpairs(a);
+  if (!of_a) return InternalError("Frechet distance: no eigenvalues of a covariance were found");
+  const std::vector<double> s = FunctionOf(*of_a, Root);
+  const auto of_product = SymmetricEigenpairs(Product(Product(s, b, n), s, n));
+  if (!of_product)
     return InternalError("Frechet distance: no eigenvalues of a product of covariances were found");
-  return Roots(of_product.eigenvalues()).sum();
+  double sum = 0;
+  for (const double value : of_product->values) sum += Root(value);
+  return sum;
+}
+
+double SquaredDistance(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return sum;
 }
 
 double Kernel(std::span<const float> x, std::span<const float> y) {
@@ -72,9 +86,9 @@ double KernelSum(const FeatureRows& a, const FeatureRows& b, const Workers& work
 Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b) {
   TILEGRAD_TRY(CheckPair(a, b, 2, "Frechet distance"));
   const NormalFit p = NormalFitOf(a), q = NormalFitOf(b);
-  TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance));
-  const double distance =
-      (p.mean - q.mean).squaredNorm() + p.covariance.trace() + q.covariance.trace() - 2 * root;
+  TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance, a.width));
+  const double distance = SquaredDistance(p.mean, q.mean) + Trace(p.covariance, a.width) +
+                          Trace(q.covariance, a.width) - 2 * root;
   return std::max(distance, 0.0);
 }
 

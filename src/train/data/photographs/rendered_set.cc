@@ -1,23 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/rendered_set.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <mutex>
 
+#include "base/dense.h"
 #include "base/error.h"
 #include "io/image_file.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/picture.h"
 #include "scene/shapes.h"
+#include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/cmr_writer.h"
 #include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/factorization.h"
+#include "train/data/photographs/points3.h"
 
 namespace tilegrad::train {
 namespace {
+
+using points3::Dot, points3::Point, points3::operator+, points3::operator-, points3::operator*;
 
 constexpr int kWidth = 208, kHeight = 160, kSide = 144;       // pixels; the object's square
 constexpr double kStretch = 0.15, kFov = 30, kHidden = 0.03;  // world units behind what is seen
@@ -189,28 +193,72 @@ Status FindCameras(PhotographSet* set) {
   return {};
 }
 
-using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic>;
+// x -> scale * rotation * x + shift.
+struct Similarity {
+  Mat3Array rotation{};
+  double scale = 1;
+  Point shift{};
 
-PointColumns MatrixOf(const std::vector<std::array<double, 3>>& points) {
-  PointColumns out(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t k = 0; k < points.size(); ++k)
-    out.col(static_cast<Eigen::Index>(k)) = Eigen::Vector3d(points[k].data());
+  Point operator()(const Point& x) const { return scale * weak_ref::Rotate(rotation, x) + shift; }
+};
+
+Point MeanOf(const std::vector<Point>& points) {
+  Point sum{};
+  for (const Point& p : points) sum = sum + p;
+  return (1 / static_cast<double>(points.size())) * sum;
+}
+
+// The rotation that turns `from` towards `to`, both about their means, in least squares (Horn,
+// "Closed-form solution of absolute orientation using unit quaternions", 1987).
+Mat3Array RotationBetween(const std::vector<Point>& from, const std::vector<Point>& to) {
+  const Point a_mean = MeanOf(from), b_mean = MeanOf(to);
+  double s[3][3] = {};
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    const Point a = from[k] - a_mean, b = to[k] - b_mean;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) s[i][j] += a[i] * b[j];
+  }
+  const double x = s[0][0], y = s[1][1], z = s[2][2];
+  const double yz = s[1][2] - s[2][1], zx = s[2][0] - s[0][2], xy = s[0][1] - s[1][0];
+  const double yz2 = s[1][2] + s[2][1], zx2 = s[2][0] + s[0][2], xy2 = s[0][1] + s[1][0];
+  const auto parts = SymmetricEigenpairs(std::array{x + y + z, yz, zx, xy,     //
+                                                    yz, x - y - z, xy2, zx2,   //
+                                                    zx, xy2, -x + y - z, yz2,  //
+                                                    xy, zx2, yz2, -x - y + z});
+  if (!parts) return Mat3Array{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double* const q = &parts->vectors[12];
+  return RotationOf(std::array{q[0], q[1], q[2], q[3]});
+}
+
+Similarity SimilarityBetween(const std::vector<Point>& from, const std::vector<Point>& to) {
+  Similarity out{.rotation = RotationBetween(from, to)};
+  const Point a_mean = MeanOf(from), b_mean = MeanOf(to);
+  double along = 0, squares = 0;
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    const Point a = from[k] - a_mean;
+    along += Dot(to[k] - b_mean, weak_ref::Rotate(out.rotation, a));
+    squares += Dot(a, a);
+  }
+  out.scale = along / squares;
+  out.shift = b_mean - out.scale * weak_ref::Rotate(out.rotation, a_mean);
   return out;
 }
 
 // From the world of the models to that of the cameras, by the means of keypoints in both.
-Eigen::Matrix4d WorldOfCameras(const PhotographSet& set) {
-  PointColumns mean = PointColumns::Zero(3, static_cast<Eigen::Index>(set.mean_keypoints.size()));
+Similarity WorldOfCameras(const PhotographSet& set) {
+  std::vector<Point> mean(set.mean_keypoints.size());
   const std::vector<int> train = set.Select(Split::kTrain);
-  for (const int i : train)
-    mean += MatrixOf(set.photographs[static_cast<std::size_t>(i)].points) /
-            static_cast<double>(train.size());
-  return Eigen::umeyama(mean, MatrixOf(set.mean_keypoints));
+  for (const int i : train) {
+    const std::vector<Point>& points = set.photographs[static_cast<std::size_t>(i)].points;
+    for (std::size_t k = 0; k < mean.size(); ++k)
+      mean[k] = mean[k] + (1 / static_cast<double>(train.size())) * points[k];
+  }
+  return SimilarityBetween(mean, set.mean_keypoints);
 }
 
 // Of the test part alone: nothing else knows the models.
 void TellTruth(PhotographSet* set) {
-  const Eigen::Matrix4d to_cameras = WorldOfCameras(*set);
+  const Similarity to_cameras = WorldOfCameras(*set);
   for (Photograph& photo : set->photographs) {
     if (photo.split != Split::kTest) {
       photo.points.clear();
@@ -218,10 +266,7 @@ void TellTruth(PhotographSet* set) {
     }
     std::vector<Keypoint> all = photo.keypoints;
     for (std::size_t k = 0; k < all.size(); ++k) {
-      const Eigen::Vector3d place =
-          to_cameras.topLeftCorner<3, 3>() * Eigen::Vector3d(photo.points[k].data()) +
-          to_cameras.topRightCorner<3, 1>();
-      photo.points[k] = {place[0], place[1], place[2]};
+      photo.points[k] = to_cameras(photo.points[k]);
       all[k].visible = true;
     }
     photo.camera = FitWeakCamera(photo.points, all, *photo.camera);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/rigid_motion.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "base/dense.h"
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
@@ -27,17 +26,9 @@ struct Motion {
   std::array<double, 2> shift{};
 };
 
-Eigen::Map<const Eigen::Vector3d> VectorOf(const Point& p) {
-  return Eigen::Map<const Eigen::Vector3d>(p.data());
-}
-
-// x of a x = b with a symmetric and positive definite; zeros where it is not.
-template <int N>
-Eigen::Vector<double, N> SolvePositive(const Eigen::Matrix<double, N, N>& a,
-                                       const Eigen::Vector<double, N>& b) {
-  const Eigen::LLT<Eigen::Matrix<double, N, N>> root(a);
-  if (root.info() != Eigen::Success) return Eigen::Vector<double, N>::Zero();
-  return root.solve(b);
+// Zeros where the equations have no single solution.
+std::vector<double> SolutionOf(const NormalEquations& equations) {
+  return equations.Solve().value_or(std::vector<double>(equations.b.size()));
 }
 
 struct Affine {
@@ -48,21 +39,19 @@ struct Affine {
 
 // Of one view: [S 1] -> x and y by least squares.
 Motion FitMotion(const std::vector<Point>& shape, const std::vector<Keypoint>& view) {
-  Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d b[2] = {Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+  NormalEquations coordinates[2] = {NormalEquations(4), NormalEquations(4)};
   double weight = 0;
   for (std::size_t k = 0; k < shape.size(); ++k) {
     if (!view[k].visible) continue;
-    const Eigen::Vector4d row(shape[k][0], shape[k][1], shape[k][2], 1);
-    a += row * row.transpose();
-    b[0] += row * view[k].x;
-    b[1] += row * view[k].y;
+    const std::array<double, 4> row = {shape[k][0], shape[k][1], shape[k][2], 1};
+    coordinates[0].Add(row, view[k].x);
+    coordinates[1].Add(row, view[k].y);
     weight += 1;
   }
-  a.diagonal().array() += kRidge * weight;
   Motion out;
   for (std::size_t r = 0; r < 2; ++r) {
-    const Eigen::Vector4d x = SolvePositive<4>(a, b[r]);
+    for (std::size_t i = 0; i < 4; ++i) coordinates[r].Diagonal(i) += kRidge * weight;
+    const std::vector<double> x = SolutionOf(coordinates[r]);
     out.rows[r] = {x[0], x[1], x[2]};
     out.shift[r] = x[3];
   }
@@ -71,18 +60,16 @@ Motion FitMotion(const std::vector<Point>& shape, const std::vector<Keypoint>& v
 
 // Of one keypoint, over all views that see it. Stays where none does.
 void FitPoint(const std::vector<Motion>& motions, const Views& views, std::size_t k, Point* point) {
-  Eigen::Matrix3d a = 1e-9 * Eigen::Matrix3d::Identity();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  NormalEquations equations(3);
+  for (std::size_t i = 0; i < 3; ++i) equations.Diagonal(i) = 1e-9;
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (!views[v][k].visible) continue;
     for (std::size_t r = 0; r < 2; ++r) {
       const double want = (r == 0 ? views[v][k].x : views[v][k].y) - motions[v].shift[r];
-      const auto row = VectorOf(motions[v].rows[r]);
-      a += row * row.transpose();
-      b += row * want;
+      equations.Add(motions[v].rows[r], want);
     }
   }
-  const Eigen::Vector3d x = SolvePositive<3>(a, b);
+  const std::vector<double> x = SolutionOf(equations);
   *point = {x[0], x[1], x[2]};
 }
 
@@ -117,47 +104,67 @@ Affine Alternate(const Views& views, std::uint64_t seed) {
 }
 
 // a Q b as a row over the six numbers of a symmetric Q.
-Eigen::Vector<double, 6> QuadraticRow(const Point& a, const Point& b) {
+using Row6 = std::array<double, 6>;
+Row6 QuadraticRow(const Point& a, const Point& b) {
   return {a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[2] * b[0],
           a[1] * b[1], a[1] * b[2] + a[2] * b[1], a[2] * b[2]};
 }
 
-// A 3 x 3 map after which the two rows of each motion are as long as each other and orthogonal, as
-// well as that goes: A of M -> M A.
-Eigen::Matrix3d MetricUpgrade(const std::vector<Motion>& motions) {
-  using Vector6 = Eigen::Vector<double, 6>;
+// Equations over Q: the two rows of each motion are as long as each other and orthogonal, and 1 on
+// average.
+NormalEquations MetricEquations(const std::vector<Motion>& motions) {
   const auto weight = static_cast<double>(motions.size());
-  Eigen::Matrix<double, 6, 6> a = 1e-12 * weight * Eigen::Matrix<double, 6, 6>::Identity();
-  Vector6 mean = Vector6::Zero();
+  NormalEquations out(6);
+  for (std::size_t i = 0; i < 6; ++i) out.Diagonal(i) = 1e-12 * weight;
+  Row6 mean{};
   for (const Motion& m : motions) {
-    const Vector6 first = QuadraticRow(m.rows[0], m.rows[0]),
-                  second = QuadraticRow(m.rows[1], m.rows[1]),
-                  both = QuadraticRow(m.rows[0], m.rows[1]), difference = first - second;
-    mean += (first + second) / (2 * weight);
-    a += difference * difference.transpose() + 4 * both * both.transpose();
+    const Row6 first = QuadraticRow(m.rows[0], m.rows[0]);
+    const Row6 second = QuadraticRow(m.rows[1], m.rows[1]);
+    Row6 both = QuadraticRow(m.rows[0], m.rows[1]);
+    Row6 difference{};
+    for (std::size_t i = 0; i < 6; ++i) {
+      mean[i] += (first[i] + second[i]) / (2 * weight) * std::sqrt(weight);
+      difference[i] = first[i] - second[i];
+      both[i] *= 2;
+    }
+    out.Add(difference, 0);
+    out.Add(both, 0);
   }
-  a += weight * mean * mean.transpose();
-  const Vector6 q = SolvePositive<6>(a, weight * mean);
-  const Eigen::Matrix3d metric{{q[0], q[1], q[2]}, {q[1], q[3], q[4]}, {q[2], q[4], q[5]}};
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(metric);
-  const double least = 1e-4 * std::max(parts.eigenvalues().maxCoeff(), 1e-300);
-  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).cwiseSqrt().asDiagonal();
+  out.Add(mean, std::sqrt(weight));
+  return out;
+}
+
+// A 3 x 3 map after which the two rows of each motion are as long as each other and orthogonal, as
+// well as that goes: A of M -> M A. Row k holds column k of A.
+std::array<Point, 3> MetricUpgrade(const std::vector<Motion>& motions) {
+  const std::vector<double> q = SolutionOf(MetricEquations(motions));
+  const auto parts =
+      SymmetricEigenpairs(std::array{q[0], q[1], q[2], q[1], q[3], q[4], q[2], q[4], q[5]});
+  std::array<Point, 3> out{};
+  if (!parts) return out;
+  const double least = 1e-4 * std::max(parts->values[2], 1e-300);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double* const v = &parts->vectors[3 * k];
+    out[k] = std::sqrt(std::max(parts->values[k], least)) * Point{v[0], v[1], v[2]};
+  }
+  return out;
 }
 
 // The scaled rotation nearest to two rows: (M M^T)^(-1/2) M.
 WeakPerspective NearestCamera(const Motion& m) {
   const double cross = Dot(m.rows[0], m.rows[1]);
-  const Eigen::Matrix2d products{{Dot(m.rows[0], m.rows[0]), cross},
-                                 {cross, Dot(m.rows[1], m.rows[1])}};
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(products);
-  const Eigen::Vector2d roots = parts.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
-  const Eigen::Matrix2d inverse =
-      parts.eigenvectors() * roots.cwiseInverse().asDiagonal() * parts.eigenvectors().transpose();
+  // Of a symmetric 2 x 2 matrix a: a^(1/2) = (a + d) / t with d^2 = |a|, t = tr a^(1/2).
+  const double xx = Dot(m.rows[0], m.rows[0]);
+  const double yy = Dot(m.rows[1], m.rows[1]);
+  const double d = std::sqrt(std::max(xx * yy - cross * cross, 1e-24));
+  const double trace = std::sqrt(xx + yy + 2 * d);
+  const double inverse[2][2] = {{(yy + d) / (d * trace), -cross / (d * trace)},
+                                {-cross / (d * trace), (xx + d) / (d * trace)}};
   Point rows[2];
-  for (int r = 0; r < 2; ++r) rows[r] = inverse(r, 0) * m.rows[0] + inverse(r, 1) * m.rows[1];
+  for (int r = 0; r < 2; ++r) rows[r] = inverse[r][0] * m.rows[0] + inverse[r][1] * m.rows[1];
   const Point x = Unit(rows[0]), z = Unit(Cross(x, rows[1])), y = Cross(z, x);
   WeakPerspective out;
-  out.scale = 0.5 * roots.sum();
+  out.scale = 0.5 * trace;
   out.translation = m.shift;
   out.quaternion = QuaternionOf({x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]});
   return out;
@@ -171,14 +178,13 @@ Motion MotionOf(const WeakPerspective& camera) {
 }
 
 RigidMotion MakeRigid(const Affine& affine, const Views& views) {
-  const Eigen::Matrix3d a = MetricUpgrade(affine.motions);
+  const std::array<Point, 3> a = MetricUpgrade(affine.motions);
   RigidMotion out;
   std::vector<Motion> motions;
   for (const Motion& m : affine.motions) {
     Motion upgraded{{}, m.shift};
     for (std::size_t r = 0; r < 2; ++r) {
-      const Eigen::Vector3d row = a.transpose() * VectorOf(m.rows[r]);
-      upgraded.rows[r] = {row[0], row[1], row[2]};
+      upgraded.rows[r] = {Dot(a[0], m.rows[r]), Dot(a[1], m.rows[r]), Dot(a[2], m.rows[r])};
     }
     out.cameras.push_back(NearestCamera(upgraded));
     motions.push_back(MotionOf(out.cameras.back()));

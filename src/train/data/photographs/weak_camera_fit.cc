@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "base/dense.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
 
@@ -12,26 +12,24 @@ namespace {
 using PlanePoint = std::array<double, 3>;
 
 // scale, x, y, and a turn about each axis of the camera.
-using Vector6 = Eigen::Vector<double, 6>;
-struct NormalEquations {
-  Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
-  Vector6 b = Vector6::Zero();
+struct Linearized {
+  NormalEquations equations{6};
   double squares = 0;
 };
 
-NormalEquations Build(const std::vector<PlanePoint>& shape, const std::vector<Keypoint>& keypoints,
-                      const WeakPerspective& camera) {
-  NormalEquations out;
+Linearized Linearize(const std::vector<PlanePoint>& shape, const std::vector<Keypoint>& keypoints,
+                     const WeakPerspective& camera) {
+  Linearized out;
   for (std::size_t k = 0; k < shape.size(); ++k) {
     if (!keypoints[k].visible) continue;
     const PlanePoint seen = ProjectWeakly(camera, shape[k]);
     const double s = camera.scale, x = (seen[0] - camera.translation[0]) / s,
                  y = (seen[1] - camera.translation[1]) / s, z = seen[2];
-    const Vector6 rows[2] = {{x, 1, 0, 0, s * z, -s * y}, {y, 0, 1, -s * z, 0, s * x}};
+    const std::array<double, 6> rows[2] = {{x, 1, 0, 0, s * z, -s * y},
+                                           {y, 0, 1, -s * z, 0, s * x}};
     const double residuals[2] = {keypoints[k].x - seen[0], keypoints[k].y - seen[1]};
     for (int r = 0; r < 2; ++r) {
-      out.a += rows[r] * rows[r].transpose();
-      out.b += rows[r] * residuals[r];
+      out.equations.Add(rows[r], residuals[r]);
       out.squares += residuals[r] * residuals[r];
     }
   }
@@ -47,7 +45,7 @@ std::array<double, 4> Turned(const std::array<double, 4>& q, double x, double y,
                                            t[0] * q[3] + t[1] * q[2] - t[2] * q[1] + t[3] * q[0]});
 }
 
-WeakPerspective Moved(const WeakPerspective& camera, const Vector6& by) {
+WeakPerspective Moved(const WeakPerspective& camera, const std::vector<double>& by) {
   WeakPerspective out = camera;
   out.scale = std::max(camera.scale + by[0], 0.1 * camera.scale);
   out.translation[0] += by[1];
@@ -60,14 +58,19 @@ WeakPerspective Moved(const WeakPerspective& camera, const Vector6& by) {
 
 WeakPerspective FitWeakCamera(const std::vector<PlanePoint>& shape,
                               const std::vector<Keypoint>& keypoints, WeakPerspective camera) {
-  NormalEquations at = Build(shape, keypoints, camera);
+  Linearized at = Linearize(shape, keypoints, camera);
   double damping = 1e-3;
   for (int step = 0; step < 60 && damping < 1e8; ++step) {
-    Eigen::Matrix<double, 6, 6> a = at.a;
-    a.diagonal().array() += damping * (at.a.diagonal().array() + 1e-9);
-    // Where `a` is not positive what comes is no number, and no better.
-    const WeakPerspective next = Moved(camera, a.llt().solve(at.b));
-    const NormalEquations there = Build(shape, keypoints, next);
+    NormalEquations damped = at.equations;
+    for (std::size_t i = 0; i < 6; ++i)
+      damped.Diagonal(i) += damping * (at.equations.Diagonal(i) + 1e-9);
+    const auto by = damped.Solve();
+    if (!by) {
+      damping *= 10;
+      continue;
+    }
+    const WeakPerspective next = Moved(camera, *by);
+    const Linearized there = Linearize(shape, keypoints, next);
     if (!(there.squares < at.squares)) {
       damping *= 10;
       continue;
@@ -84,7 +87,7 @@ WeakPerspective FitWeakCamera(const std::vector<PlanePoint>& shape,
 double WeakCameraError(const std::vector<PlanePoint>& shape, const std::vector<Keypoint>& keypoints,
                        const WeakPerspective& camera) {
   const auto visible = std::ranges::count_if(keypoints, &Keypoint::visible);
-  const double squares = Build(shape, keypoints, camera).squares;
+  const double squares = Linearize(shape, keypoints, camera).squares;
   return visible > 0 ? std::sqrt(squares / static_cast<double>(visible)) : 0;
 }
 
