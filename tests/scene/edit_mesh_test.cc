@@ -58,7 +58,7 @@ double Volume(const Mesh& mesh) {
   return sum;
 }
 
-Mesh Torus(int n) {
+Mesh TorusLevelSet(int n) {
   return LevelSet(
       GridOf(n, [](glm::vec3 p) { return 0.25f - std::hypot(std::hypot(p.x, p.y) - 0.6f, p.z); }));
 }
@@ -103,7 +103,7 @@ TEST(EditMesh, LinkConditionRefusesWhatWouldChangeTheTopology) {
 
 // Any collapses that are allowed, in any order.
 TEST(EditMesh, StaysAManifoldOfTheSameTopology) {
-  EditMesh mesh = Make(Torus(13));
+  EditMesh mesh = Make(TorusLevelSet(13));
   ASSERT_EQ(Euler(mesh.Pack()), 0);
   Rng rng(3);
   int collapsed = 0;
@@ -133,7 +133,7 @@ TEST(EditMesh, CollapsedEdgesStandWhereTheyAreTold) {
 }
 
 TEST(Simplified, KeepsShapeAndTopologyWithFewFaces) {
-  const Mesh fine = Torus(41);
+  const Mesh fine = TorusLevelSet(41);
   const auto coarse = Ok(Simplified(fine, {.error = 0.01f, .patch = 0.005f}));
   EXPECT_LT(coarse->faces.size(), fine.faces.size() / 10);
   Make(*coarse);  // a closed manifold
@@ -143,7 +143,7 @@ TEST(Simplified, KeepsShapeAndTopologyWithFewFaces) {
 }
 
 TEST(Simplified, EndsAtTheFacesAndTheLengthAskedFor) {
-  const Mesh fine = Torus(41);
+  const Mesh fine = TorusLevelSet(41);
   const auto few = Ok(Simplified(fine, {.error = 0, .most_faces = 1000}));
   EXPECT_LE(few->faces.size(), 1000u);
   EXPECT_GE(few->faces.size(), 996u);
@@ -180,7 +180,7 @@ TEST(LevelSet, ZeroIsOutsideAndBordersAreClosed) {
 }
 
 TEST(LevelSet, HasTheTopologyAndTheVolumeOfATorus) {
-  const Mesh torus = Torus(41);
+  const Mesh torus = TorusLevelSet(41);
   EXPECT_EQ(Euler(torus), 0);
   const double truth = 2 * std::numbers::pi * std::numbers::pi * 0.6 * 0.25 * 0.25;
   EXPECT_NEAR(Volume(torus), truth, 0.02 * truth);
