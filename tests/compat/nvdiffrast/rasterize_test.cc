@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <complex>
 #include <limits>
 #include <optional>
 
@@ -12,59 +11,6 @@
 #include "support/expect.h"
 
 namespace tilegrad::compat::nvdiffrast::rasterize_test {
-
-// w = 1: the triangle (-1, -1), (1, -1), (-1, 1) of an image of 4 x 4, its lower left half.
-Scene<float> HalfImage() {
-  Scene<float> out;
-  out.positions = {-1, -1, 0.5f, 1, 1, -1, 0.5f, 1, -1, 1, -0.5f, 1};
-  out.faces = {0, 1, 2};
-  out.height = out.width = 4;
-  return out;
-}
-
-TEST(Rasterize, TriangleByHand) {
-  const auto out = Rasterize(HalfImage());
-  // Pixel (x, y) has its centre at fractions (x + 0.5) / 4 and (y + 0.5) / 4 of the two legs: these
-  // are the weights of corners 1 and 2. Row 0 is the bottom. The diagonal belongs to one side only.
-  for (int y = 0; y < 4; ++y) {
-    for (int x = 0; x < 4; ++x) {
-      const float* pixel = &out.rast[static_cast<std::size_t>(4 * (4 * y + x))];
-      const float right = (static_cast<float>(x) + 0.5f) / 4,
-                  up = (static_cast<float>(y) + 0.5f) / 4;
-      if (x + y > 3) {
-        for (int c = 0; c < 4; ++c) EXPECT_EQ(pixel[c], 0) << x << "," << y;
-      } else if (x + y < 3) {
-        EXPECT_NEAR(pixel[0], 1 - right - up, 1e-6f);
-        EXPECT_NEAR(pixel[1], right, 1e-6f);
-        EXPECT_NEAR(pixel[2], 0.5f - up, 1e-6f);
-        EXPECT_EQ(pixel[3], 1);
-        const float* db = &out.rast_db[static_cast<std::size_t>(4 * (4 * y + x))];
-        EXPECT_NEAR(db[0], -0.25f, 1e-6f);
-        EXPECT_NEAR(db[1], -0.25f, 1e-6f);
-        EXPECT_NEAR(db[2], 0.25f, 1e-6f);
-        EXPECT_NEAR(db[3], 0, 1e-6f);
-      }
-    }
-  }
-}
-
-TEST(Rasterize, PerspectiveCorrectOverADeepFloor) {
-  // A floor strip from w = 1 to w = 9: the middle of the strip in space is at w = 5, not in the
-  // middle of the screen.
-  Scene<double> scene;
-  scene.positions = {-1, -1, 0, 1, 1, -1, 0, 1, 0, 0, 0, 9};
-  scene.faces = {0, 1, 2};
-  scene.height = 64;
-  scene.width = 3;
-  const auto out = Rasterize(scene);
-  for (int y = 0; y < 31; ++y) {
-    const double* pixel = &out.rast[static_cast<std::size_t>(4 * (3 * y + 1))];
-    ASSERT_EQ(pixel[3], 1);
-    // On the axis, y/w = -(1 - b) / (1 + 8 b), b the weight of corner 2.
-    const double at = (2 * y + 1) / 64.0 - 1, b = (1 + at) / (1 - 8 * at);
-    EXPECT_NEAR(1 - pixel[0] - pixel[1], b, 1e-12) << y;
-  }
-}
 
 // Every face for every pixel, in homogeneous coordinates without clipping. Nothing where rounding
 // decides: close to an edge, a clip plane or another face.
@@ -259,48 +205,6 @@ TEST(Rasterize, SameBitsForEveryTargetAndNumberOfWorkers) {
           RasterizeBackward<float>(narrow.input(), {out.rast, d_rast, d_db}, workers, d).ok());
       if (!gradient.has_value()) gradient = d;
       EXPECT_EQ(d, *gradient) << target << " " << count;
-    }
-  }
-}
-
-// The derivative of what a pixel says, weighted, by complex step: exact to rounding.
-TEST(RasterizeBackward, BarycentricsByComplexStep) {
-  using Complex = std::complex<double>;
-  Rng rng(4, 4);
-  for (int round = 0; round < 200; ++round) {
-    ClipCorners<double> c;
-    for (int k = 0; k < 3; ++k) {
-      c.w[k] = rng.Uniform(0.5, 2);
-      c.x[k] = rng.Uniform(-1, 1);
-      c.y[k] = rng.Uniform(-1, 1);
-      c.z[k] = rng.Uniform(-1, 1);
-    }
-    const PixelCentre at{rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
-    const PixelSize size{2.0 / 50, 2.0 / 40};
-    if (!BarycentricsAt(c, at, size).solid) continue;
-    BarycentricsCotangent<double> d{rng.Uniform(-1, 1), rng.Uniform(-1, 1), {}};
-    for (double& slope : d.d_slopes) slope = rng.Uniform(-1, 1);
-    ClipCorners<double> gradient{};
-    BarycentricsAdjoint(c, at, size, d, &gradient);
-    for (int i = 0; i < 9; ++i) {
-      ClipCorners<Complex> moved;
-      for (int k = 0; k < 3; ++k) {
-        moved.x[k] = c.x[k];
-        moved.y[k] = c.y[k];
-        moved.z[k] = c.z[k];
-        moved.w[k] = c.w[k];
-      }
-      Complex* const numbers[3] = {moved.x, moved.y, moved.w};
-      const double* const gradients[3] = {gradient.x, gradient.y, gradient.w};
-      numbers[i / 3][i % 3] += Complex(0, 1e-30);
-      const auto b = BarycentricsAt(moved, at, size);
-      const Complex loss = d.d_u * b.u + d.d_v * b.v + d.d_slopes[0] * b.du_dx +
-                           d.d_slopes[1] * b.du_dy + d.d_slopes[2] * b.dv_dx +
-                           d.d_slopes[3] * b.dv_dy;
-      const double expected = loss.imag() / 1e-30;
-      // Conditioning: weights of faces seen at a slant are quotients by a small s.
-      const double scale = std::max(1.0, std::abs(expected));
-      EXPECT_NEAR(gradients[i / 3][i % 3], expected, 1e-9 * scale) << round << " " << i;
     }
   }
 }
