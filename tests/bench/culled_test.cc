@@ -45,15 +45,24 @@ std::vector<float> ToWorld(const BenchBatch& batch, std::size_t image,
   return out;
 }
 
-TEST(Culled, AgreesWithTheRenderer) {
-  BenchBatch batch(kScene);
-  CulledBatch culled(batch);
-  culled.Forward({});
-  culled.Backward({});
-  const Workers workers(1);
-  Pipeline renderer(workers);
+// The scene drawn and differentiated by the yardstick, and drawn by the renderer.
+struct Both {
+  BenchBatch batch{kScene};
+  CulledBatch culled{batch};
+  Workers workers{1};
+  Pipeline renderer{workers};
   FrameImages frame;
-  Draw(batch, {.color = false}, &renderer, &frame);
+
+  Both() {
+    culled.Forward({});
+    culled.Backward({});
+    Draw(batch, {.color = false}, &renderer, &frame);
+  }
+};
+
+TEST(Culled, AgreesWithTheRenderer) {
+  Both both;
+  auto& [batch, culled, workers, renderer, frame] = both;
   const std::size_t pixels = culled.frames[0].face_ids.size();
   std::size_t different = 0, covered = 0;
   double alpha = 0, color = 0;
@@ -83,14 +92,8 @@ TEST(Culled, AgreesWithTheRenderer) {
 }
 
 TEST(Culled, GradientsAgreeWithTheRenderer) {
-  BenchBatch batch(kScene);
-  CulledBatch culled(batch);
-  culled.Forward({});
-  culled.Backward({});
-  const Workers workers(1);
-  Pipeline renderer(workers);
-  FrameImages frame;
-  Draw(batch, {.color = false}, &renderer, &frame);
+  Both both;
+  auto& [batch, culled, workers, renderer, frame] = both;
   ASSERT_TRUE(renderer.Backward(batch.views, batch.options, frame,
                                 {batch.d_attributes, batch.d_alpha}, batch.d_scenes));
   for (std::size_t i = 0; i < culled.frames.size(); ++i) {
