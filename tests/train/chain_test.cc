@@ -192,8 +192,8 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
     return moved.loss;
   };
   Rng rng(9);
-  const Differences d =
-      CompareWithDifferences({parameters.begin(), parameters.end()}, loss, gradients, 3, 1e-8, rng);
+  const Differences d = CompareWithDifferences({parameters.begin(), parameters.end()}, loss,
+                                               gradients, 3, 1e-8, rng, 1e-5);
   EXPECT_LE(d.off, d.checked / 50) << "of " << d.checked;
 }
 

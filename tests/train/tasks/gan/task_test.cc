@@ -5,9 +5,12 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 
+#include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
+#include "train/gradient_check.h"
 #include "train/predictor.h"
 #include "train/report/report.h"
 #include "train/run/log.h"
@@ -255,30 +258,15 @@ struct SmallProblem {
 void ExpectGradientsAgreeWithDifferences(const GanConfig& config, GanStage stage) {
   SmallProblem p(config);
   nn::Module& module = stage == GanStage::kShape ? p.generator.shape() : p.generator.texture();
-  std::vector<nn::NamedVar> parameters = nn::Parameters(module);
-  std::vector<nn::Var> vars;
-  for (const nn::NamedVar& parameter : parameters) vars.push_back(parameter.value);
-  const auto gradients = nn::Grad(p.Loss(stage), vars);
+  const std::vector<nn::Var> weights = nn::WeightsOf(module);
+  const auto gradients = nn::Grad(p.Loss(stage), weights);
   ASSERT_TRUE(p.context.status().ok()) << p.context.status().message();
   Rng rng(9);
-  int checked = 0, off = 0, moving = 0;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    nn::Tensor& weight = parameters[i].value.value();
-    for (int k = 0; k < 6; ++k, ++checked) {
-      const std::size_t at = rng.Below(weight.elements());
-      const double h = 1e-6, before = weight.data<double>()[at];
-      weight.data<double>()[at] = before + h;
-      const double up = p.Loss(stage).item();
-      weight.data<double>()[at] = before - h;
-      const double down = p.Loss(stage).item();
-      weight.data<double>()[at] = before;
-      const double want = (up - down) / (2 * h), got = gradients[i].value().data<double>()[at];
-      moving += std::abs(got) > 1e-9 ? 1 : 0;
-      off += std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8 ? 0 : 1;
-    }
-  }
-  EXPECT_LE(off, checked / 20) << "of " << checked;
-  EXPECT_GT(2 * moving, checked);
+  const Differences d = CompareWithDifferences(
+      weights, [&] { return p.Loss(stage).item(); }, gradients, 6, 1e-8, rng,
+      std::numeric_limits<double>::infinity());
+  EXPECT_LE(d.off, d.checked / 20) << "of " << d.checked;
+  EXPECT_GT(2 * d.moving, d.checked);
 }
 
 TEST(GanStep, GradientsOfShapes) {

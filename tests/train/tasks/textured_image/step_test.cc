@@ -7,10 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "support/expect.h"
+#include "train/gradient_check.h"
 #include "train/terms.h"
 
 namespace tilegrad::train::textured_image_step_test {
@@ -84,33 +87,21 @@ void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config,
       nn::Grad(p.step.Loss(renders, p.batch, 0, &values), p.step.weights().adam().parameters());
   ASSERT_TRUE(p.context.status().ok()) << p.context.status().message();
   EXPECT_LT(TermOf(values, "iou"), 0.95);  // silhouettes overlap
-  std::vector<nn::NamedVar> parameters = nn::Parameters(p.step.network().module());
-  Rng rng(9);
-  int checked = 0, off = 0, moving = 0;
+  const std::vector<nn::NamedVar> parameters = nn::Parameters(p.step.network().module());
+  std::vector<nn::Var> chosen, of_chosen;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (std::ranges::none_of(within, [&](const std::string& word) {
           return parameters[i].name.find(word) != std::string::npos;
         }))
       continue;
-    nn::Tensor& weight = parameters[i].value.value();
-    for (int k = 0; k < 3; ++k, ++checked) {
-      const std::size_t at = rng.Below(weight.elements());
-      const double h = 1e-6, before = weight.data<double>()[at];
-      weight.data<double>()[at] = before + h;
-      const double up = p.LossNow();
-      weight.data<double>()[at] = before - h;
-      const double down = p.LossNow();
-      weight.data<double>()[at] = before;
-      const double want = (up - down) / (2 * h), got = gradients[i].value().data<double>()[at];
-      moving += std::abs(got) > 1e-9 ? 1 : 0;
-      if (std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8) continue;
-      ++off;
-      EXPECT_NEAR(got, want, 0.05 * std::abs(want) + 1e-3)
-          << parameters[i].name << "[" << at << "]";
-    }
+    chosen.push_back(parameters[i].value);
+    of_chosen.push_back(gradients[i]);
   }
-  EXPECT_LE(off, checked / 50) << "of " << checked;
-  EXPECT_GT(2 * moving, checked);
+  Rng rng(9);
+  const Differences d = CompareWithDifferences(
+      chosen, [&] { return p.LossNow(); }, of_chosen, 3, 1e-8, rng, 1e-3);
+  EXPECT_LE(d.off, d.checked / 50) << "of " << d.checked;
+  EXPECT_GT(2 * d.moving, d.checked);
 }
 
 TEST(TexturedStep, GradientsUnderLambertLight) {
@@ -200,26 +191,14 @@ TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
       EXPECT_TRUE(p.adversary->CriticGradients({2, 0}, &now).ok());
       return 4 * TermOf(now, "critic_penalty") - TermOf(now, "critic_distance");
     };
-    std::vector<nn::NamedVar> parameters = nn::Parameters(*p.adversary->critic());
+    std::vector<nn::Var> of_weights;
+    for (const auto& gradient : *gradients) of_weights.push_back(gradient.Value());
     Rng rng(4);
-    int off = 0, checked = 0;
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      nn::Tensor& weight = parameters[i].value.value();
-      for (int k = 0; k < 4; ++k, ++checked) {
-        const std::size_t at = rng.Below(weight.elements());
-        const double h = 1e-6, before = weight.data<double>()[at];
-        weight.data<double>()[at] = before + h;
-        const double up = loss();
-        weight.data<double>()[at] = before - h;
-        const double down = loss();
-        weight.data<double>()[at] = before;
-        const double want = (up - down) / (2 * h);
-        const double got = (*gradients)[i].Value().value().data<double>()[at];
-        off += std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8 ? 0 : 1;
-      }
-    }
-    EXPECT_LE(off, checked / 10) << place;
-    EXPECT_GT(checked, 20);
+    const Differences d =
+        CompareWithDifferences(nn::WeightsOf(*p.adversary->critic()), loss, of_weights, 4, 1e-8,
+                               rng, std::numeric_limits<double>::infinity());
+    EXPECT_LE(d.off, d.checked / 10) << place;
+    EXPECT_GT(d.checked, 20);
   }
 }
 
