@@ -143,4 +143,16 @@ TEST_F(Networks, FeatureWeightsThatDoNotFitAreNamed) {
                 "\"features.2.weight\" has shape [5, 9, 5, 5]");
 }
 
+// Steps of an adversarial game and of a U-Net in float: same bits for any number of workers.
+TEST(NetworksTraining, SameBitsForAnyNumberOfWorkersOver100Steps) {
+  Bytes want;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    Game game(workers);
+    for (std::uint64_t step = 0; step < 100; ++step) game.Step(step);
+    if (want.empty()) want = game.Encoded();
+    EXPECT_EQ(game.Encoded(), want) << count;
+  }
+}
+
 }  // namespace tilegrad::nn::networks_test
