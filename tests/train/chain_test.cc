@@ -14,7 +14,6 @@
 #include "scene/topology.h"
 #include "train/gradient_check.h"
 #include "train/tasks/single_image/step.h"
-#include "train/terms.h"
 
 namespace tilegrad::train::chain_test {
 

@@ -7,12 +7,23 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "base/rng.h"
 #include "nn/nn.h"
+#include "train/run/step_values.h"
 
 namespace tilegrad::train {
+
+// NaN if there is none of that name.
+inline double TermOf(const StepValues& values, const std::string& name) {
+  for (const LossTerm& term : values.terms) {
+    if (name == term.name) return term.value;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
 
 inline std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
   Rng rng(seed);

@@ -14,7 +14,6 @@
 #include "scene/shapes.h"
 #include "support/expect.h"
 #include "train/gradient_check.h"
-#include "train/terms.h"
 
 namespace tilegrad::train::textured_image_step_test {
 
