@@ -13,6 +13,7 @@ if(TILEGRAD_PROGRAM)
   pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
   pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
   find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
+  pkg_check_modules(MATIO REQUIRED IMPORTED_TARGET matio)        # libmatio-dev
   pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)    # libopenexr-dev
   pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebpmux libwebp)    # libwebp-dev
   pkg_check_modules(WEBPDEMUX REQUIRED IMPORTED_TARGET libwebpdemux)    # likewise; for tests

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "base/error.h"
 
@@ -25,57 +24,25 @@ const char* KindName(MatKind kind) {
 
 }  // namespace
 
-std::optional<StoredType> NumberTypeOf(MatType type) {
-  static constexpr std::pair<MatType, StoredType> kTypes[] = {
-      {MatType::kInt8, StoredType::kI8},    {MatType::kUint8, StoredType::kU8},
-      {MatType::kInt16, StoredType::kI16},  {MatType::kUint16, StoredType::kU16},
-      {MatType::kInt32, StoredType::kI32},  {MatType::kUint32, StoredType::kU32},
-      {MatType::kInt64, StoredType::kI64},  {MatType::kUint64, StoredType::kU64},
-      {MatType::kSingle, StoredType::kF32}, {MatType::kDouble, StoredType::kF64}};
-  const auto* row = std::ranges::find(kTypes, type, &std::pair<MatType, StoredType>::first);
-  return row == std::end(kTypes) ? std::nullopt : std::optional(row->second);
-}
-
-MatNumbers::MatNumbers(StoredType type, std::vector<std::uint8_t> stored)
-    : type_(type), count_(stored.size() / RowOf(type).size), stored_(std::move(stored)) {
-  bits_ = RowOf(type).size == 1 && count_ > 0 &&
-          std::ranges::all_of(stored_, [](std::uint8_t b) { return b <= 1; });
-  if (!bits_) return;
-  std::vector<std::uint8_t> packed((count_ + 7) / 8);
-  for (std::size_t i = 0; i < count_; ++i)
-    packed[i / 8] = static_cast<std::uint8_t>(packed[i / 8] | (stored_[i] << (i % 8)));
-  stored_ = std::move(packed);
-}
-
-MatNumbers::MatNumbers(std::span<const double> numbers)
-    : count_(numbers.size()), stored_(numbers.size_bytes()) {
-  if (!numbers.empty()) std::memcpy(stored_.data(), numbers.data(), numbers.size_bytes());
-}
-
-double MatNumbers::operator[](std::size_t i) const {
-  if (bits_) return (stored_[i / 8] >> (i % 8)) & 1;
-  const StoredTypeRow& row = RowOf(type_);
-  return row.load(stored_.data() + i * row.size);
-}
-
 std::size_t MatArray::places() const {
   std::size_t product = 1;
   for (const std::size_t extent : dims) product *= extent;
   return product;
 }
 
-MatArray MatArray::Numbers(std::vector<std::size_t> dims, std::span<const double> values) {
+MatArray MatArray::Numbers(std::vector<std::uint64_t> dims, std::span<const double> values) {
   MatArray out;
   out.dims = std::move(dims);
-  out.numbers = MatNumbers(values);
+  out.numbers = MatNumbers::Of(values);
   return out;
 }
 
-MatArray MatArray::Mask(std::size_t rows, std::size_t columns, std::vector<std::uint8_t> values) {
+MatArray MatArray::Mask(std::size_t rows, std::size_t columns,
+                        const std::vector<std::uint8_t>& values) {
   MatArray out;
-  out.logical = true;
+  out.logical = 1;
   out.dims = {rows, columns};
-  out.numbers = MatNumbers(StoredType::kU8, std::move(values));
+  out.numbers = MatNumbers::Of<std::uint8_t>(values);
   return out;
 }
 
@@ -157,7 +124,9 @@ Result<std::string> MatPlace::Text() const {
 }
 
 Status MatPlace::ExpectSize(std::size_t rows, std::size_t columns) const {
-  if (array_->kind == MatKind::kNumbers && array_->dims == std::vector{rows, columns}) return {};
+  if (array_->kind == MatKind::kNumbers &&
+      array_->dims == std::vector<std::uint64_t>{rows, columns})
+    return {};
   std::string dims;
   for (const std::size_t extent : array_->dims)
     dims += fmt::format("{}{}", dims.empty() ? "" : " x ", extent);

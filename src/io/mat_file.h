@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// MATLAB's files of version 5 (what `save` writes up to -v6 and -v7, and scipy.io.savemat), as the
-// annotations of CUB-200 and PASCAL3D+ come: in and out. Source: MathWorks, "MAT-File Format",
-// R2019b, section "Level 5 MAT-File Format".
-//
-// The reader is ours because of memory: libmatio (1.5.23, which survived 10,000 damaged files)
-// unpacks whatever a file declares, with no limit, and holds the 5,964 masks of CUB as bytes, 1.1
-// GB. Here masks take a bit a pixel, and every array asks base/read_budget.h first.
+// MATLAB's files of versions 5 (what `save` writes up to -v6 and -v7, and scipy.io.savemat) and 7.3
+// (HDF5), as the annotations of CUB-200 and PASCAL3D+ come: in by libmatio, which runs in a process
+// of its own (guarded_process.h), and out.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,53 +13,29 @@
 #include <vector>
 
 #include "base/file.h"
-#include "io/stored_number.h"
 
 namespace tilegrad::io {
 
-// The "mi" types of the format.
-enum class MatType : std::uint32_t {
-  kInt8 = 1,
-  kUint8 = 2,
-  kInt16 = 3,
-  kUint16 = 4,
-  kInt32 = 5,
-  kUint32 = 6,
-  kSingle = 7,
-  kDouble = 9,
-  kInt64 = 12,
-  kUint64 = 13,
-  kMatrix = 14,
-  kCompressed = 15,
-  kUtf8 = 16,
-  kUtf16 = 17,
-  kUtf32 = 18
-};
-// Nothing for what is no number. Arrays of doubles are often stored as small integers.
-std::optional<StoredType> NumberTypeOf(MatType type);
+// Numbers that are all 0 or 1, as masks are, take a bit each: CUB-200 has 5,964 masks in one file.
+struct MatNumbers {
+  std::uint64_t count = 0;
+  std::vector<double> values;      // of all, or
+  std::vector<std::uint8_t> bits;  // eight in each, the first the lowest
 
-// Numbers as they are stored. Bytes that are all 0 or 1, as masks are, take a bit each.
-class MatNumbers {
- public:
-  MatNumbers() = default;
-  MatNumbers(StoredType type, std::vector<std::uint8_t> stored);  // whole numbers of that type
-  explicit MatNumbers(std::span<const double> numbers);
-  std::size_t size() const { return count_; }
-  double operator[](std::size_t i) const;
-
- private:
-  StoredType type_ = StoredType::kF64;
-  bool bits_ = false;
-  std::size_t count_ = 0;
-  std::vector<std::uint8_t> stored_;
+  template <class Number>
+  static MatNumbers Of(std::span<const Number> numbers);
+  std::size_t size() const { return count; }
+  double operator[](std::size_t i) const {
+    return bits.empty() ? values[i] : (bits[i / 8] >> (i % 8)) & 1;
+  }
 };
 
-enum class MatKind { kNumbers, kText, kStruct, kCell };
+enum class MatKind : std::uint8_t { kNumbers, kText, kStruct, kCell };
 
 struct MatArray {
   MatKind kind = MatKind::kNumbers;
-  bool logical = false;
-  std::vector<std::size_t> dims = {0, 0};  // the first varies fastest in memory
+  std::uint8_t logical = 0;                  // 1: its numbers are truth values
+  std::vector<std::uint64_t> dims = {0, 0};  // the first varies fastest in memory
   MatNumbers numbers;
   std::string text;                 // UTF-8; rows of a matrix of text one after the other
   std::vector<std::string> fields;  // kStruct
@@ -74,18 +45,16 @@ struct MatArray {
   std::size_t places() const;  // the product of dims
 
   static MatArray Number(double value) { return Numbers({1, 1}, std::vector<double>{value}); }
-  static MatArray Numbers(std::vector<std::size_t> dims, std::span<const double> values);
-  static MatArray Mask(std::size_t rows, std::size_t columns, std::vector<std::uint8_t> values);
+  static MatArray Numbers(std::vector<std::uint64_t> dims, std::span<const double> values);
+  static MatArray Mask(std::size_t rows, std::size_t columns,
+                       const std::vector<std::uint8_t>& values);
   static MatArray Text(std::string_view text);
   // [1, n] of structs with these fields; `elements` as above.
   static MatArray Structs(std::vector<std::string> fields, std::vector<MatArray> elements);
 };
 
-using MatVariables = std::vector<std::pair<std::string, MatArray>>;
-
-// Classes and a flag of arrays, as files number them.
-inline constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kCharClass = 4,
-                               kLogicalFlag = 0x200;
+using MatVariable = std::pair<std::string, MatArray>;
+using MatVariables = std::vector<MatVariable>;
 
 struct MatFile {
   std::string name;  // for messages
@@ -93,16 +62,16 @@ struct MatFile {
 };
 
 // Numbers, text, structs and cells of any depth up to 16; other variables (sparse, objects,
-// functions) and complex numbers are errors, as are version 4 and 7.3 (HDF5), big-endian files and
-// everything that is cut off, longer than it says or not finished. Errors name `name` and the
-// variable. Whatever the bytes, nothing crashes.
-Result<MatFile> ReadMat(std::span<const std::uint8_t> bytes, const std::string& name);
+// functions) and complex numbers are errors, as are version 4 and everything that is cut off.
+// Errors name the file, and the variable where it is known. Numbers that a damaged file announces
+// and lacks may be any. Whatever the file, nothing crashes.
 Result<MatFile> LoadMat(const Path& path);
+// Between that process and this one. What comes is untrusted: the library may have gone wrong.
+Result<MatVariables> MatFromReader(std::span<const std::uint8_t> bytes);
+Bytes MatForReader(const Result<MatVariables>& variables);
 
-enum class MatPacking { kPlain, kCompressed };
-// A file of variables whose elements fit their dims. Numbers are stored as doubles, logical ones as
-// bytes.
-Bytes EncodeMat(const MatVariables& variables, MatPacking packing = MatPacking::kCompressed);
+// A file of version 5, packed, of variables whose elements fit their dims; whole or not at all.
+// Numbers are stored as doubles, logical ones as bytes.
 Status SaveMat(const Path& path, const MatVariables& variables);
 
 // A place in a file, for who wants to know what is there. Errors name file and place:
@@ -132,5 +101,23 @@ class MatPlace {
   const MatArray* array_;
   std::string where_;
 };
+
+template <class Number>
+MatNumbers MatNumbers::Of(std::span<const Number> numbers) {
+  MatNumbers out;
+  out.count = numbers.size();
+  bool truths = true;
+  for (const Number n : numbers) truths = truths && (n == Number(0) || n == Number(1));
+  if (!truths) {
+    out.values.assign(numbers.begin(), numbers.end());
+    return out;
+  }
+  out.bits.resize((numbers.size() + 7) / 8);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const int bit = numbers[i] == Number(1) ? 1 << (i % 8) : 0;
+    out.bits[i / 8] = static_cast<std::uint8_t>(out.bits[i / 8] | bit);
+  }
+  return out;
+}
 
 }  // namespace tilegrad::io

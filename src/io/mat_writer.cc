@@ -1,143 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <zlib.h>
+#include <matio.h>
 
-#include <algorithm>
-#include <cstring>
-
+#include "base/error.h"
 #include "io/mat_file.h"
 
 namespace tilegrad::io {
 namespace {
 
-constexpr std::uint32_t kDouble = 6, kUint8 = 9;
+matvar_t* NewVariable(const char* name, const MatArray& array);
 
-class MatWriter {
- public:
-  void Word(std::uint32_t word) { Append({reinterpret_cast<std::uint8_t*>(&word), sizeof word}); }
-  void Element(MatType type, std::span<const std::uint8_t> data) {
-    Word(static_cast<std::uint32_t>(type));
-    Word(static_cast<std::uint32_t>(data.size()));
-    Append(data);
-    bytes.resize((bytes.size() + 7) / 8 * 8);
-  }
-  template <class T>
-  void Elements(MatType type, std::span<const T> values) {
-    Element(type, {reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()});
-  }
-  void Matrix(const MatArray& array, const std::string& name);
-
-  Bytes bytes;
-
- private:
-  void Append(std::span<const std::uint8_t> data) {
-    bytes.insert(bytes.end(), data.begin(), data.end());
-  }
-  void Content(const MatArray& array);
-  void FieldNames(const std::vector<std::string>& fields);
-};
-
-std::uint32_t ClassOf(const MatArray& array) {
-  switch (array.kind) {
-    case MatKind::kCell:
-      return kCellClass;
-    case MatKind::kStruct:
-      return kStructClass;
-    case MatKind::kText:
-      return kCharClass;
-    default:
-      return array.logical ? kUint8 | kLogicalFlag : kDouble;
-  }
+// The library owns what it is given.
+matvar_t* NewCells(const char* name, const MatArray& array, std::vector<std::size_t> dims) {
+  std::vector<matvar_t*> elements;
+  for (const MatArray& element : array.elements) elements.push_back(NewVariable(nullptr, element));
+  return Mat_VarCreate(name, MAT_C_CELL, MAT_T_CELL, static_cast<int>(dims.size()), dims.data(),
+                       elements.data(), 0);
 }
 
-void MatWriter::Matrix(const MatArray& array, const std::string& name) {
-  Word(static_cast<std::uint32_t>(MatType::kMatrix));
-  const std::size_t size_at = bytes.size();
-  Word(0);
-  const std::uint32_t flags[] = {ClassOf(array), 0};
-  Elements(MatType::kUint32, std::span<const std::uint32_t>(flags));
-  std::vector<std::int32_t> dims(array.dims.begin(), array.dims.end());
-  Elements(MatType::kInt32, std::span<const std::int32_t>(dims));
-  Elements(MatType::kInt8, std::span<const char>(name));
-  Content(array);
-  const auto size = static_cast<std::uint32_t>(bytes.size() - size_at - 4);
-  std::memcpy(&bytes[size_at], &size, sizeof size);
-}
-
-void MatWriter::FieldNames(const std::vector<std::string>& fields) {
-  std::size_t longest = 0;
-  for (const std::string& field : fields) longest = std::max(longest, field.size());
-  const std::int32_t length = static_cast<std::int32_t>(longest) + 1;
-  Elements(MatType::kInt32, std::span<const std::int32_t>(&length, 1));
-  std::string names;
-  for (const std::string& field : fields) {
-    names += field;
-    names.append(static_cast<std::size_t>(length) - field.size(), '\0');
+matvar_t* NewStructs(const char* name, const MatArray& array, std::vector<std::size_t> dims) {
+  std::vector<const char*> names;
+  for (const std::string& field : array.fields) names.push_back(field.c_str());
+  matvar_t* const out = Mat_VarCreateStruct(name, static_cast<int>(dims.size()), dims.data(),
+                                            names.data(), static_cast<unsigned>(names.size()));
+  for (std::size_t i = 0; i < array.elements.size(); ++i) {
+    const std::size_t field = i % names.size(), place = i / names.size();
+    Mat_VarSetStructFieldByIndex(out, field, place, NewVariable(names[field], array.elements[i]));
   }
-  Elements(MatType::kInt8, std::span<const char>(names));
-}
-
-void MatWriter::Content(const MatArray& array) {
-  if (array.kind == MatKind::kText) {
-    std::vector<std::uint16_t> units;  // MATLAB's own characters; of ASCII the same as UTF-8
-    for (const char c : array.text) units.push_back(static_cast<std::uint8_t>(c));
-    return Elements(MatType::kUint16, std::span<const std::uint16_t>(units));
-  }
-  if (array.kind == MatKind::kStruct) FieldNames(array.fields);
-  if (array.kind != MatKind::kNumbers) {
-    for (const MatArray& element : array.elements) Matrix(element, "");
-    return;
-  }
-  std::vector<double> numbers(array.numbers.size());
-  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = array.numbers[i];
-  if (!array.logical) return Elements(MatType::kDouble, std::span<const double>(numbers));
-  std::vector<std::uint8_t> flags(numbers.size());
-  std::ranges::transform(numbers, flags.begin(), [](double x) { return x != 0 ? 1 : 0; });
-  Elements(MatType::kUint8, std::span<const std::uint8_t>(flags));
-}
-
-Bytes Deflated(std::span<const std::uint8_t> bytes) {
-  uLongf size = compressBound(bytes.size());
-  Bytes out(size);
-  // Cannot fail: the buffer is as large as it may get, and memory is the process's.
-  compress2(out.data(), &size, bytes.data(), bytes.size(), Z_BEST_SPEED);
-  out.resize(size);
   return out;
 }
 
-Bytes WriteHeader() {
-  constexpr std::string_view kText = "MATLAB 5.0 MAT-file, written by tilegrad";
-  Bytes header(128, ' ');
-  std::ranges::copy(kText, header.begin());
-  std::fill(header.begin() + 116, header.begin() + 124, std::uint8_t{0});
-  header[124] = 0;
-  header[125] = 1;
-  header[126] = 'I';
-  header[127] = 'M';
-  return header;
+matvar_t* NewNumbers(const char* name, const MatArray& array, std::vector<std::size_t> dims) {
+  const int rank = static_cast<int>(dims.size());
+  std::vector<double> numbers(array.numbers.size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = array.numbers[i];
+  if (array.logical == 0)
+    return Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, rank, dims.data(), numbers.data(), 0);
+  std::vector<std::uint8_t> truths(numbers.begin(), numbers.end());
+  return Mat_VarCreate(name, MAT_C_UINT8, MAT_T_UINT8, rank, dims.data(), truths.data(),
+                       MAT_F_LOGICAL);
+}
+
+matvar_t* NewVariable(const char* name, const MatArray& array) {
+  std::vector<std::size_t> dims(array.dims.begin(), array.dims.end());
+  std::string text = array.text;  // older versions of the library want it writable
+  switch (array.kind) {
+    case MatKind::kCell:
+      return NewCells(name, array, dims);
+    case MatKind::kStruct:
+      return NewStructs(name, array, dims);
+    case MatKind::kText:
+      return Mat_VarCreate(name, MAT_C_CHAR, MAT_T_UTF8, static_cast<int>(dims.size()), dims.data(),
+                           text.data(), 0);
+    default:
+      return NewNumbers(name, array, dims);
+  }
+}
+
+// The library writes to files alone, and closes them without a sync.
+Status WriteByLibrary(const Path& path, const MatVariables& variables) {
+  mat_t* const file =
+      Mat_CreateVer(path.c_str(), "MATLAB 5.0 MAT-file, written by tilegrad", MAT_FT_MAT5);
+  if (file == nullptr) return IoError("the file cannot be made");
+  bool good = true;
+  for (const auto& [name, array] : variables) {
+    matvar_t* const variable = NewVariable(name.c_str(), array);
+    good = good && Mat_VarWrite(file, variable, MAT_COMPRESSION_ZLIB) == 0;
+    Mat_VarFree(variable);
+  }
+  good = Mat_Close(file) == 0 && good;
+  return good ? Status() : IoError("the file cannot be written");
 }
 
 }  // namespace
 
-Bytes EncodeMat(const MatVariables& variables, MatPacking packing) {
-  MatWriter file;
-  file.bytes = WriteHeader();
-  for (const auto& [name, array] : variables) {
-    if (packing == MatPacking::kPlain) {
-      file.Matrix(array, name);
-      continue;
-    }
-    MatWriter variable;
-    variable.Matrix(array, name);
-    const Bytes packed = Deflated(variable.bytes);
-    file.Word(static_cast<std::uint32_t>(MatType::kCompressed));
-    file.Word(static_cast<std::uint32_t>(packed.size()));
-    file.bytes.insert(file.bytes.end(), packed.begin(), packed.end());
-  }
-  return file.bytes;
-}
-
 Status SaveMat(const Path& path, const MatVariables& variables) {
-  return WriteFileAtomic(path, EncodeMat(variables));
+  TILEGRAD_TRY(MakeFolder(path.parent_path()));
+  const Path draft = TemporaryOf(path);
+  const Status written = WriteByLibrary(draft, variables);
+  const auto bytes = written.ok() ? ReadFile(draft) : Result<Bytes>(written);
+  TILEGRAD_TRY(RemoveFiles({&draft, 1}));
+  if (!bytes.ok()) return bytes.status().Within(path.string());
+  return WriteFileAtomic(path, *bytes);
 }
 
 }  // namespace tilegrad::io

@@ -192,6 +192,7 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^(tiny_gltf|stb_.*)\\.h$"), {"src/io/"}},
       {std::regex("^assimp/.*"), {"src/io/"}},
       {std::regex("^(zip|zlib)\\.h$"), {"src/io/"}},
+      {std::regex("^matio\\.h$"), {"src/io/mat_"}},
       {std::regex("^Imf.*"), {"src/io/exr_"}},
       {std::regex("^webp/.*"), {"src/io/webp_"}},
       {std::regex("^mpi\\.h$"), {"src/train/ranks/mpi_transport.cc"}},

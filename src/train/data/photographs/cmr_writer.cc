@@ -38,7 +38,7 @@ MatArray MaskOf(const PhotoMask& mask) {
   for (int x = 0; x < mask.width; ++x)
     for (int y = 0; y < mask.height; ++y) values.push_back(mask.at(x, y) ? 1 : 0);
   return MatArray::Mask(static_cast<std::size_t>(mask.height), static_cast<std::size_t>(mask.width),
-                        std::move(values));
+                        values);
 }
 
 MatArray RotationArray(const WeakPerspective& camera) {
