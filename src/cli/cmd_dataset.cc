@@ -14,6 +14,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/mesh_options.h"
+#include "cli/photograph_sets.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
@@ -28,8 +29,9 @@ namespace {
 
 struct DatasetOptions {
   std::vector<std::string> sources = {"sweethome3d"};
-  std::string input, out;
-  std::vector<std::string> split_lists;
+  std::string input, out, masks;
+  std::vector<std::string> split_lists, classes;
+  std::string meshes_only;  // an option that was given and says how meshes are rendered; or empty
   int workers = 0;
   bool size = false, views = false;  // --size, --views were given
   bool shares = false;               // of the split were given
@@ -45,8 +47,8 @@ using Opened = Result<std::unique_ptr<train::ModelSource>>;
 constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
 
 std::vector<std::string> DatasetSourceNames() {
-  std::vector<std::string> names = {"shapenet", "choy",   "nmr",        "dvr",
-                                    "dibr",     "folder", "procedural", train::kThirteen};
+  std::vector<std::string> names = {"shapenet", "choy",       "nmr", "dvr",      "dibr",
+                                    "folder",   "procedural", "cub", "pascal3d", train::kThirteen};
   for (const auto& source : train::InstalledSources()) names.emplace_back(source.name);
   return names;
 }
@@ -59,9 +61,9 @@ std::string DatasetSourceHelp() {
          "these), shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL with "
          "one of " +
          io::MeshFileEndings() +
-         "), procedural (built in); renders of ShapeNet: nmr (.npz of N3MR and SoftRas), dvr (the "
-         "NMR_Dataset of DVR), choy (ShapeNetRendering and ShapeNetVox32 of 3D-R2N2), dibr (the "
-         "paper's)";
+         "), procedural (built in), cub and pascal3d (photographs); renders of ShapeNet: nmr (.npz "
+         "of N3MR and SoftRas), dvr (the NMR_Dataset of DVR), choy (ShapeNetRendering and "
+         "ShapeNetVox32 of 3D-R2N2), dibr (the paper's)";
 }
 
 // One source, or several of installed packages as one. Errors: --input is missing, or given where
@@ -105,6 +107,8 @@ bool HoldsPictures(const std::string& name) {
 // An option that would do nothing is a mistake: somebody expects a split that there will not be.
 Status CheckEffects(const DatasetOptions& options) {
   const std::string name = options.Name();
+  if (!options.classes.empty() || !options.masks.empty())
+    return InvalidArgument("--classes, --masks: not for --source {}", name);
   const bool pictures = HoldsPictures(name), listed = !options.split_lists.empty();
   if (listed && (name == "nmr" || (!pictures && name != "shapenet")))
     return InvalidArgument("--split-list is for --source shapenet, choy, dvr and dibr, not {}",
@@ -193,7 +197,21 @@ Opened Open(const DatasetOptions& options, const Path& folder, const Ranks& rank
   return OpenDatasetSource(options);
 }
 
+// Sets of photographs, one by one: nothing is rendered.
+Status MakePhotographs(const DatasetOptions& options) {
+  if (options.sources.size() > 1)
+    return InvalidArgument("--source {}: photographs and models make no one dataset",
+                           options.Name());
+  if (!options.meshes_only.empty())
+    return InvalidArgument("{}: --source {} has photographs, which are taken as they are",
+                           options.meshes_only, options.Name());
+  return MakePhotographSets({options.Name(), options.input, options.out, options.masks,
+                             options.classes, options.workers, options.build.allow_broken,
+                             options.force});
+}
+
 Status Make(const DatasetOptions& options) {
+  if (std::ranges::any_of(options.sources, IsPhotographSource)) return MakePhotographs(options);
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.Name() : Path(options.out);
   Ranks ranks;
@@ -246,6 +264,12 @@ void AddSourceOptions(Command* command, DatasetOptions* options) {
       "train|val|test, or one file a split, whose name has train, val or test in it; those "
       "of Pixel2Mesh, DVR, DIB-R, PyTorch3D, 3D-R2N2 and ShapeNet's all.csv as they are",
       {SplitAtCommas{}});
+  command->Add("--classes", &options->classes, "pascal3d: a set for each of these [car]",
+               {SplitAtCommas{}});
+  command->Add(
+      "--masks", &options->masks,
+      "pascal3d: folder of masks, CLASS_imagenet/PICTURE.png, or PICTURE_NUMBER.png of one "
+      "object among several");
   command->Add("--allow-broken", &options->build.allow_broken,
                "go on if more than 1 % of a published set cannot be used");
 }
@@ -284,6 +308,11 @@ void AddDataset(CommandList* list) {
     options->size = command.Given("--size");
     options->views = command.Given("--views");
     options->liveries = command.Given("--liveries");
+    for (const char* option :
+         {"--size", "--views", "--per-class", "--liveries", "--limit", "--seed", "--test-share",
+          "--validation-share", "--up", "--split-list"}) {
+      if (command.Given(option)) options->meshes_only = option;
+    }
     options->shares = command.Given("--test-share") || command.Given("--validation-share");
     if (!options->liveries && options->Name() == "thirteen") options->build.liveries = 1;
     return Make(*options);

@@ -26,6 +26,11 @@ constexpr std::size_t kMostKeypoints = 256;
 // A rotation printed with few digits; as camera_conventions.h.
 constexpr double kTolerance = 1e-2;
 
+// In the order in which they are looked for.
+constexpr std::array kPascal3dClasses = {"car",       "aeroplane", "bicycle", "boat",
+                                         "bottle",    "bus",       "chair",   "diningtable",
+                                         "motorbike", "sofa",      "train",   "tvmonitor"};
+
 struct Layout {
   Path data, sfm, images;
   std::string class_name;  // empty: CUB
@@ -52,7 +57,7 @@ std::optional<Layout> FindPascal(const Path& folder) {
   for (const char* below : {".", "p3d", "cachedir/p3d"}) {
     const Path base = (folder / below).lexically_normal(), data = base / "data";
     if (!IsFolder(data)) continue;
-    for (const char* name : {"car", "aeroplane"}) {
+    for (const char* name : kPascal3dClasses) {
       if (!PathExists(data / (std::string(name) + "_kps.mat"))) continue;
       const auto images = FirstThere(folder, {"PASCAL3D+_release1.1/Images", "Images"});
       return Layout{data, base / "sfm", images.value_or(folder / "Images"), name};
@@ -139,6 +144,7 @@ class CmrReader {
   Result<PhotographSet> Read(const Path& folder) {
     set_.folder = folder;
     set_.source = layout_.class_name.empty() ? "cub" : "pascal3d";
+    set_.class_name = layout_.class_name;
     TILEGRAD_TRY(ReadNames());
     for (const auto& [name, split] :
          {std::pair("train", Split::kTrain), {"val", Split::kValidation}, {"test", Split::kTest}}) {

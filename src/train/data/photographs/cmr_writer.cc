@@ -81,7 +81,7 @@ Status WriteKeypointNames(const Path& folder, const PhotographSet& set) {
   names.dims = {1, set.keypoint_names.size()};
   for (const std::string& name : set.keypoint_names) names.elements.push_back(MatArray::Text(name));
   return io::SaveMat(
-      folder / "data/car_kps.mat",
+      folder / "data" / (set.class_name + "_kps.mat"),
       {{"kp_names", names}, {"kp_perm_inds", MatArray::Numbers({mirror.size(), 1}, mirror)}});
 }
 
@@ -105,8 +105,8 @@ Status WriteCmrLayout(const Path& folder, const PhotographSet& set) {
                              : split == Split::kTest && cub ? "test"
                                                             : "val";
     if (part.images.empty()) continue;
-    const std::string anno = cub ? name + "_cub_cleaned.mat" : "car_" + name + ".mat";
-    const std::string sfm = (cub ? "anno_" : "car_") + name + ".mat";
+    const std::string anno = cub ? name + "_cub_cleaned.mat" : set.class_name + "_" + name + ".mat";
+    const std::string sfm = (cub ? "anno" : set.class_name) + "_" + name + ".mat";
     TILEGRAD_TRY(io::SaveMat(
         folder / "data" / anno,
         {{"images", MatArray::Structs({"rel_path", "bbox", "width", "height", "parts", "mask"},

@@ -61,14 +61,14 @@ Status CheckWorld(const std::vector<std::array<double, 3>>& places, const char* 
   return {};
 }
 
-Status CheckPlaces(const Photograph& photo) {
+}  // namespace
+
+Status CheckPhotograph(const Photograph& photo) {
   TILEGRAD_TRY(CheckBox(photo));
   TILEGRAD_TRY(CheckKeypoints(photo));
   TILEGRAD_TRY(CheckWorld(photo.points, "the true place of a keypoint"));
   return photo.camera ? CheckCamera(*photo.camera) : Status();
 }
-
-}  // namespace
 
 double PhotoBox::longer_side() const { return std::max(right - left, bottom - top); }
 
@@ -94,7 +94,7 @@ Result<PhotographSet> OpenPhotographs(const Path& folder) {
   if (set->Select(Split::kTrain).empty())
     return InvalidArgument("{}: no photographs to train on", folder.string());
   for (const Photograph& photo : set->photographs)
-    TILEGRAD_TRY(CheckPlaces(photo).Within((folder / photo.id).string()));
+    TILEGRAD_TRY(CheckPhotograph(photo).Within((folder / photo.id).string()));
   TILEGRAD_TRY(CheckWorld(set->mean_keypoints, "a mean keypoint").Within(folder.string()));
   return std::move(*set);
 }

@@ -64,7 +64,8 @@ struct Photograph {
 };
 
 struct PhotographSet {
-  std::string source;  // "cub", "pascal3d", "photographs"
+  std::string source;      // "cub", "pascal3d", "photographs"
+  std::string class_name;  // of PASCAL3D+: "car"
   Path folder;
   std::vector<std::string> keypoint_names;
   std::vector<int> mirror;  // the mirror image of keypoint i is keypoint mirror[i]
@@ -80,6 +81,9 @@ struct PhotographSet {
 // too, that are far from any picture. At least one photograph of Split::kTrain; cameras,
 // where a folder has keypoints but none, are found by factorisation (factorization.h).
 Result<PhotographSet> OpenPhotographs(const Path& folder);
+
+// Errors: boxes, keypoints and cameras that are far from any picture.
+Status CheckPhotograph(const Photograph& photo);
 
 // The forms alone; nothing if the folder is not of that form.
 Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder);

@@ -286,6 +286,7 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
     photographers.push_back(std::make_unique<Photographer>(job, noise, backgrounds));
   PhotographSet set;
   set.source = "pascal3d";
+  set.class_name = "car";
   set.mirror = ExtremeMirror();
   for (const ExtremePoint& point : kExtremePoints) set.keypoint_names.emplace_back(point.name);
   std::vector<Photograph> all(count);

@@ -80,6 +80,7 @@ inline PhotographSet WriteMiniature(const Path& folder, const std::string& sourc
                                     const MiniatureSize& size = {}) {
   PhotographSet set;
   set.source = source;
+  set.class_name = source == "cub" ? "" : "car";
   const bool cub = source == "cub";
   set.mirror = cub ? CubMirror() : std::vector<int>{1, 0, 3, 2, 5, 4, 6, 7};
   for (std::size_t k = 0; k < set.mirror.size(); ++k)
