@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three commands of docs/photographs.md for owners of CUB-200 and PASCAL3D+, on miniatures of
+// The commands of docs/photographs.md for owners of CUB-200 and PASCAL3D+, on miniatures of
 // their layout.
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ constexpr const char* kSmall =
     " --set network.levels=2 --set network.latent=8 --set network.template_level=1"
     " --set photographs.size=16";
 
-TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
+TEST_F(Photographs, FromAnnotationsToATableInFourCommands) {
   ImageU8 cutout(32, 32, 4);
   for (int y = 8; y < 24; ++y)
     for (int x = 4; x < 28; ++x) std::fill_n(cutout.at(x, y), 4, std::uint8_t{255});
@@ -24,7 +24,12 @@ TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
   for (const auto& [source, config] : {std::pair("cub", "birds"), {"pascal3d", "cars_photos"}}) {
     train::WriteMiniature(folder_ / source, source);
     const std::string run = In(std::string(source) + "_run");
-    ExpectDone(std::string("train --config ") + config + " --data " + In(source) + " --out " + run +
+    const std::string set = In(std::string(source) + "_set");
+    const std::string collect =
+        std::string("dataset --source ") + source + " --input " + In(source) + " --out " + set;
+    ExpectIn(ExpectDone(collect), "10 training, 0 validation and 3 test photographs");
+    ExpectError(collect + " --views 3", "--views: --source " + std::string(source));
+    ExpectDone(std::string("train --config ") + config + " --data " + set + " --out " + run +
                kSmall);
     const std::string table = ExpectDone("eval --run " + run);
     ExpectIn(table, "PCK@0.1");

@@ -18,7 +18,7 @@ struct CollectionJob {
   std::string source;  // "cub" or "pascal3d"
   Path input;
   std::string class_name = "car";  // of PASCAL3D+
-  Path masks;                      // of PASCAL3D+ (pascal3d_masks.h); empty: none
+  Path masks = {};                 // of PASCAL3D+ (pascal3d_masks.h); empty: none
   bool allow_broken = false;       // more than BrokenMembers does
 };
 

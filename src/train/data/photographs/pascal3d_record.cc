@@ -102,8 +102,7 @@ Result<Pascal3dRecord> ReadPascal3dRecord(const io::MatFile& file, const std::st
 // The set's project_3d.m: the camera is at distance * (cos e sin a, -cos e cos a, sin e) and looks
 // at the origin; what it sees is turned by theta about the principal point.
 Camera64 CameraOfViewpoint(const Pascal3dViewpoint& viewpoint) {
-  Eigen::Matrix3d from_ours;
-  from_ours << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  const Eigen::Matrix3d from_ours = Turn(90, Eigen::Vector3d::UnitX());
   const Eigen::Matrix3d rotation = Turn(viewpoint.theta, Eigen::Vector3d::UnitZ()) *
                                    Turn(viewpoint.elevation - 90, Eigen::Vector3d::UnitX()) *
                                    Turn(-viewpoint.azimuth, Eigen::Vector3d::UnitZ()) * from_ours;
