@@ -145,7 +145,7 @@ struct SmallProblem {
     CameraRule rule;
     rule.lens.width = rule.lens.height = store.size;
     Rng rng(5);
-    store.bytes.resize(store.ImageBytes() * 6);
+    store.bytes.Resize(store.ImageBytes() * 6);
     for (int v = 0; v < 3; ++v)
       store.cameras.push_back(OrbitCamera(rule.lens, 40.0 * v, 20, rule.distance));
     // Truth: discs with noise inside.

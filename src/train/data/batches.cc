@@ -36,7 +36,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
   store.views = dataset.info().views;
   store.size = dataset.info().image_size;
   const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
-  store.bytes.resize(per_model * models.size());
+  store.bytes.Resize(per_model * models.size());
   std::mutex mutex;
   std::uint64_t done = 0;
   std::vector<Status> failures(models.size());
@@ -44,9 +44,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
   workers.For(models.size(), [&](std::size_t i, std::size_t) {
     if (stop) return;
     auto images = dataset.LoadImages(models[i]);
-    if (images.ok())
-      std::copy(images->begin(), images->end(),
-                store.bytes.begin() + static_cast<std::ptrdiff_t>(i * per_model));
+    if (images.ok()) std::copy(images->begin(), images->end(), store.bytes.begin() + i * per_model);
     failures[i] = images.status();
     const std::scoped_lock lock(mutex);
     if (progress) progress({"loading images", ++done, models.size(), ""});

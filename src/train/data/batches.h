@@ -9,15 +9,16 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "base/scratch_bytes.h"
 #include "scene/camera.h"
 #include "train/data/dataset.h"
 #include "train/run/portion.h"
 
 namespace tilegrad::train {
 
-// The images of some models in memory: [models][views][4][size][size] bytes.
+// The images of some models: [models][views][4][size][size] bytes.
 struct ImageStore {
-  std::vector<std::uint8_t> bytes;
+  ScratchBytes bytes;
   std::vector<Camera> cameras;  // by view, the same for all models, or by model and view
   int models = 0, views = 0, size = 0;
 

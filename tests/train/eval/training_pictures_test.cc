@@ -58,6 +58,7 @@ class TrainingPicturesTest : public TempFolderTest {
     info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
     info.views = kViews;
     ImageStore store{.bytes = {}, .cameras = {}, .models = models, .views = kViews, .size = kSize};
+    Bytes bytes;
     std::vector<ModelInfo> infos;
     for (int m = 0; m < models; ++m) {
       ModelInfo& model = infos.emplace_back();
@@ -65,8 +66,9 @@ class TrainingPicturesTest : public TempFolderTest {
       model.name = "a\tb " + model.id;
       model.shape = shape;
       for (int v = 0; v < kViews; ++v)
-        AddPlanar(picture_.empty() ? Draw(Shown(m, v)) : picture_, &store.bytes);
+        AddPlanar(picture_.empty() ? Draw(Shown(m, v)) : picture_, &bytes);
     }
+    store.bytes.Assign(bytes);
     EXPECT_TRUE(WriteDatasetInfo(folder_, info).ok());
     EXPECT_TRUE(WriteModels(folder_, info, infos).ok());
     return TrainingPictures::Of(Dataset::Open(folder_).value(), store, Workers(workers));

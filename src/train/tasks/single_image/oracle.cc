@@ -20,7 +20,7 @@ constexpr double kShapeRate = 0.01, kColorRate = 0.03, kFinalFactor = 0.05;
 // The views of one object as the images of a store.
 ImageStore StoreOf(const ModelData& data, const DatasetInfo& info) {
   ImageStore store;
-  store.bytes = data.images;
+  store.bytes.Assign(data.images);
   store.models = 1;
   store.views = info.views;
   store.size = info.image_size;

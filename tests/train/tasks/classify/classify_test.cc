@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <numeric>
 
 #include "base/rng.h"
 #include "nn/nn.h"
@@ -153,7 +154,8 @@ TEST_F(ClassifyTest, PicturesAreMovedAndMirrored) {
   LabelledImages data;
   data.images.models = data.images.views = 1;
   data.images.size = 2;
-  for (int i = 0; i < 16; ++i) data.images.bytes.push_back(static_cast<std::uint8_t>(i + 1));
+  data.images.bytes.Resize(16);
+  std::iota(data.images.bytes.begin(), data.images.bytes.end(), std::uint8_t{1});
   data.labels = {7};
   const Sample samples[] = {{0, {0}}, {0, {0}, true}, {0, {0}}};
   const Shift shifts[] = {{}, {}, {1, -1}};

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/scratch_bytes.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <new>
+#include <string>
+#include <system_error>
+
+namespace tilegrad {
+namespace {
+
+// Room for `size` bytes, so that no write to the mapping can fail; -1 where there is none.
+int OpenScratchFile(std::size_t size) {
+  std::error_code error;
+  std::string name = (std::filesystem::temp_directory_path(error) / "tilegrad-XXXXXX").string();
+  const int fd = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd < 0) return -1;
+  ::unlink(name.c_str());
+  if (::posix_fallocate(fd, 0, static_cast<off_t>(size)) == 0) return fd;
+  ::close(fd);
+  return -1;
+}
+
+void* MapBytes(std::size_t size, std::size_t in_memory) {
+  const int fd = size > in_memory ? OpenScratchFile(size) : -1;
+  const int kind = fd < 0 ? MAP_PRIVATE | MAP_ANONYMOUS : MAP_SHARED;
+  void* const bytes = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, kind, fd, 0);
+  if (fd >= 0) ::close(fd);
+  return bytes;
+}
+
+}  // namespace
+
+void ScratchBytes::Resize(std::size_t size) {
+  Free();
+  if (size == 0) return;
+  void* const bytes = MapBytes(size, in_memory_);
+  if (bytes == MAP_FAILED) throw std::bad_alloc();
+  bytes_ = {static_cast<std::uint8_t*>(bytes), size};
+}
+
+void ScratchBytes::Assign(std::span<const std::uint8_t> bytes) {
+  Resize(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), begin());
+}
+
+void ScratchBytes::Free() {
+  if (!bytes_.empty()) ::munmap(bytes_.data(), bytes_.size());
+  bytes_ = {};
+}
+
+}  // namespace tilegrad
