@@ -58,7 +58,7 @@ std::string DatasetSourceHelp() {
   return "where models come from: sweethome3d (Debian package sweethome3d-furniture), planes "
          "(flightgear-data-ai), ships (flightgear-data-models), cars (torcs-data, "
          "trigger-rally-data, ufoai-data), several of these with commas between, thirteen (all of "
-         "these), shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL with "
+         "these), shapenet (ShapeNetCore, version 1 or 2), folder (CLASS/MODEL with "
          "one of " +
          io::MeshFileEndings() +
          "), procedural (built in), cub and pascal3d (photographs); renders of ShapeNet: nmr (.npz "
@@ -107,8 +107,7 @@ bool HoldsPictures(const std::string& name) {
 // An option that would do nothing is a mistake: somebody expects a split that there will not be.
 Status CheckEffects(const DatasetOptions& options) {
   const std::string name = options.Name();
-  if (!options.classes.empty() || !options.masks.empty())
-    return InvalidArgument("--classes, --masks: not for --source {}", name);
+  if (!options.masks.empty()) return InvalidArgument("--masks: not for --source {}", name);
   const bool pictures = HoldsPictures(name), listed = !options.split_lists.empty();
   if (listed && (name == "nmr" || (!pictures && name != "shapenet")))
     return InvalidArgument("--split-list is for --source shapenet, choy, dvr and dibr, not {}",
@@ -222,6 +221,7 @@ Status Make(const DatasetOptions& options) {
   train::BuildOptions build = options.build;
   build.crew = ranks.crew();
   build.anew = options.force;
+  for (const std::string& name : options.classes) build.classes.push_back(train::SynsetName(name));
   const Workers workers(ranks.Workers(options.workers));
   ProgressLine line;
   auto made = train::BuildDataset(**source, build, folder, workers,
@@ -264,7 +264,8 @@ void AddSourceOptions(Command* command, DatasetOptions* options) {
       "train|val|test, or one file a split, whose name has train, val or test in it; those "
       "of Pixel2Mesh, DVR, DIB-R, PyTorch3D, 3D-R2N2 and ShapeNet's all.csv as they are",
       {SplitAtCommas{}});
-  command->Add("--classes", &options->classes, "pascal3d: a set for each of these [car]",
+  command->Add("--classes", &options->classes,
+               "only these classes, by name or ShapeNet's number; pascal3d: a set for each [car]",
                {SplitAtCommas{}});
   command->Add(
       "--masks", &options->masks,

@@ -39,6 +39,7 @@ struct DatasetInfo {
   CameraRule camera;
   std::vector<std::string> classes;  // sorted; ModelInfo::class_index points here
   std::vector<std::string> credits;  // one sentence a source
+  std::string input;                 // absolute folder of the models, of "shapenet"; else empty
   std::string recipe;                // 16 hex digits over all that shapes the model files
   UpAxis up = UpAxis::kY;            // of the source's meshes; only while the files are made
   bool own_cameras = false;          // each model has its own; `camera` is what they are like

@@ -164,10 +164,11 @@ Status RemoveDataset(const Path& folder) {
 }
 
 Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info) {
-  const Json json = {
+  Json json = {
       {"format", kFormat},       {"source", info.source},      {"image_size", info.image_size},
       {"views", info.views},     {"camera", CameraJson(info)}, {"classes", info.classes},
       {"credits", info.credits}, {"recipe", info.recipe}};
+  if (!info.input.empty()) json["input"] = info.input;
   return WriteTextAtomic(DatasetInfoPath(folder), JsonText(json, 2) + "\n");
 }
 
@@ -189,6 +190,7 @@ Result<DatasetInfo> ReadDatasetInfo(const Path& folder) {
   fields.Read("classes", &info.classes);
   fields.Read("credits", &info.credits);
   fields.Read("recipe", &info.recipe);
+  if (json.contains("input")) fields.Read("input", &info.input);
   if (!fields.status().ok()) return fields.status();
   TILEGRAD_TRY(ReadCamera(json.value("camera", nlohmann::json()), place + ": \"camera\"", &info));
   return info;

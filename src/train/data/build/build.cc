@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "io/image_file.h"
 #include "render/picture/composite.h"
+#include "train/data/broken_members.h"
 #include "train/data/build/choose.h"
 #include "train/data/build/make_model.h"
 #include "train/data/dataset.h"
@@ -77,6 +78,7 @@ DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
   if (const auto fixed = source.FixedInfo()) info = *fixed;
   info.source = source.name();
   info.credits = source.credits();
+  info.input = source.input();
   info.up = options.up;
   info.camera.lens.width = info.camera.lens.height = info.image_size;
   info.recipe = RecipeOf(info, source.version());
@@ -337,6 +339,7 @@ Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions&
                                   const Path& folder, const Workers& workers,
                                   const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_TRY(CheckOptions(options));
+  TILEGRAD_TRY(CheckClasses(source.entries(), options.classes));
   return Builder(source, options, folder, workers, progress, stop).Run();
 }
 

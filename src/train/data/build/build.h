@@ -25,8 +25,9 @@ struct BuildOptions {
   int per_class = 0;  // at most that many shapes of a class, chosen by a hash of the seed; 0: all
   int liveries = 0;   // at most that many models of a shape, chosen in the same way; 0: all
   int limit = 0;      // at most that many in all; 0: all
-  UpAxis up = UpAxis::kY;     // of the source's meshes
-  bool anew = false;          // a dataset that is there goes first
+  UpAxis up = UpAxis::kY;                 // of the source's meshes
+  std::vector<std::string> classes = {};  // only these; empty: all
+  bool anew = false;                      // a dataset that is there goes first
   bool allow_broken = false;  // any share of a published set may be unusable (broken_members.h)
   // Ranks that make the dataset together, in one folder that all of them see; null: this process
   // alone.
@@ -54,9 +55,8 @@ struct BuildSummary {
 // that was not interrupted; so does any number of workers and ranks. Models that fail are listed in
 // rejected.jsonl and left out. `stop` ends the run between models with kCancelled. Errors: a folder
 // that holds a dataset of another recipe, options out of range, no usable model, too many broken
-// ones of a published set, a full disk. With
-// a crew every rank calls it and rank 0 gets the summary, but for warnings of models that others
-// read.
+// ones of a published set, a full disk. With a crew every rank calls it and rank 0 gets the
+// summary, but for warnings of models that others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers,
                                   const ProgressSink& progress, const StopFlag& stop);

@@ -3,11 +3,20 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "base/error.h"
 #include "base/rng.h"
 
 namespace tilegrad::train {
+
+namespace {
+
+bool IsWanted(const std::vector<std::string>& classes, const std::string& name) {
+  return classes.empty() || std::find(classes.begin(), classes.end(), name) != classes.end();
+}
+
+}  // namespace
 
 std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
                                        const BuildOptions& options) {
@@ -22,6 +31,7 @@ std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
   };
   std::vector<Candidate> order;
   for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (!IsWanted(options.classes, entries[i].class_name)) continue;
     const std::uint64_t seed = Mix64(options.split.seed);
     order.push_back({HashText(shape_of(i), seed),
                      HashText(entries[i].class_name + "/" + entries[i].id, seed), i});
@@ -39,6 +49,18 @@ std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
   }
   std::sort(chosen.begin(), chosen.end());
   return chosen;
+}
+
+Status CheckClasses(const std::vector<SourceEntry>& entries,
+                    const std::vector<std::string>& classes) {
+  std::set<std::string> there;
+  for (const SourceEntry& entry : entries) there.insert(entry.class_name);
+  for (const std::string& name : classes) {
+    if (there.count(name) > 0) continue;
+    return InvalidArgument("--classes: \"{}\" is none of the source's classes: {}", name,
+                           fmt::join(there, ", "));
+  }
+  return {};
 }
 
 namespace {

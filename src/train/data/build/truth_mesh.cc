@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 #include <unordered_map>
+#include <utility>
 
 #include "base/rng.h"
 #include "render/picture/mesh_pictures.h"
@@ -22,6 +23,16 @@ struct VertexSum {
 
 std::uint64_t MaterialOf(const Mesh& mesh, std::size_t face) {
   return mesh.face_materials.empty() ? 0 : static_cast<std::uint64_t>(mesh.face_materials[face]);
+}
+
+bool Collapsed(const Face& face) {
+  return face[0] == face[1] || face[1] == face[2] || face[0] == face[2];
+}
+
+// The same three corners in the same winding are one face, wherever it begins.
+Face FromItsLeast(Face face) {
+  std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+  return face;
 }
 
 // Joins the corners that `key_of(face, k)` gives the same key.
@@ -44,9 +55,8 @@ Mesh JoinCorners(const Mesh& mesh, const ColorList& colors, KeyOf key_of) {
       sum.count += 1;
       face[corner] = at->second;
     }
-    if (face[0] == face[1] || face[1] == face[2] || face[0] == face[2]) continue;
-    // The same three corners in the same winding are one face.
-    std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+    if (Collapsed(face)) continue;
+    face = FromItsLeast(face);
     if (seen.insert(face).second) out.faces.push_back(face);
   }
   for (const VertexSum& sum : sums) {
@@ -54,6 +64,17 @@ Mesh JoinCorners(const Mesh& mesh, const ColorList& colors, KeyOf key_of) {
     out.colors.emplace_back(sum.color / sum.count, 1.0f);
   }
   return out;
+}
+
+// What vertex v has, as what vertex to[v] has, of `kept`; negative: left out.
+template <class T>
+void Renumber(const std::vector<std::int32_t>& to, std::int32_t kept, std::vector<T>* values) {
+  if (values->empty()) return;
+  std::vector<T> out(static_cast<std::size_t>(kept));
+  for (std::size_t v = 0; v < to.size(); ++v) {
+    if (to[v] >= 0) out[static_cast<std::size_t>(to[v])] = (*values)[v];
+  }
+  *values = std::move(out);
 }
 
 // Vertices that no face uses any more go.
@@ -67,16 +88,9 @@ void DropUnused(Mesh* mesh) {
       v = target;
     }
   }
-  Mesh out;
-  out.positions.resize(static_cast<std::size_t>(kept));
-  out.colors.resize(static_cast<std::size_t>(kept));
-  for (std::size_t v = 0; v < to.size(); ++v) {
-    if (to[v] < 0) continue;
-    out.positions[static_cast<std::size_t>(to[v])] = mesh->positions[v];
-    out.colors[static_cast<std::size_t>(to[v])] = mesh->colors[v];
-  }
-  out.faces = std::move(mesh->faces);
-  *mesh = std::move(out);
+  Renumber(to, kept, &mesh->positions);
+  Renumber(to, kept, &mesh->normals);
+  Renumber(to, kept, &mesh->colors);
 }
 
 std::uint64_t Cell(glm::vec3 p, const Bounds& bounds, float cell) {
@@ -87,13 +101,45 @@ std::uint64_t Cell(glm::vec3 p, const Bounds& bounds, float cell) {
   return key;
 }
 
-Mesh Cluster(const Mesh& mesh, const ColorList& colors, const Bounds& bounds, int cells) {
+float CellSide(const Bounds& bounds, int cells) {
   const glm::vec3 size = bounds.high - bounds.low;
-  const float cell = std::max({size.x, size.y, size.z}) / static_cast<float>(cells);
+  return std::max({size.x, size.y, size.z}) / static_cast<float>(cells);
+}
+
+Mesh Cluster(const Mesh& mesh, const ColorList& colors, const Bounds& bounds, int cells) {
+  const float cell = CellSide(bounds, cells);
   return JoinCorners(mesh, colors, [&](std::size_t f, int k) {
     const auto v = static_cast<std::size_t>(mesh.faces[f][static_cast<std::size_t>(k)]);
     return Cell(mesh.positions[v], bounds, cell) << 24 | MaterialOf(mesh, f);
   });
+}
+
+// The vertices of a cell become the first of them, at the mean of their corners.
+void JoinVertices(const Bounds& bounds, int cells, Mesh* mesh) {
+  const float cell = CellSide(bounds, cells);
+  std::unordered_map<std::uint64_t, std::int32_t> first;
+  std::vector<VertexSum> sums(mesh->positions.size());
+  for (Face& face : mesh->faces) {
+    for (std::int32_t& v : face) {
+      const glm::vec3 p = mesh->positions[static_cast<std::size_t>(v)];
+      v = first.try_emplace(Cell(p, bounds, cell), v).first->second;
+      VertexSum& sum = sums[static_cast<std::size_t>(v)];
+      sum.position += p;
+      sum.count += 1;
+    }
+  }
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    if (sums[v].count > 0) mesh->positions[v] = sums[v].position / sums[v].count;
+  }
+}
+
+// Those that have no area or double another; false if no others are there.
+bool DropSpentFaces(Mesh* mesh) {
+  std::set<Face> seen;
+  std::vector<char> keep;
+  for (const Face& face : mesh->faces)
+    keep.push_back(!Collapsed(face) && seen.insert(FromItsLeast(face)).second);
+  return KeepFaces(keep, mesh);
 }
 
 }  // namespace
@@ -116,6 +162,20 @@ Mesh MakeTruthMesh(const Mesh& mesh, std::size_t max_faces) {
   }
   DropUnused(&out);
   return out;
+}
+
+void ClusterFaces(std::size_t max_faces, Mesh* mesh) {
+  if (mesh->faces.size() <= max_faces) return;
+  const Bounds bounds = MeshBounds(*mesh);
+  auto textures = std::exchange(mesh->textures, {});  // not to be copied each time
+  for (int cells = 160; mesh->faces.size() > max_faces && cells > 1; cells = cells * 4 / 5) {
+    Mesh joined = *mesh;
+    JoinVertices(bounds, cells, &joined);
+    if (!DropSpentFaces(&joined)) break;
+    *mesh = std::move(joined);
+  }
+  mesh->textures = std::move(textures);
+  DropUnused(mesh);
 }
 
 std::uint64_t GeometryFingerprint(const Mesh& mesh) {

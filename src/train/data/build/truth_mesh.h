@@ -15,6 +15,10 @@ namespace tilegrad::train {
 // stands at its mean, and faces that collapse or double another are dropped.
 Mesh MakeTruthMesh(const Mesh& mesh, std::size_t max_faces);
 
+// The same clustering of a mesh that keeps its texture coordinates and materials: each corner has
+// what it had. Stops before nothing is left.
+void ClusterFaces(std::size_t max_faces, Mesh* mesh);
+
 // The same for any order of faces and vertices, and for any colours. Never 0. Of a normalised mesh,
 // positions rounded to 1e-4.
 std::uint64_t GeometryFingerprint(const Mesh& mesh);

@@ -52,6 +52,7 @@ class ModelSource {
   virtual std::vector<IgnoredFile> ignored() const { return {}; }
   // Whether it is a set that others know too, of whose models hardly any may be unusable.
   virtual bool published() const { return false; }
+  virtual std::string input() const { return {}; }  // DatasetInfo::input
   // Another where the same entries give other models, as after a change of a list that says how
   // they are read; 0 where nothing does.
   virtual std::uint64_t version() const { return 0; }
@@ -83,8 +84,10 @@ std::unique_ptr<ModelSource> CombineSources(std::string name,
 // folder within one.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
-// folder/<synset>/<model>/models/model_normalized.obj, the paper's 13 synsets; other folders
-// are not looked at. With a list (split_list.h) only the models that it lists are used.
+// ShapeNetCore: folder/<synset>/<model>/models/model_normalized.obj (v2) or
+// folder/<synset>/<model>/model.obj (v1), axes as the files have them (y up), of the paper's 13
+// synsets; other folders are not looked at. A model without a file is an entry that cannot be
+// loaded. With a list (split_list.h) only the models that it lists are used.
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list);
 
 // Published renders of ShapeNet models; each file says what lies where: 3D-R2N2's (choy.cc), N3MR's

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "scene/shapes.h"
 #include "train/data/build/glass.h"
@@ -43,6 +44,35 @@ TEST(TruthMesh, LargeMeshesAreReducedWithinAFewPercent) {
     EXPECT_NEAR(r, 0.45f, 0.03f);  // the mean of a cell of at most 0.9 / 26 across
   }
   EXPECT_LE(MakeTruthMesh(ball, 10).faces.size(), 10u);
+}
+
+// A ball whose corners say where they were: they stay where they are shown.
+TEST(ClusterFaces, LeavesCornersWithWhatTheyHad) {
+  Mesh ball = Icosphere(5, 0.45f);  // 20,480 faces
+  for (const Face& face : ball.faces) {
+    for (const std::int32_t v : face) {
+      const glm::vec3 p = ball.positions[static_cast<std::size_t>(v)];
+      ball.corner_uvs.emplace_back(p.x, p.y);
+    }
+  }
+  ball.textures = {{"white", ImageU8(1, 1, 3, 255)}};
+  ball.materials = {{.name = "", .base_color_texture = 0}};
+  ClusterFaces(20480, &ball);
+  EXPECT_EQ(ball.faces.size(), 20480u);
+  ClusterFaces(2000, &ball);
+  EXPECT_TRUE(Validate(ball).ok());
+  EXPECT_LE(ball.faces.size(), 2000u);
+  EXPECT_GT(ball.faces.size(), 500u);
+  EXPECT_LT(ball.positions.size(), 1500u);
+  EXPECT_EQ(ball.textures.size(), 1u);
+  for (std::size_t c = 0; c < ball.corner_uvs.size(); ++c) {
+    const glm::vec3 p = ball.positions[static_cast<std::size_t>(ball.faces[c / 3][c % 3])];
+    EXPECT_NEAR(ball.corner_uvs[c].x, p.x, 0.09f);  // a cell is at most 0.9 / 20 across
+    EXPECT_NEAR(ball.corner_uvs[c].y, p.y, 0.09f);
+    EXPECT_NEAR(glm::length(p), 0.45f, 0.03f);
+  }
+  ClusterFaces(1, &ball);  // there is always something left
+  EXPECT_FALSE(ball.faces.empty());
 }
 
 TEST(GeometryFingerprint, SeesShapeOnly) {
