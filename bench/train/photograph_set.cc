@@ -32,12 +32,12 @@ Status Run(int argc, char** argv) {
   const Workers workers(0);
   const StopFlag stop = false;
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(argv[1]));
-  std::vector<TexturedMesh> meshes[2];
-  for (const Split split : {Split::kTrain, Split::kTest}) {
-    TILEGRAD_ASSIGN(meshes[split == Split::kTest],
-                    LoadTexturedMeshes(dataset, dataset.Select(split), {}, workers, nullptr, stop));
-  }
-  RenderedSetJob job{meshes[0], meshes[1], PhotographsBelow(argv[2])};
+  const auto open = [&](Split split) {
+    return OpenTexturedMeshes(dataset, dataset.Select(split), {}, workers, nullptr, stop);
+  };
+  TILEGRAD_ASSIGN(const MeshCache train, open(Split::kTrain));
+  TILEGRAD_ASSIGN(const MeshCache test, open(Split::kTest));
+  RenderedSetJob job{train, test, PhotographsBelow(argv[2])};
   if (argc > 4) job.train_count = std::atoi(argv[4]);
   if (argc > 5) job.test_count = std::atoi(argv[5]);
   fmt::print("{} training and {} test models, {} backgrounds\n", job.train.size(), job.test.size(),

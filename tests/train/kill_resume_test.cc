@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program, which renders half of its pictures itself, is killed with SIGKILL at random
 // moments and resumed: the weights, moments and
-// curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers.
+// curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers and
+// the size of the cache of meshes.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -88,6 +89,7 @@ class KillResume : public TempFolderTest {
 
   void CheckKills(int kills) {
     const double seconds = Finish("whole", 2);
+    settings_.insert(settings_.end(), {"--set", "stream.cache=1K"});  // a mesh or two
     // On a machine whose load has fallen since, a run may be over before the first of them.
     std::string run = "killed";
     int killed = KillAtRandom(run, kills, seconds);

@@ -42,8 +42,9 @@ class Photographer {
   Result<Drawn> Take(int index) {
     Rng rng(job_.seed ^ kObjectStream, static_cast<std::uint64_t>(index));
     const bool train = index < job_.train_count;
-    const auto& models = train ? job_.train : job_.test;
-    const Mesh mesh = Stretched(models[rng.Below(models.size())].mesh(), rng);
+    const MeshCache& models = train ? job_.train : job_.test;
+    TILEGRAD_ASSIGN(const auto model, models.Get(rng.Below(models.size())));
+    const Mesh mesh = Stretched(model->mesh(), rng);
     const Camera camera = CameraOf(rng);
     TILEGRAD_ASSIGN(const auto planes, lit_.Render(mesh, {&camera, 1}, kSide));
     const int left = static_cast<int>(rng.Below(kWidth - kSide + 1)),
@@ -277,7 +278,7 @@ void TellTruth(PhotographSet* set) {
 
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const ProgressSink& progress, const StopFlag& stop) {
-  if (job.train.empty() || job.test.empty())
+  if (job.train.size() == 0 || job.test.size() == 0)
     return InvalidArgument("photographs need models to train on and models to test on");
   TILEGRAD_ASSIGN(const auto backgrounds, LoadBackgrounds(job.backgrounds));
   const auto count = static_cast<std::size_t>(job.train_count + job.test_count);

@@ -14,8 +14,8 @@
 namespace tilegrad::train {
 
 struct RenderedSetJob {
-  const std::vector<TexturedMesh>& train;  // models, from each of which many objects are made
-  const std::vector<TexturedMesh>& test;
+  const MeshCache& train;  // models, from each of which many objects are made
+  const MeshCache& test;
   std::vector<Path> backgrounds;  // photographs
   int train_count = 600, test_count = 120;
   std::uint64_t seed = 1;

@@ -3,11 +3,22 @@
 
 namespace tilegrad::train {
 
+ConfigField CacheField(std::string* cache) {
+  return {
+      "stream.cache",
+      cache,
+      0,
+      0,
+      "memory for meshes and textures (512M, 4G); the others are read again when they are drawn",
+      Affects::kReporting};
+}
+
 ConfigFields FieldsOf(StreamConfig* c) {
   return {
       {"stream.share", &c->share, 0, 1,
        "share of the objects of a batch that are deformed and rendered while training"},
       {"stream.max_faces", &c->max_faces, 4, 100000, "of a mesh; larger ones are clustered"},
+      CacheField(&c->cache),
       {"stream.samples", &c->samples, 1, 8, "along each side of a pixel"},
       {"stream.stretch", &c->stretch, 0, 2,
        "pieces of an object grow by up to exp(this) along each axis, or shrink"},

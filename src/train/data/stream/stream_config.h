@@ -13,6 +13,7 @@ struct StreamConfig {
   double share = 0;  // of the objects of a batch; the others are the dataset's pictures
   std::int64_t max_faces = 2000;  // of a mesh; larger ones are clustered
   std::int64_t samples = 2;       // along each side of a pixel
+  std::string cache = "4G";       // of memory for meshes and textures
 
   // The shape. Each axis is cut into pieces, and each piece grows or shrinks by a factor of its own
   // within exp(+-stretch); across x = 0 the pieces are mirror images. Upper and lower end then
@@ -37,6 +38,8 @@ struct StreamConfig {
   double light = 0.25;      // how far lights leave those of datasets: 1 is anywhere above
 };
 
+// stream.cache
+ConfigField CacheField(std::string* cache);
 ConfigFields FieldsOf(StreamConfig* config);
 
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "scene/creases.h"
 #include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
@@ -16,15 +17,6 @@ namespace tilegrad::train {
 namespace {
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
-MeshSceneOptions SceneOptions(NormalSource normals) {
-  MeshSceneOptions options;
-  options.color_space = ColorSpace::kSrgb;
-  options.normals = normals;
-  options.filter = Filter::kBilinear;
-  options.blend = false;
-  return options;
-}
 
 // They would count when a deformed copy is scaled to its box.
 void CentreUnusedVertices(Mesh* mesh) {
@@ -37,30 +29,34 @@ void CentreUnusedVertices(Mesh* mesh) {
   }
 }
 
-Result<std::unique_ptr<ModelSource>> OpenSource(const Dataset& dataset, const std::string& folder) {
+Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetInfo& info, const std::string& given) {
+  const std::string& folder = given.empty() ? info.input : given;
+  if (info.source == "shapenet" && !folder.empty()) return ShapeNetSource(folder, {});
   if (!folder.empty()) return FolderSource(folder);
-  const std::string& name = dataset.info().source;
-  const bool installed = name == kThirteen || FindInstalledSource(name.substr(0, name.find('+')));
-  if (installed) return OpenInstalledSources(name);
+  const bool installed =
+      info.source == kThirteen || FindInstalledSource(info.source.substr(0, info.source.find('+')));
+  if (installed) return OpenInstalledSources(info.source);
   return std::unique_ptr<ModelSource>();
 }
 
 class Loader {
  public:
-  Loader(const Dataset& dataset, const TexturedMeshRequest& request)
-      : dataset_(dataset), request_(request) {}
+  Loader(const Dataset& dataset, const TexturedMeshRequest& request, std::vector<int> models)
+      : dataset_(dataset),
+        request_(request),
+        models_(std::move(models)),
+        entries_(models_.size(), kNone) {}
 
-  Status Open(const std::vector<int>& models) {
-    entries_.assign(models.size(), kNone);
-    if (clusters()) return {};
-    TILEGRAD_ASSIGN(source_, OpenSource(dataset_, request_.folder));
+  Status Open() {
+    if (request_.colored) return {};
+    TILEGRAD_ASSIGN(source_, OpenSource(dataset_.info(), request_.folder));
     if (!source_) return {};
     std::map<std::pair<std::string, std::string>, std::size_t> places;
     for (std::size_t e = 0; e < source_->entries().size(); ++e)
       places[{source_->entries()[e].class_name, source_->entries()[e].id}] = e;
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      const auto at = places.find({ClassOf(models[i]), InfoOf(models[i]).id});
-      if (at == places.end()) return Changed(models[i], "is not there any more");
+    for (std::size_t i = 0; i < models_.size(); ++i) {
+      const auto at = places.find({ClassOf(models_[i]), InfoOf(models_[i]).id});
+      if (at == places.end()) return Changed(models_[i], "is not there any more");
       entries_[i] = at->second;
     }
     return {};
@@ -75,31 +71,24 @@ class Loader {
     return order;
   }
 
-  Result<std::unique_ptr<TexturedMesh>> Load(int model, std::size_t i) const {
-    Mesh mesh;
-    if (entries_[i] == kNone) {
-      TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
-      mesh = std::move(data.mesh);
-      if (mesh.faces.empty())
-        return InvalidArgument("{}: has no mesh to render{}", dataset_.ModelPath(model).string(),
-                               clusters() ? "; set stream.share to 0" : "");
+  Result<TexturedMesh> Load(std::size_t i) const {
+    TILEGRAD_ASSIGN(Mesh mesh, entries_[i] == kNone ? FromDataset(models_[i])
+                                                    : FromSource(models_[i], entries_[i]));
+    const auto most = static_cast<std::size_t>(request_.max_faces);
+    if (request_.colored) {
+      mesh = MakeTruthMesh(mesh, most);
     } else {
-      TILEGRAD_ASSIGN(mesh, FromSource(model, entries_[i]));
-    }
-    if (clusters()) {
-      mesh = MakeTruthMesh(mesh, static_cast<std::size_t>(request_.max_faces));
-    } else {
+      if (most > 0) ClusterFaces(most, &mesh);
       CentreUnusedVertices(&mesh);
     }
     for (MeshTexture& texture : mesh.textures)
       texture.image = ShrunkImage(texture.image, request_.max_texture);
-    if (request_.crease <= 0) return std::make_unique<TexturedMesh>(std::move(mesh));
+    if (request_.crease <= 0) return TexturedMesh(std::move(mesh));
     SplitAtCreases(request_.crease, &mesh);
-    return std::make_unique<TexturedMesh>(std::move(mesh), NormalSource::kSmooth);
+    return TexturedMesh(std::move(mesh), NormalSource::kSmooth);
   }
 
  private:
-  bool clusters() const { return request_.max_faces > 0; }
   const ModelInfo& InfoOf(int model) const {
     return dataset_.models()[static_cast<std::size_t>(model)];
   }
@@ -110,6 +99,13 @@ class Loader {
     return InvalidArgument(
         "{}: the model {}/{} of {} {} there; make the dataset again from what is there now",
         dataset_.folder().string(), ClassOf(model), InfoOf(model).id, source_->name(), how);
+  }
+
+  Result<Mesh> FromDataset(int model) const {
+    TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
+    if (!data.mesh.faces.empty()) return std::move(data.mesh);
+    return InvalidArgument("{}: has no mesh to render{}", dataset_.ModelPath(model).string(),
+                           request_.colored ? "; set stream.share to 0" : "");
   }
 
   // The dataset does not note which axis was up; its shape tells.
@@ -128,53 +124,39 @@ class Loader {
   }
 
   const Dataset& dataset_;
-  const TexturedMeshRequest& request_;
+  const TexturedMeshRequest request_;
+  const std::vector<int> models_;
   std::unique_ptr<ModelSource> source_;  // null: the dataset's own meshes
-  std::vector<std::size_t> entries_;     // of the models
+  std::vector<std::size_t> entries_;     // of models_
 };
 
 }  // namespace
 
-TexturedMesh::TexturedMesh(Mesh mesh, NormalSource normals)
-    : mesh_(std::make_unique<Mesh>(std::move(mesh))),
-      scene_(std::make_unique<MeshScene>(*mesh_, SceneOptions(normals))) {}
-
-std::size_t TexturedMesh::bytes() const {
-  std::size_t bytes = mesh_->positions.size() * sizeof(glm::vec3) +
-                      mesh_->faces.size() * (sizeof(Face) + 3 * sizeof(glm::vec2));
-  for (const MeshTexture& texture : mesh_->textures) bytes += texture.image.pixels.size();
-  for (const Texture& texture : scene().textures) bytes += texture.texels.size_bytes();
-  return bytes;
-}
-
-Result<std::vector<TexturedMesh>> LoadTexturedMeshes(
-    const Dataset& dataset, const std::vector<int>& models, const TexturedMeshRequest& request,
-    const Workers& workers, const ProgressSink& progress, const StopFlag& stop) {
-  Loader loader(dataset, request);
-  TILEGRAD_TRY(loader.Open(models));
-  const std::vector<std::size_t> order = loader.Order();
-  std::vector<std::unique_ptr<TexturedMesh>> loaded(models.size());
+Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<int>& models,
+                                     const TexturedMeshRequest& request, const Workers& workers,
+                                     const ProgressSink& progress, const StopFlag& stop) {
+  const auto bytes = ParseByteCount(request.cache);
+  if (!bytes.ok()) return bytes.status().Within("stream.cache");
+  const auto loader = std::make_shared<Loader>(dataset, request, models);
+  TILEGRAD_TRY(loader->Open());
+  MeshCache meshes(models.size(), *bytes, [loader](std::size_t i) { return loader->Load(i); });
+  const std::vector<std::size_t> order = loader->Order();
   std::vector<Status> failures(models.size());
   std::mutex mutex;
   std::atomic<std::size_t> next = 0;
-  std::size_t done = 0, bytes = 0;
+  std::size_t done = 0;
   workers.For(static_cast<std::size_t>(workers.count()), [&](std::size_t, std::size_t) {
-    for (std::size_t n = next++; n < order.size() && !stop; n = next++) {
-      const std::size_t i = order[n];
-      auto mesh = loader.Load(models[i], i);
-      failures[i] = mesh.status();
-      if (mesh.ok()) loaded[i] = std::move(*mesh);
+    for (std::size_t n = next++; n < order.size() && !stop && !meshes.full(); n = next++) {
+      failures[order[n]] = meshes.Get(order[n]).status();
       const std::scoped_lock lock(mutex);
-      if (loaded[i]) bytes += loaded[i]->bytes();
       if (progress)
-        progress({"loading meshes", ++done, order.size(), fmt::format("{:.1f} MB", bytes / 1e6)});
+        progress({"loading meshes", ++done, order.size(),
+                  fmt::format("{:.1f} MB", static_cast<double>(meshes.bytes()) / 1e6)});
     }
   });
   if (stop) return Cancelled("stopped while loading meshes");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
-  std::vector<TexturedMesh> out;
-  for (auto& mesh : loaded) out.push_back(std::move(*mesh));
-  return out;
+  return meshes;
 }
 
 ImageU8 ShrunkImage(const ImageU8& image, int side) {

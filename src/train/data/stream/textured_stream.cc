@@ -45,8 +45,11 @@ ConfigFields FieldsOf(TexturedStreamConfig* c) {
   ConfigFields fields = FieldsOf(&c->draw);
   std::erase_if(fields, [](const ConfigField& field) {
     return field.key == "stream.share" || field.key == "stream.max_faces" ||
-           field.key == "stream.light";
+           field.key == "stream.light" || field.key == "stream.cache";
   });
+  fields.push_back({"stream.max_faces", &c->meshes.max_faces, 0, 1000000,
+                    "of a mesh; larger ones are clustered; 0: none"});
+  fields.push_back(CacheField(&c->meshes.cache));
   fields.push_back({"stream.max_texture", &c->meshes.max_texture, 1, 4096,
                     "texels a side of the source's textures; larger ones are averaged down"});
   fields.push_back({"stream.models", &c->meshes.folder, 0, 0,
@@ -70,6 +73,7 @@ struct TexturedStream::Worker {
   Workers alone{1};
   Renderer renderer = RendererOn(alone);
   Frame frame;
+  MeshCache::Held held;  // to which the scenes refer
   std::vector<glm::vec3> positions;
   std::vector<float> colors;
   std::vector<std::vector<float>> texels;
@@ -158,9 +162,8 @@ Status TexturedStream::Worker::Take(const Job& job, Appearance appearance) {
   return {};
 }
 
-TexturedStream::TexturedStream(const Job& job, std::span<const TexturedMesh> meshes,
-                               const Workers& workers)
-    : job_(job), meshes_(meshes) {
+TexturedStream::TexturedStream(const Job& job, MeshCache meshes, const Workers& workers)
+    : job_(job), meshes_(std::move(meshes)) {
   for (int w = 0; w < workers.count(); ++w) workers_.push_back(std::make_unique<Worker>());
 }
 TexturedStream::~TexturedStream() = default;
@@ -170,11 +173,18 @@ std::size_t TexturedStream::Count(std::size_t batch) const {
   return static_cast<std::size_t>(std::lround(job_.config.draw.share * static_cast<double>(batch)));
 }
 
+void TexturedStream::Expect(std::span<const Sample> objects) const {
+  std::vector<std::size_t> indices;
+  for (const Sample& object : objects) indices.push_back(static_cast<std::size_t>(object.model));
+  meshes_.Expect(indices);
+}
+
 // Everything that is drawn by lot.
-void TexturedStream::Place(int model, std::uint64_t position, Worker* worker,
-                           std::span<TexturedView> views) {
+Status TexturedStream::Place(int model, std::uint64_t position, Worker* worker,
+                             std::span<TexturedView> views) {
   Worker& w = *worker;
-  const TexturedMesh& mesh = meshes_[static_cast<std::size_t>(model)];
+  TILEGRAD_ASSIGN(w.held, meshes_.Get(static_cast<std::size_t>(model)));
+  const TexturedMesh& mesh = *w.held;
   Rng rng(job_.seed ^ (job_.dataset_light ? kSceneStream : kTexturedStream), position);
   DrawShape(job_.config.draw, mesh.mesh().positions, static_cast<float>(job_.camera.half_extent),
             rng, &w.positions);
@@ -187,6 +197,7 @@ void TexturedStream::Place(int model, std::uint64_t position, Worker* worker,
   object.textures = w.textures;
   object.colors.values = w.colors;
   w.DrawViews(job_, object, views, rng);
+  return {};
 }
 
 Result<std::span<const float>> TexturedStream::Render(int model, std::uint64_t position,
@@ -194,7 +205,7 @@ Result<std::span<const float>> TexturedStream::Render(int model, std::uint64_t p
                                                       std::span<TexturedView> views) {
   const double start = ThreadSeconds();
   Worker& w = *workers_[worker];
-  Place(model, position, &w, views);
+  TILEGRAD_TRY(Place(model, position, &w, views));
   TILEGRAD_TRY(Again(worker, Appearance::kLit).status());
   w.seconds += ThreadSeconds() - start;
   return std::span<const float>(w.rgba);
@@ -204,7 +215,7 @@ Status TexturedStream::SetUp(int model, std::uint64_t position, std::size_t work
                              std::span<const TexturedView> views) {
   Worker& w = *workers_[worker];
   w.drawn.resize(views.size());
-  Place(model, position, &w, w.drawn);
+  TILEGRAD_TRY(Place(model, position, &w, w.drawn));
   return Change(worker, views);
 }
 

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "scene/image.h"
 #include "tilegrad/renderer.h"
+#include "train/data/batches.h"
 #include "train/data/stream/light_draw.h"
 #include "train/data/stream/stream_config.h"
 #include "train/data/stream/textured_meshes.h"
@@ -46,8 +47,7 @@ inline Outputs OutputsOf(Appearance appearance) {
 
 class TexturedStream {
  public:
-  // `meshes` outlive it. `seed` also decides which pictures these are: two streams of one seed show
-  // the same.
+  // `seed` also decides which pictures these are: two streams of one seed show the same.
   struct Job {
     TexturedStreamConfig config;
     LightConfig light;
@@ -58,12 +58,14 @@ class TexturedStream {
     // the views after the first have elevations of their own, and no object is mirrored.
     bool dataset_light = false;
   };
-  TexturedStream(const Job& job, std::span<const TexturedMesh> meshes, const Workers& workers);
+  TexturedStream(const Job& job, MeshCache meshes, const Workers& workers);
   ~TexturedStream();
   TexturedStream(TexturedStream&&) noexcept;
 
   // How many of `batch` objects are streamed: the first ones.
   std::size_t Count(std::size_t batch) const;
+  // These objects come next: their meshes are read meanwhile.
+  void Expect(std::span<const Sample> objects) const;
   // The object at `position` of the run, step * batch + slot, made from mesh `model`, from as many
   // views as there are `views`, which are chosen: [views][4][size][size], planar, RGB over black
   // and the covered share of each pixel, in [0, 1]. Valid until the next call with the same
@@ -86,9 +88,9 @@ class TexturedStream {
 
  private:
   struct Worker;
-  void Place(int model, std::uint64_t position, Worker* worker, std::span<TexturedView> views);
+  Status Place(int model, std::uint64_t position, Worker* worker, std::span<TexturedView> views);
   Job job_;
-  std::span<const TexturedMesh> meshes_;
+  MeshCache meshes_;
   std::vector<std::unique_ptr<Worker>> workers_;
 };
 

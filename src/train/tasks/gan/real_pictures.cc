@@ -60,8 +60,7 @@ std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& r
   return {world * front[0], world * side[1], world * side[0]};
 }
 
-RealPictures::RealPictures(nn::Context& context, const Job& job,
-                           std::span<const TexturedMesh> meshes)
+RealPictures::RealPictures(nn::Context& context, const Job& job, MeshCache meshes)
     : context_(context),
       job_(job),
       stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes, context.workers()),
@@ -71,6 +70,7 @@ RealPictures::RealPictures(nn::Context& context, const Job& job,
 
 Result<ObjectViews> RealPictures::Draw(std::uint64_t number, int count) {
   const auto models = order_.Batch(static_cast<std::int64_t>(number), count, 1);
+  stream_.Expect(order_.Batch(static_cast<std::int64_t>(number) + 1, count, 1));
   const std::int64_t size = job_.size;
   ObjectViews out{context_.Empty({count, 3 * job_.views, size, size}),
                   context_.Empty({count, job_.views, size, size})};

@@ -38,8 +38,7 @@ class RealPictures {
     int size = 64;
     std::uint64_t seed = 0;
   };
-  // `meshes` outlive it.
-  RealPictures(nn::Context& context, const Job& job, std::span<const TexturedMesh> meshes);
+  RealPictures(nn::Context& context, const Job& job, MeshCache meshes);
 
   // Batch `number` of `count` objects, each drawn anew.
   Result<ObjectViews> Draw(std::uint64_t number, int count);

@@ -53,8 +53,9 @@ class Scorer {
     const std::vector<int> models = dataset.Select(split);
     if (models.empty())
       return InvalidArgument("{}: a split has no models", dataset.folder().string());
-    TILEGRAD_ASSIGN(const auto meshes, LoadTexturedMeshes(dataset, models, config.stream.meshes,
-                                                          context_.workers(), progress, stop));
+    TILEGRAD_ASSIGN(const MeshCache meshes,
+                    OpenTexturedMeshes(dataset, models, config.stream.meshes, context_.workers(),
+                                       progress, stop));
     RealPictures pictures(
         context_,
         {config.stream, dataset.info().camera, config.views, dataset.info().image_size,

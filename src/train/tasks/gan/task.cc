@@ -62,7 +62,7 @@ class GanTask : public Task {
   GanConfig config_;
   nn::Context* context_ = nullptr;
   std::optional<Dataset> dataset_;
-  std::vector<TexturedMesh> meshes_;  // of training, to which the pictures refer
+  std::optional<MeshCache> meshes_;  // of training
   std::optional<RealPictures> pictures_;
   std::optional<TextureBank> bank_;
   std::unique_ptr<GanLearner> learner_;
@@ -73,7 +73,7 @@ Status GanTask::ExtractTextures(const TaskStart& start) {
   const TextureBank::Job job{config_.textures.run, static_cast<int>(config_.textures.count),
                              static_cast<std::uint64_t>(config_.schedule.seed), config_.stream,
                              config_.network};
-  TILEGRAD_ASSIGN(bank_, TextureBank::Extract(job, {*dataset_, meshes_}, start.context.workers(),
+  TILEGRAD_ASSIGN(bank_, TextureBank::Extract(job, {*dataset_, *meshes_}, start.context.workers(),
                                               start.progress, start.stop));
   return {};
 }
@@ -85,13 +85,13 @@ Status GanTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_ASSIGN(
-      meshes_, LoadTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.meshes,
+      meshes_, OpenTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.meshes,
                                   start.context.workers(), start.progress, start.stop));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   const CameraRule& camera = dataset_->info().camera;
   pictures_.emplace(*context_,
                     RealPictures::Job{config_.stream, camera, config_.views, image_size(), seed},
-                    meshes_);
+                    *meshes_);
   TILEGRAD_TRY(ExtractTextures(start));
   TILEGRAD_ASSIGN(learner_, GanLearner::Make(*context_, {config_, camera, start.warn},
                                              {&*pictures_, bank_ ? &*bank_ : nullptr}));
@@ -112,7 +112,7 @@ Status GanTask::Begin(const Path& run, std::int64_t first_step) {
 
 RunHeader GanTask::Header() {
   return {.dataset_source = dataset_->info().source,
-          .training_models = static_cast<int>(meshes_.size()),
+          .training_models = static_cast<int>(meshes_->size()),
           .parameters = learner_->parameters()};
 }
 

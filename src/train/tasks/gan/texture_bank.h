@@ -24,7 +24,7 @@ class TextureBank {
   };
   struct Data {
     const Dataset& dataset;
-    std::span<const TexturedMesh> meshes;  // of training
+    const MeshCache& meshes;  // of training
   };
   // Errors name the run: it is not there, is of another task, or has images or textures of another
   // size.

@@ -64,7 +64,6 @@ class SingleImageTask : public NetworkTask {
   std::vector<Sample> samples_;  // of held_out_, for pictures
   std::optional<TrainStep> step_;
   std::optional<BatchOrder> order_;
-  std::vector<TexturedMesh> meshes_;  // to which the stream refers
   std::optional<TexturedStream> stream_;
 };
 
@@ -143,11 +142,14 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
 
 Status SingleImageTask::LoadMeshes(const TaskStart& start) {
   if (config_.stream.share <= 0) return {};
-  const TexturedStreamConfig stream{.draw = config_.stream,
-                                    .meshes = {.max_faces = config_.stream.max_faces}};
+  const TexturedStreamConfig stream{
+      .draw = config_.stream,
+      .meshes = {
+          .max_faces = config_.stream.max_faces, .colored = true, .cache = config_.stream.cache}};
   const Workers& workers = start.context.workers();
-  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain),
-                                              stream.meshes, workers, start.progress, start.stop));
+  TILEGRAD_ASSIGN(MeshCache meshes,
+                  OpenTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), stream.meshes,
+                                     workers, start.progress, start.stop));
   const DatasetInfo& info = dataset_->info();
   stream_.emplace(TexturedStream::Job{.config = stream,
                                       .light = {},
@@ -155,12 +157,16 @@ Status SingleImageTask::LoadMeshes(const TaskStart& start) {
                                       .size = info.image_size,
                                       .seed = static_cast<std::uint64_t>(start.schedule.seed),
                                       .dataset_light = true},
-                  meshes_, workers);
+                  std::move(meshes), workers);
   return {};
 }
 
 Result<nn::Var> SingleImageTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
   const auto batch = order_->Batch(slots, static_cast<int>(config_.views));
+  if (stream_) {
+    const auto next = order_->Batch(SlotsOf(at.step + 1, config_.batch, at.portion), 1);
+    stream_->Expect(std::span(next).first(stream_->Count(next.size())));
+  }
   TILEGRAD_ASSIGN(
       const BatchTensors tensors,
       GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, slots.first));

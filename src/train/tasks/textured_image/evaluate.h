@@ -14,7 +14,7 @@ namespace tilegrad::train {
 // "tilegrad". Before the last stand four of the light that LightSearch finds in the same picture,
 // given the predicted or the true shape and the predicted or the true texture: they split the error
 // of a light into what each of these adds. Without a light model only the last row. Errors: as
-// CheckHeldOut and LoadTexturedMeshes; a job with a change.
+// CheckHeldOut and OpenTexturedMeshes; a job with a change.
 Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
                                     const Workers& workers, const ProgressSink& progress,
                                     const StopFlag& stop);

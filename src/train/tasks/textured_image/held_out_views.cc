@@ -18,15 +18,14 @@ Result<HeldOutViews> HeldOutViews::Load(const Request& request, const Workers& w
                                         const ProgressSink& progress, const StopFlag& stop) {
   HeldOutViews out;
   out.models_ = request.models;
-  TILEGRAD_ASSIGN(auto meshes,
-                  LoadTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
+  TILEGRAD_ASSIGN(MeshCache meshes,
+                  OpenTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
                                      workers, progress, stop));
-  out.meshes_ = std::make_unique<std::vector<TexturedMesh>>(std::move(meshes));
   const DatasetInfo& info = request.dataset.info();
   out.stream_.emplace(
       TexturedStream::Job{WithoutChanges(request.config.stream), request.config.light, info.camera,
                           info.image_size, kHeldOutSeed},
-      *out.meshes_, workers);
+      std::move(meshes), workers);
   return out;
 }
 

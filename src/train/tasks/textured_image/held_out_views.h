@@ -34,13 +34,11 @@ class HeldOutViews {
   // The same of chosen views.
   Result<Views> Show(std::size_t i, std::vector<TexturedView> views);
   const std::vector<int>& models() const { return models_; }
-  const Mesh& mesh(std::size_t i) const { return (*meshes_)[i].mesh(); }
 
  private:
   HeldOutViews() = default;
   Status Fill(Views* out);
   std::vector<int> models_;
-  std::unique_ptr<std::vector<TexturedMesh>> meshes_;  // the stream refers to them
   std::optional<TexturedStream> stream_;
 };
 

@@ -48,7 +48,6 @@ class TexturedImageTask : public NetworkTask {
 
   TexturedImageConfig config_;
   std::optional<Dataset> dataset_;
-  std::vector<TexturedMesh> meshes_;  // of training, to which the stream refers
   std::optional<TexturedStream> stream_;
   std::optional<HeldOutViews> held_out_;  // for sample pictures
   std::optional<BatchOrder> order_;
@@ -67,8 +66,8 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   config_.network.sphere.half_extent = lesson_.half_extent;
   lesson_.objects = static_cast<int>(train.size());
   const Workers& workers = start.context.workers();
-  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes, workers,
-                                              start.progress, start.stop));
+  TILEGRAD_ASSIGN(MeshCache meshes, OpenTexturedMeshes(*dataset_, train, config_.stream.meshes,
+                                                       workers, start.progress, start.stop));
   TILEGRAD_ASSIGN(HeldOutViews held_out,
                   HeldOutViews::Load({config_, *dataset_, ChooseModels(*dataset_, kTexturedRows)},
                                      workers, start.progress, start.stop));
@@ -76,7 +75,7 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   stream_.emplace(TexturedStream::Job{config_.stream, config_.light, dataset_->info().camera,
                                       image_size(), seed},
-                  meshes_, workers);
+                  std::move(meshes), workers);
   order_.emplace(static_cast<int>(train.size()), 1, seed);
   step_.emplace(*context_, config_, image_size());
   TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, seed));
@@ -95,6 +94,7 @@ Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
 Result<nn::Var> TexturedImageTask::Loss(const UpdateIndex& at, const Slots& slots,
                                         StepValues* out) {
   const auto models = order_->Batch(slots, 1);
+  stream_->Expect(order_->Batch(SlotsOf(at.step + 1, config_.batch, at.portion), 1));
   TILEGRAD_ASSIGN(TexturedBatch batch,
                   RenderBatch(*context_, *stream_, image_size(), models, slots.first));
   batch.portion = at.portion;

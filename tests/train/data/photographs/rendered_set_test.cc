@@ -15,9 +15,6 @@ namespace tilegrad::train::rendered_set_test {
 class RenderedSet : public TempFolderTest {
  protected:
   RenderedSet() {
-    Mesh box = Box(glm::vec3(0), {0.4f, 0.3f, 0.9f});
-    SetColor(box, {0.8f, 0.3f, 0.2f, 1});
-    models_.emplace_back(std::move(box));
     ImageU8 sky(300, 200, 3, 90);
     EXPECT_TRUE(io::SavePng(folder_ / "sky.png", sky).ok());
   }
@@ -25,7 +22,12 @@ class RenderedSet : public TempFolderTest {
     const RenderedSetJob job{models_, models_, {folder_ / "sky.png"}, 18, 4};
     return MakeRenderedSet(job, noise, folder_ / out, Workers(workers), nullptr, stop_);
   }
-  std::vector<TexturedMesh> models_;
+  static Result<TexturedMesh> RedBox(std::size_t) {
+    Mesh box = Box(glm::vec3(0), {0.4f, 0.3f, 0.9f});
+    SetColor(box, {0.8f, 0.3f, 0.2f, 1});
+    return TexturedMesh(std::move(box));
+  }
+  MeshCache models_{1, 1 << 30, RedBox};
   StopFlag stop_ = false;
 };
 
@@ -76,7 +78,7 @@ TEST_F(RenderedSet, IsTheSameForAnyWorkers) {
 }
 
 TEST_F(RenderedSet, NeedsModelsAndBackgrounds) {
-  const std::vector<TexturedMesh> none;
+  const MeshCache none(0, 1, RedBox);
   const RenderedSetJob job{none, models_, {folder_ / "sky.png"}};
   ExpectMessage(MakeRenderedSet(job, {}, folder_ / "b", Workers(1), nullptr, stop_), "models");
   const RenderedSetJob bare{models_, models_, {}};

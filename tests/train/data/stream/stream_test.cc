@@ -30,16 +30,16 @@ StreamConfig Still() {
   return c;
 }
 
+constexpr std::size_t kRoom = 1 << 30;
+
 Mesh Ball() {
   Mesh ball = Icosphere(2, 0.45f);
   for (const glm::vec3& p : ball.positions) ball.colors.emplace_back(glm::vec3(0.5f) + p, 1.0f);
   return ball;
 }
 
-std::vector<TexturedMesh> Balls(std::size_t count) {
-  std::vector<TexturedMesh> out;
-  for (std::size_t i = 0; i < count; ++i) out.emplace_back(Ball());
-  return out;
+MeshCache Balls(std::size_t count) {
+  return {count, kRoom, [](std::size_t) { return Result<TexturedMesh>(TexturedMesh(Ball())); }};
 }
 
 TexturedStream::Job JobOf(const StreamConfig& config, int size, std::uint64_t seed) {
@@ -236,7 +236,7 @@ TEST(DatasetLitStream, WithoutChanceItIsTheDatasetsPicture) {
   StreamConfig config = Still();
   config.samples = 4;
   const Workers workers(1);
-  const std::vector<TexturedMesh> balls = Balls(1);
+  const MeshCache balls = Balls(1);
   TexturedStream stream(JobOf(config, kSize, 7), balls, workers);
   std::vector<TexturedView> views(3);
   const auto rgba = stream.Render(0, 0, 0, views);
@@ -256,7 +256,7 @@ TEST(DatasetLitStream, DependsOnSeedAndPositionOnly) {
   StreamConfig config;
   config.share = 0.5;
   const Workers two(2);
-  const std::vector<TexturedMesh> balls = Balls(2);
+  const MeshCache balls = Balls(2);
   TexturedStream a(JobOf(config, kSize, 7), balls, two), b(JobOf(config, kSize, 7), balls, two),
       other(JobOf(config, kSize, 8), balls, two);
   EXPECT_EQ(a.Count(8), 4u);
@@ -276,7 +276,7 @@ TEST(DatasetLitStream, DependsOnSeedAndPositionOnly) {
 
 TEST(DatasetLitStream, ASheetShowsAllOfIt) {
   const Workers workers(1);
-  const std::vector<TexturedMesh> balls = Balls(3);
+  const MeshCache balls = Balls(3);
   TexturedStream stream(JobOf({}, 16, 7), balls, workers);
   const auto sheet = stream.Sheet(2, 3);
   ASSERT_TRUE(sheet.ok());

@@ -34,10 +34,10 @@ Mesh Ball() {
   return ball;
 }
 
-std::vector<TexturedMesh> Balls(int count) {
-  std::vector<TexturedMesh> out;
-  for (int i = 0; i < count; ++i) out.emplace_back(Ball());
-  return out;
+constexpr std::size_t kRoom = 1 << 30;
+
+MeshCache Balls(std::size_t count) {
+  return {count, kRoom, [](std::size_t) { return Result<TexturedMesh>(TexturedMesh(Ball())); }};
 }
 
 // Nothing is left to chance but azimuth and light.
@@ -136,7 +136,7 @@ TEST(LightDraw, WordsAndRangesAreChecked) {
 
 TEST(TexturedStream, SamePositionSameBits) {
   const Workers workers(2);
-  const std::vector<TexturedMesh> meshes = Balls(2);
+  const MeshCache meshes = Balls(2);
   TexturedStream::Job job = Still("phong");
   job.config = {};
   TexturedStream one(job, meshes, workers), other(job, meshes, workers);
@@ -157,7 +157,7 @@ TEST(TexturedStream, SamePositionSameBits) {
 // The same object in the views of another, and back.
 TEST(TexturedStream, ViewsCanBeChanged) {
   const Workers workers(1);
-  const std::vector<TexturedMesh> meshes = Balls(1);
+  const MeshCache meshes = Balls(1);
   TexturedStream stream(Still("phong"), meshes, workers);
   std::vector<TexturedView> first(2), other(2);
   const auto drawn = stream.Render(0, 4, 0, first);
@@ -179,7 +179,7 @@ TEST(TexturedStream, ViewsCanBeChanged) {
 // An object that is set up in given views is the one that Render draws at that position.
 TEST(TexturedStream, SetsUpWhatRenderDraws) {
   const Workers workers(1);
-  const std::vector<TexturedMesh> meshes = Balls(1);
+  const MeshCache meshes = Balls(1);
   TexturedStream::Job job = Still("lambert");
   job.config = {};
   TexturedStream one(job, meshes, workers), other(job, meshes, workers);
@@ -197,7 +197,7 @@ TEST(TexturedStream, SetsUpWhatRenderDraws) {
 // covers wholly; at supersampled edges it is a mean of products.
 TEST(TexturedStream, LitIsTextureTimesLight) {
   const Workers workers(1);
-  const std::vector<TexturedMesh> meshes = Balls(1);
+  const MeshCache meshes = Balls(1);
   TexturedStream::Job job = Still("lambert");
   job.config.draw.samples = 1;
   TexturedStream stream(job, meshes, workers);
@@ -225,8 +225,9 @@ TEST(TexturedStream, CreasesDecideWhatIsSmooth) {
   Mesh smooth = Ball();
   SplitAtCreases(60, &smooth);
   EXPECT_EQ(smooth.positions.size(), Ball().positions.size());
-  std::vector<TexturedMesh> meshes = Balls(1);
-  meshes.emplace_back(std::move(smooth), NormalSource::kSmooth);
+  const MeshCache meshes(2, kRoom, [&](std::size_t i) -> Result<TexturedMesh> {
+    return i == 0 ? TexturedMesh(Ball()) : TexturedMesh(smooth, NormalSource::kSmooth);
+  });
   TexturedStream::Job job = Still("lambert");
   job.config.draw.samples = 1;
   TexturedStream stream(job, meshes, workers);
@@ -275,11 +276,12 @@ class TexturedMeshes : public TempFolderTest {
     const auto built = BuildDataset(**source, options, folder_ / "data", workers_, nullptr, stop_);
     EXPECT_TRUE(built.ok()) << built.status().message();
   }
-  Result<std::vector<TexturedMesh>> Load(const std::string& folder) {
-    TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder_ / "data"));
-    return LoadTexturedMeshes(dataset, {1, 0}, {folder, 8}, workers_, nullptr, stop_);
+  Result<MeshCache> Load(const std::string& folder) {
+    dataset_ = Ok(Dataset::Open(folder_ / "data")).value();
+    return OpenTexturedMeshes(*dataset_, {1, 0}, {folder, 8}, workers_, nullptr, stop_);
   }
 
+  std::optional<Dataset> dataset_;
   Workers workers_{2};
   StopFlag stop_ = false;
 };
@@ -288,16 +290,18 @@ TEST_F(TexturedMeshes, AreReadAgainFromTheirFolder) {
   const auto meshes = Load((folder_ / "models").string());
   ASSERT_TRUE(meshes.ok()) << meshes.status().message();
   ASSERT_EQ(meshes->size(), 2u);
-  ASSERT_EQ((*meshes)[0].scene().textures.size(), 1u);
-  EXPECT_EQ((*meshes)[0].scene().textures[0].width, 8);
-  EXPECT_GT((*meshes)[0].bytes(), 1000u);
+  const auto mesh = Ok(meshes->Get(0)).value();
+  ASSERT_EQ(mesh->scene().textures.size(), 1u);
+  EXPECT_EQ(mesh->scene().textures[0].width, 8);
+  EXPECT_GT(mesh->bytes(), 1000u);
 }
 
 TEST_F(TexturedMeshes, WithoutAFolderColoursOfTheDatasetStandIn) {
   const auto meshes = Load("");
   ASSERT_TRUE(meshes.ok()) << meshes.status().message();
-  EXPECT_TRUE((*meshes)[0].scene().textures.empty());
-  EXPECT_FALSE((*meshes)[0].scene().colors.values.empty());
+  const auto mesh = Ok(meshes->Get(0)).value();
+  EXPECT_TRUE(mesh->scene().textures.empty());
+  EXPECT_FALSE(mesh->scene().colors.values.empty());
 }
 
 TEST_F(TexturedMeshes, ChangesSinceThenAreErrors) {

@@ -36,19 +36,17 @@ TexturedImageConfig TinyConfig(const std::string& light) {
   return config;
 }
 
-std::vector<TexturedMesh> Balls() {
+TexturedMesh Ball() {
   Mesh ball = Icosphere(2, 0.45f);
   for (const glm::vec3& p : ball.positions) ball.colors.emplace_back(glm::vec3(0.5f) + p, 1.0f);
-  std::vector<TexturedMesh> out;
-  out.emplace_back(ball);
-  return out;
+  return TexturedMesh(ball);
 }
 
 struct SmallProblem {
   TexturedImageConfig config;
   Workers workers{1};
   nn::Context context{workers, nn::DType::kF64};
-  std::vector<TexturedMesh> meshes = Balls();
+  MeshCache meshes{1, 1 << 30, [](std::size_t) { return Result<TexturedMesh>(Ball()); }};
   TexturedStream stream;
   TexturedStep step;
   std::unique_ptr<Adversary> adversary;
