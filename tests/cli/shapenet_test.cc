@@ -71,7 +71,7 @@ class ShapeNetTest : public ProgramTest {
                "network.most=8 --set network.levels=2 --set network.latent=12 --set "
                "network.hidden=12 --set network.light_width=8 --set network.lookup_width=4 " +
                settings);
-    ExpectIn(ExpectDone("eval --run " + In("run")), "3D IoU");
+    ExpectIn(ExpectDone("eval --run " + In("run")), "Carved IoU");
   }
   // The mean colour of what is covered in one view of a model; shares of the covered brightness.
   std::array<double, 3> ColorOf(const std::string& model, int view) const {
@@ -127,7 +127,7 @@ TEST_F(ShapeNetTest, ClassesByNameOrNumber) {
   WriteSet(kV2);
   ExpectIn(ExpectDone(Dataset("--classes 03001627")), "6 models");
   EXPECT_FALSE(Exists("data/models/car"));
-  ExpectError(Dataset("--classes chair,boat --force"), "\"boat\"", "car, chair");
+  ExpectError(Dataset("--classes chair,boat"), "\"boat\"", "car, chair");
 }
 
 TEST_F(ShapeNetTest, BrokenModelsCostThemselves) {
@@ -139,8 +139,8 @@ TEST_F(ShapeNetTest, BrokenModelsCostThemselves) {
   std::filesystem::remove(folder_ / (car + "23/images/texture0.png"));
   const Path picture = folder_ / (car + "24/images/texture0.png");
   std::filesystem::resize_file(picture, std::filesystem::file_size(picture) / 2);
-  ExpectRefused(Dataset(), 2, "3 of 12", "--allow-broken", "car/20", "car/21", "car/22");
-  ExpectIn(ExpectDone(Dataset("--allow-broken")), "9 models", "3 models could not be used",
+  ExpectRefused(Dataset(), 3, "3 of 12", "--allow-broken", "car/20", "car/21", "car/22");
+  ExpectIn(ExpectDone(Dataset("--allow-broken --force")), "9 models", "3 models could not be used",
            "2 warnings while reading models", "23/models/model_normalized.obj: texture",
            "24/models/model_normalized.obj: texture");
   TrainAndEval("--set stream.cache=10K");
