@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/loop_trace.h"
 #include "base/sanitizers.h"
 
 namespace tilegrad {
@@ -203,6 +204,8 @@ Workers::Workers(int count) : count_(count > 0 ? count : AvailableCores()) {
   if (count_ > 1) impl_ = std::make_unique<Impl>(count_);
 }
 
+Workers::Workers(int count, LoopTrace* trace) : count_(count), trace_(trace) {}
+
 Workers::~Workers() {
   if (impl_ == nullptr) return;
   if (ThisProcessOwnsTbb()) {
@@ -237,7 +240,12 @@ void ForInArena(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task)
 
 }  // namespace
 
-void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) const {
+void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
+                  LoopSite site) const {
+  if (trace_ != nullptr) {
+    trace_->Run(n, task, site);
+    return;
+  }
   if (count_ == 1 || n <= 1) {
     for (std::size_t i = 0; i < n; ++i) task(i, 0);
     return;
@@ -252,9 +260,10 @@ void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> tas
   impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { ForInArena(n, task); }); });
 }
 
-void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) const {
-  if (parts_ == 1) {  // not in the arena
-    workers_.For(n, task);
+void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
+                        LoopSite site) const {
+  if (parts_ == 1 || workers_.trace_ != nullptr) {  // not in the arena
+    workers_.For(n, task, site);
   } else if (n > 1 && waiting_.load(std::memory_order_relaxed) == 0 && workers_.HasArena()) {
     // Not isolated: only tasks of loops like this one can be taken here, and those never wait.
     ForInArena(n, task);
@@ -263,20 +272,28 @@ void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t
   }
 }
 
-void Workers::ForParts(std::size_t n, FunctionRef<void(std::size_t, const Part&)> task) const {
+void Workers::ForParts(std::size_t n, FunctionRef<void(std::size_t, const Part&)> task,
+                       LoopSite site) const {
   std::atomic<std::size_t> waiting{n};
-  For(n, [&](std::size_t index, std::size_t worker) {
+  const auto run = [&](std::size_t index, std::size_t worker) {
     waiting.fetch_sub(1, std::memory_order_relaxed);
     task(index, Part(*this, worker, n, waiting));
-  });
+  };
+  For(n, run, site);
 }
 
 void Workers::ForRanges(std::size_t n, std::size_t grain,
-                        FunctionRef<void(std::size_t, std::size_t, std::size_t)> task) const {
+                        FunctionRef<void(std::size_t, std::size_t, std::size_t)> task,
+                        LoopSite site) const {
   grain = std::max<std::size_t>(grain, 1);
-  For((n + grain - 1) / grain, [&](std::size_t i, std::size_t worker) {
+  const auto run = [&](std::size_t i, std::size_t worker) {
     task(i * grain, std::min(n, (i + 1) * grain), worker);
-  });
+  };
+  For((n + grain - 1) / grain, run, site);
+}
+
+void Workers::NoteTraffic(double bytes) const {
+  if (trace_ != nullptr) trace_->NoteTraffic(bytes);
 }
 
 static_assert(kMostCores == CPU_SETSIZE);

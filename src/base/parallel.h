@@ -14,6 +14,18 @@
 
 namespace tilegrad {
 
+class LoopTrace;
+
+// Where a loop stands in the source: its name in a LoopTrace.
+struct LoopSite {
+  const char* file;
+  int line;
+  // As a default argument: of the caller.
+  static constexpr LoopSite Here(const char* file = __builtin_FILE(), int line = __builtin_LINE()) {
+    return {file, line};
+  }
+};
+
 // A fixed number of workers. Copies nothing; two Workers are independent. Where the system refuses
 // threads (limits of a container) there are fewer than asked for, the caller's own at the least.
 //
@@ -24,6 +36,9 @@ class Workers {
  public:
   // count 0: one per core that this process may use.
   explicit Workers(int count = 0);
+  // Stands for `count` workers, 1 or more, and is none: the calling thread runs every loop itself,
+  // cut as for that many, and `trace`, which outlives this, records it.
+  Workers(int count, LoopTrace* trace);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
@@ -36,13 +51,17 @@ class Workers {
   // is how the library keeps the same bits for any thread count. What a task throws (it may run out
   // of memory) comes out here when the others have ended, some of which may not have begun. Calls
   // may nest, but not those of A within those of B within those of A, which may wait for ever.
-  void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
+  void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task,
+           LoopSite site = LoopSite::Here()) const;
 
   // The same over fixed ranges [begin, end) of at most `grain` indices; the split depends on n and
   // grain only.
-  void ForRanges(
-      std::size_t n, std::size_t grain,
-      FunctionRef<void(std::size_t begin, std::size_t end, std::size_t worker)> task) const;
+  void ForRanges(std::size_t n, std::size_t grain,
+                 FunctionRef<void(std::size_t begin, std::size_t end, std::size_t worker)> task,
+                 LoopSite site = LoopSite::Here()) const;
+
+  // Bytes that the next loop reads and writes in memory, for a trace.
+  void NoteTraffic(double bytes) const;
 
   // A task of ForParts.
   class Part {
@@ -50,7 +69,8 @@ class Workers {
     std::size_t worker() const { return worker_; }
 
     // As Workers::For, within the task; but `task` must not contain loops.
-    void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
+    void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task,
+             LoopSite site = LoopSite::Here()) const;
 
    private:
     friend class Workers;
@@ -68,13 +88,15 @@ class Workers {
   // that waits for the end of such a loop may run iterations of other tasks' loops. So data that
   // one loop leaves for the next must lie in memory of the task, not in scratch by worker index
   // that such iterations write.
-  void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task) const;
+  void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task,
+                LoopSite site = LoopSite::Here()) const;
 
  private:
   struct Impl;
   bool HasArena() const;  // of oneTBB, which this process may use
 
   int count_;
+  LoopTrace* trace_ = nullptr;
   std::unique_ptr<Impl> impl_;  // null where oneTBB is not used
   mutable std::mutex own_loop_;
 };
@@ -103,13 +125,14 @@ void ReserveThreadData();
 // Calls task(begin, end) for ranges of at most `size` indices that make up [0, n); on the calling
 // thread, in order, where `workers` is null or there is one range only.
 template <class Task>
-void ForChunks(const Workers* workers, std::size_t n, std::size_t size, const Task& task) {
+void ForChunks(const Workers* workers, std::size_t n, std::size_t size, const Task& task,
+               LoopSite site = LoopSite::Here()) {
   if (workers == nullptr || n <= size) {
     for (std::size_t i = 0; i < n; i += size) task(i, std::min(n, i + size));
     return;
   }
-  workers->ForRanges(n, size,
-                     [&](std::size_t begin, std::size_t end, std::size_t) { task(begin, end); });
+  workers->ForRanges(
+      n, size, [&](std::size_t begin, std::size_t end, std::size_t) { task(begin, end); }, site);
 }
 
 }  // namespace tilegrad

@@ -138,6 +138,7 @@ void AddInfo(CommandList* list);
 void AddLive(CommandList* list);
 void AddMan(CommandList* list);
 void AddPredict(CommandList* list);
+void AddProfile(CommandList* list);
 void AddRender(CommandList* list);
 void AddReport(CommandList* list);
 void AddSample(CommandList* list);

@@ -239,6 +239,7 @@ constexpr std::size_t kUpdateGrain = 65536;  // elements to a task
 template <class T>
 void Blend(double decay, std::span<const T> x, std::span<T> y, const Workers& workers) {
   const auto old = static_cast<T>(decay), rest = static_cast<T>(1 - decay);
+  workers.NoteTraffic(static_cast<double>(x.size() * 3 * sizeof(T)));
   workers.ForRanges(x.size(), kUpdateGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) y[i] = old * y[i] + rest * x[i];
   });

@@ -227,15 +227,7 @@ class Training : public RunWork {
   }
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
- private:
-  // Terms may begin in the middle of a run.
-  Status NoteLabels(std::span<const LossTerm> terms) {
-    const std::size_t known = header_.labels.size();
-    for (const LossTerm& term : terms) {
-      if (*term.label != '\0') header_.labels.emplace(term.name, term.label);
-    }
-    return header_.labels.size() == known ? Status() : WriteHeader(job_.run, header_);
-  }
+  // The computing of a step.
   Status Updates(std::int64_t step, StepValues* values) {
     for (int update = 0; update < task_.Updates(step); ++update) {
       const UpdateIndex at{step, update};
@@ -247,6 +239,16 @@ class Training : public RunWork {
       TILEGRAD_TRY(task_.Update(at, gradients));
     }
     return {};
+  }
+
+ private:
+  // Terms may begin in the middle of a run.
+  Status NoteLabels(std::span<const LossTerm> terms) {
+    const std::size_t known = header_.labels.size();
+    for (const LossTerm& term : terms) {
+      if (*term.label != '\0') header_.labels.emplace(term.name, term.label);
+    }
+    return header_.labels.size() == known ? Status() : WriteHeader(job_.run, header_);
   }
   void ShareState(std::int64_t first_step) {
     job_.crew->Order(first_step);
@@ -287,7 +289,36 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
   return job.crew->Agree(started, {data});
 }
 
+class TrainingRehearsal : public Rehearsal {
+ public:
+  TrainingRehearsal(const TrainJob& job, TrainConfig config, const Workers& workers)
+      : config_(std::move(config)), context_(workers), training_(job, &config_) {}
+
+  Status Start(const ProgressSink& progress, const StopFlag& stop) {
+    return training_.Start(context_, progress, stop);
+  }
+  Status Step() override {
+    values_.Clear();
+    return training_.Updates(step_++, &values_);
+  }
+
+ private:
+  TrainConfig config_;
+  nn::Context context_;
+  Training training_;
+  StepValues values_;
+  std::int64_t step_ = 0;
+};
+
 }  // namespace
+
+Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
+                                            const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(WriteConfig(job.config), "configuration"));
+  auto rehearsal = std::make_unique<TrainingRehearsal>(job, std::move(config), workers);
+  TILEGRAD_TRY(rehearsal->Start(progress, stop));
+  return std::unique_ptr<Rehearsal>(std::move(rehearsal));
+}
 
 Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const ProgressSink& progress,
                          const StopFlag& stop) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "base/parallel.h"
 #include "train/config.h"
@@ -32,6 +33,16 @@ struct TrainJob {
   PictureSink drawn = nullptr;
   std::function<Status()> begun = nullptr;  // once the run has its folder
 };
+
+// The steps of a training without its run: nothing is written. For measurements.
+class Rehearsal {
+ public:
+  virtual ~Rehearsal() = default;
+  virtual Status Step() = 0;  // the next one
+};
+// Of job.config and job.data, on one process. Job and workers outlive it.
+Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
+                                            const ProgressSink& progress, const StopFlag& stop);
 
 // As ExecuteRun. With a crew, every rank calls it and rank 0's result tells; after an error with
 // Crew::broken() the ranks can only be aborted. Two runs have the same configuration if all keys

@@ -53,6 +53,26 @@ TEST_F(Runs, GoOnFromTheirFolderAlone) {
   ExpectIn(said.output, "tensorboard --logdir " + In("run"));
 }
 
+TEST_F(Runs, AreProfiledBeforeTheyExist) {
+  MakeData();
+  const std::string profile = "profile --config " + In("tiny.toml") + " --data " + In("data");
+  const Json said = Done(profile + " --steps 2 --workers 2,16 --set schedule.batch=4");
+  ASSERT_EQ(said["forecasts"].size(), 2u);
+  EXPECT_EQ(said["forecasts"][1]["workers"], 16);
+  for (const Json& forecast : said["forecasts"]) {
+    double work = 0, seconds = 0;
+    for (const Json& place : forecast["places"]) {
+      work += place["work"].get<double>();
+      seconds += place["seconds"].get<double>();
+    }
+    EXPECT_NEAR(forecast["seconds"].get<double>(), seconds, 1e-6);
+    EXPECT_GE(seconds * forecast["workers"].get<int>(), work * (1 - 1e-6));
+  }
+  ExpectIn(ExpectDone(profile + " --steps 1 --workers 2"), "times as fast");
+  ExpectRefused(profile + " --workers 1", 2, "--workers");
+  ExpectRefused(profile + " --set schedule.batches=4", 2, "schedule.batch");
+}
+
 TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
   MakeData();
   const Outcome said = RunProgram(Start("run") + " --set schedule.steps=12");

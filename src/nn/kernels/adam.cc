@@ -25,6 +25,7 @@ template <class T, class RangeSum>
 double SumByRanges(const T* x, std::size_t n, const Workers& workers, const RangeSum& range_sum) {
   const std::size_t stretch = std::max(kGrain, (n + kMaxPartials - 1) / kMaxPartials);
   std::array<double, kMaxPartials> partial;
+  workers.NoteTraffic(static_cast<double>(n * sizeof(T)));
   workers.ForRanges(n, stretch, [&](std::size_t begin, std::size_t end, std::size_t) {
     partial[begin / stretch] = range_sum(x + begin, end - begin);
   });
@@ -36,6 +37,7 @@ double SumByRanges(const T* x, std::size_t n, const Workers& workers, const Rang
 }  // namespace
 
 void AdamStep(const AdamProblem<float>& problem, const Workers& workers) {
+  workers.NoteTraffic(static_cast<double>(problem.n * 7 * sizeof(float)));
   workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
     HWY_DYNAMIC_DISPATCH(AdamRange)(problem, begin, end);
   });

@@ -40,6 +40,7 @@ void ForRowRanges(const BinaryProblem<T>& problem, const Workers& workers, const
 }  // namespace
 
 void Unary(const UnaryProblem<float>& problem, const Workers& workers) {
+  workers.NoteTraffic(static_cast<double>(problem.n * 2 * sizeof(float)));
   workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
     HWY_DYNAMIC_DISPATCH(UnaryRange)(problem, begin, end);
   });

@@ -153,6 +153,7 @@ inline void ProductAdamTarget(const GemmProblem<float>& product, const AdamProbl
   context.workers.For(plan.gemm.rows.count(), [&](std::size_t panel, std::size_t) {
     PackRowPanel(plan.gemm, panel, 0, 1, packed_a);
   });
+  context.workers.NoteTraffic(static_cast<double>(adam.n * 6 * sizeof(float)));
   context.workers.For(plan.gemm.items(), [&](std::size_t item, std::size_t worker) {
     UpdateItem(plan, item, packed_a, packed_a + a_size + worker * plan.worker_size());
   });

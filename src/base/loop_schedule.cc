@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/loop_schedule.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <map>
+#include <queue>
+#include <string_view>
+#include <utility>
+
+#include "base/aligned.h"
+#include "base/clocks.h"
+
+namespace tilegrad {
+namespace {
+
+// Runs a strand on workers that exist as numbers only.
+class Simulation {
+ public:
+  explicit Simulation(const LoopMachine& machine)
+      : machine_(machine), stacks_(static_cast<std::size_t>(machine.workers)) {
+    for (std::size_t w = stacks_.size(); w-- > 1;) idle_.push_back(w);
+  }
+
+  // Seconds that each of the strand's own loops takes.
+  std::vector<double> Run(const Strand& strand) {
+    Begin(strand, nullptr, 0, 0.0);
+    while (!events_.empty()) {
+      const auto [time, worker] = events_.top();
+      events_.pop();
+      Advance(worker, time);
+    }
+    return std::move(taken_);
+  }
+
+ private:
+  struct OpenLoop {
+    const LoopRecord& record;
+    std::size_t owner;
+    double begin;
+    std::size_t started = 0, ended = 0;
+    bool left = false;  // by its owner
+    bool HasTask() const { return started < record.tasks.size(); }
+    bool IsOver() const { return ended == record.tasks.size(); }
+  };
+  // A strand that a worker is in.
+  struct Frame {
+    const Strand& strand;
+    OpenLoop* of;               // the loop whose task it is; null: the whole
+    std::size_t stretch = 0;    // that it is in, or whose loop it waits for
+    OpenLoop* inner = nullptr;  // the loop that it waits for
+  };
+
+  void Begin(const Strand& strand, OpenLoop* of, std::size_t worker, double time) {
+    stacks_[worker].push_back({strand, of});
+    events_.emplace(time + strand.stretches[0], worker);
+  }
+
+  // The worker's stretch is over, or the loop that it waits for, or others may have work for it.
+  void Advance(std::size_t worker, double time) {
+    auto& stack = stacks_[worker];
+    if (!stack.empty() && stack.back().inner == nullptr) {
+      if (stack.back().stretch < stack.back().strand.loops.size()) {
+        Open(worker, time);
+      } else {
+        Close(worker, time);
+      }
+    }
+    Continue(worker, time);
+  }
+
+  void Open(std::size_t worker, double time) {
+    Frame& frame = stacks_[worker].back();
+    frame.inner = &loops_.emplace_back(OpenLoop{frame.strand.loops[frame.stretch], worker, time});
+    const double start = frame.of == nullptr ? machine_.start_seconds : 0;
+    for (const std::size_t other : std::exchange(idle_, {})) events_.emplace(time + start, other);
+  }
+
+  // Of a strand. Its loop's owner may wait for it.
+  void Close(std::size_t worker, double time) {
+    OpenLoop* const loop = stacks_[worker].back().of;
+    stacks_[worker].pop_back();
+    if (loop == nullptr) return;
+    ++loop->ended;
+    if (loop->IsOver() && loop->owner != worker) events_.emplace(time, loop->owner);
+  }
+
+  void Continue(std::size_t worker, double time) {
+    auto& stack = stacks_[worker];
+    OpenLoop* const loop = stack.empty() ? Oldest() : stack.back().inner;
+    if (loop == nullptr) {
+      idle_.push_back(worker);
+    } else if (loop->HasTask()) {
+      Begin(loop->record.tasks[loop->started++], loop, worker, time);
+    } else if (loop->IsOver()) {
+      Resume(&stack.back(), worker, time);
+    }
+  }
+
+  OpenLoop* Oldest() {
+    while (!loops_.empty() && loops_.front().left) loops_.pop_front();
+    const auto found =
+        std::find_if(loops_.begin(), loops_.end(), [](const auto& l) { return l.HasTask(); });
+    return found == loops_.end() ? nullptr : &*found;
+  }
+
+  void Resume(Frame* frame, std::size_t worker, double time) {
+    OpenLoop& loop = *frame->inner;
+    loop.left = true;
+    if (machine_.bytes_per_second > 0)
+      time = std::max(time, loop.begin + loop.record.bytes / machine_.bytes_per_second);
+    if (frame->of == nullptr) taken_.push_back(time - loop.begin);
+    frame->inner = nullptr;
+    events_.emplace(time + frame->strand.stretches[++frame->stretch], worker);
+  }
+
+  using Event = std::pair<double, std::size_t>;  // time and worker
+  const LoopMachine& machine_;
+  std::vector<std::vector<Frame>> stacks_;  // of workers
+  std::deque<OpenLoop> loops_;              // in the order in which they were opened
+  std::vector<std::size_t> idle_;
+  std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
+  std::vector<double> taken_;
+};
+
+std::string NameOf(const LoopSite& site) {
+  std::string_view file = site.file;
+  const std::size_t folder = file.rfind("src/");
+  if (folder != std::string_view::npos) file.remove_prefix(folder + 4);
+  return fmt::format("{}:{}", file, site.line);
+}
+
+// Sums by place.
+class Places {
+ public:
+  explicit Places(int workers) : workers_(workers) {}
+  void Add(const std::string& place, double work, double taken) {
+    HeldBack& sum = places_[place];
+    ++sum.times;
+    sum.work += work;
+    sum.taken += taken;
+  }
+  LoopForecast Sorted() {
+    LoopForecast out;
+    for (auto& [place, sum] : places_) {
+      sum.place = place;
+      sum.wasted = sum.taken - sum.work / workers_;
+      out.seconds += sum.taken;
+      out.places.push_back(sum);
+    }
+    std::stable_sort(out.places.begin(), out.places.end(),
+                     [](const HeldBack& a, const HeldBack& b) { return a.wasted > b.wasted; });
+    return out;
+  }
+
+ private:
+  int workers_;
+  std::map<std::string, HeldBack> places_;
+};
+
+void Spin(double seconds) {
+  for (const auto begin = std::chrono::steady_clock::now(); SecondsSince(begin) < seconds;) {
+  }
+}
+
+// What a loop takes beyond its tasks, of which every worker gets one, where nine of ten take
+// longer: what other programs hold up is not the machine's.
+double MeasureStart(const Workers& workers) {
+  constexpr int kLoops = 301;
+  constexpr double kBefore = 30e-6, kTask = 100e-6;
+  std::vector<double> beyond;
+  for (int i = 0; i < kLoops; ++i) {
+    Spin(kBefore);
+    const auto begin = std::chrono::steady_clock::now();
+    workers.For(static_cast<std::size_t>(workers.count()),
+                [](std::size_t, std::size_t) { Spin(kTask); });
+    beyond.push_back(SecondsSince(begin) - kTask);
+  }
+  std::nth_element(beyond.begin(), beyond.begin() + kLoops / 10, beyond.end());
+  return std::max(0.0, beyond[kLoops / 10]);
+}
+
+// The best of a few rounds over arrays that no cache holds: two reads and a write of each number.
+double MeasureMemory(const Workers& workers) {
+  constexpr std::size_t kNumbers = std::size_t{1} << 25, kGrain = std::size_t{1} << 16;
+  constexpr int kRounds = 6;
+  AlignedVector<float> x(kNumbers, 1.0f), y(kNumbers, 0.0f);
+  double best = 0;
+  for (int i = 0; i < kRounds; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    workers.ForRanges(kNumbers, kGrain, [&](std::size_t from, std::size_t to, std::size_t) {
+      for (std::size_t k = from; k < to; ++k) y[k] += 0.5f * x[k];
+    });
+    best = std::max(best, 3.0 * sizeof(float) * kNumbers / SecondsSince(begin));
+  }
+  return best;
+}
+
+}  // namespace
+
+LoopForecast Forecast(const Strand& strand, const LoopMachine& machine) {
+  const std::vector<double> taken = Simulation(machine).Run(strand);
+  Places places(machine.workers);
+  std::string before = "begin";
+  for (std::size_t i = 0; i < strand.stretches.size(); ++i) {
+    const bool last = i == strand.loops.size();
+    std::string next = last ? "end" : NameOf(strand.loops[i].site);
+    places.Add(before + " .. " + next, strand.stretches[i], strand.stretches[i]);
+    if (!last) places.Add(next, WorkOf(strand.loops[i]), taken[i]);
+    before = std::move(next);
+  }
+  return places.Sorted();
+}
+
+LoopCosts MeasureLoopCosts(const Workers& workers) {
+  return {MeasureStart(workers), MeasureMemory(workers)};
+}
+
+double StartSeconds(double measured_seconds, int measured, int workers) {
+  if (workers <= 1) return 0;
+  return measured_seconds * std::max(1.0, std::log2(workers) / std::log2(std::max(2, measured)));
+}
+
+}  // namespace tilegrad

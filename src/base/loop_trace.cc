@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/loop_trace.h"
+
+#include <numeric>
+#include <utility>
+
+namespace tilegrad {
+
+double WorkOf(const Strand& strand) {
+  double sum = std::accumulate(strand.stretches.begin(), strand.stretches.end(), 0.0);
+  for (const LoopRecord& loop : strand.loops) sum += WorkOf(loop);
+  return sum;
+}
+
+double WorkOf(const LoopRecord& loop) {
+  double sum = 0;
+  for (const Strand& task : loop.tasks) sum += WorkOf(task);
+  return sum;
+}
+
+void LoopTrace::Begin() {
+  events_.clear();
+  traffic_ = 0;
+  begin_ = Clock::now();
+}
+
+void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
+                    LoopSite site) {
+  const double bytes = std::exchange(traffic_, 0);
+  if (n <= 1) {  // nothing that another worker could do
+    if (n == 1) task(0, 0);
+    return;
+  }
+  events_.push_back({n, site, bytes});
+  for (std::size_t i = 0; i < n; ++i) {
+    task(i, 0);
+    events_.push_back({});
+  }
+}
+
+// Turns the list of events into strands.
+class LoopTrace::Reader {
+ public:
+  Reader(const LoopTrace& trace, Clock::time_point end)
+      : events_(trace.events_), last_(trace.begin_), end_(end) {}
+
+  // Up to the end of the task, or of all.
+  Strand ReadStrand() {
+    Strand strand;
+    while (next_ < events_.size() && events_[next_].tasks > 0) {
+      strand.stretches.push_back(Lap(events_[next_].at));
+      strand.loops.push_back(ReadLoop());
+    }
+    strand.stretches.push_back(Lap(next_ < events_.size() ? events_[next_].at : end_));
+    return strand;
+  }
+
+ private:
+  LoopRecord ReadLoop() {
+    const Event& begin = events_[next_++];
+    LoopRecord loop{begin.site, begin.bytes, {}};
+    for (std::size_t i = 0; i < begin.tasks; ++i) {
+      loop.tasks.push_back(ReadStrand());
+      ++next_;  // its end
+    }
+    return loop;
+  }
+  // Seconds since the last event.
+  double Lap(Clock::time_point now) {
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+  const std::vector<Event>& events_;
+  std::size_t next_ = 0;
+  Clock::time_point last_, end_;
+};
+
+Strand LoopTrace::End() const { return Reader(*this, Clock::now()).ReadStrand(); }
+
+}  // namespace tilegrad

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// What parallel loops do, recorded on one thread: how long each of their tasks takes, and what
+// stands between them. base/loop_schedule.h predicts from it what many workers would take.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <vector>
+
+#include "base/function_ref.h"
+#include "base/parallel.h"
+
+namespace tilegrad {
+
+struct LoopRecord;
+
+// What one thread does in turn: stretches without loops, and loops between them.
+struct Strand {
+  // stretches[i] comes before loops[i]; one more stretch than loops. Seconds.
+  std::vector<double> stretches;
+  std::vector<LoopRecord> loops;
+};
+
+struct LoopRecord {
+  LoopSite site{};
+  double bytes = 0;  // that it moves in memory, as far as it says (Workers::NoteTraffic)
+  std::vector<Strand> tasks;
+};
+
+// Seconds of all stretches.
+double WorkOf(const Strand& strand);
+double WorkOf(const LoopRecord& loop);
+
+// Records the loops of the Workers that are made with it. Of one thread. A clock reading for each
+// loop and task is all that recording adds.
+class LoopTrace {
+ public:
+  // Forgets what was recorded; the clock starts.
+  void Begin();
+  // What was done since Begin. Not after a task has thrown.
+  Strand End() const;
+
+ private:
+  friend class Workers;
+  using Clock = std::chrono::steady_clock;
+  struct Event {            // a loop begins, or a task of the innermost open loop ends
+    std::size_t tasks = 0;  // of the loop that begins
+    LoopSite site{};
+    double bytes = 0;
+    Clock::time_point at = Clock::now();
+  };
+  class Reader;
+  void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site);
+  void NoteTraffic(double bytes) { traffic_ = bytes; }
+
+  std::vector<Event> events_;
+  Clock::time_point begin_;
+  double traffic_ = 0;
+};
+
+}  // namespace tilegrad
