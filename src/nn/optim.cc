@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string_view>
@@ -30,6 +31,14 @@ Status CheckGradient(const NamedVar& parameter, const Gradient& gradient) {
                          parameter.name, NameOf(p.dtype()), p.shape().ToString(),
                          gradient.valid() ? NameOf(gradient.dtype()) : "invalid",
                          gradient.shape().ToString());
+}
+
+constexpr std::size_t kPiece = 16384;  // numbers to a task of a loop over many tensors
+
+// Calls add(begin, end) for pieces of [0, n).
+template <class Add>
+void ForPieces(std::size_t n, const Add& add) {
+  for (std::size_t begin = 0; begin < n; begin += kPiece) add(begin, std::min(n, begin + kPiece));
 }
 
 double DecayOf(const Tensor& parameter, double weight_decay) {
@@ -86,16 +95,19 @@ Status Adam::Step(std::span<const Gradient> gradients) {
   TILEGRAD_TRY(Check(gradients));
   ++steps_;
   BeginStep();
+  pieces_.clear();
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     if (options_.map != nullptr) {
       UpdateThroughMap(slots_[i], gradients[i].Value().value());
     } else if (gradients[i].is_product()) {
       UpdateByProduct(slots_[i], gradients[i]);
     } else {
-      const Tensor& gradient = gradients[i].a().value();
-      Update(slots_[i], gradient, {0, gradient.elements()});
+      ForPieces(gradients[i].a().value().elements(), [&](std::size_t begin, std::size_t end) {
+        pieces_.push_back({i, {begin, end}});
+      });
     }
   }
+  UpdatePieces(gradients);
   return {};
 }
 
@@ -145,6 +157,19 @@ void Adam::Update(Slot& slot, const Tensor& gradient, Numbers numbers) {
     AdamProblem<T> problem = Problem<T>(slot, numbers);
     problem.gradient = gradient.data<T>() + numbers.begin;
     AdamStep(problem, context_.workers());
+  });
+}
+
+void Adam::UpdatePieces(std::span<const Gradient> gradients) {
+  double bytes = 0;
+  for (const Piece& piece : pieces_) {
+    const std::size_t numbers = piece.numbers.end - piece.numbers.begin;
+    bytes += static_cast<double>(numbers * 7 * BytesOf(gradients[piece.slot].dtype()));
+  }
+  context_.workers().NoteTraffic(bytes);
+  context_.workers().For(pieces_.size(), [&](std::size_t i, std::size_t) {
+    const Piece& piece = pieces_[i];
+    Update(slots_[piece.slot], gradients[piece.slot].a().value(), piece.numbers);
   });
 }
 
@@ -201,12 +226,34 @@ double SquaresOf(const Context& context, const Var& x) {
 }
 
 // |a_i . b_j| <= |a_i| |b_j| <= |a| |b|, and so is every partial sum but for rounding.
-bool IsSurelyFinite(const Context& context, const Gradient& product) {
-  const double bound =
-      std::sqrt(SquaresOf(context, product.a())) * std::sqrt(SquaresOf(context, product.b()));
-  return WithFloatType(product.dtype(), [&]<class T>(T) {
+bool IsSurelyFinite(DType dtype, double squares_a, double squares_b) {
+  const double bound = std::sqrt(squares_a) * std::sqrt(squares_b);
+  return WithFloatType(dtype, [&]<class T>(T) {
     return bound < 0.5 * static_cast<double>(std::numeric_limits<T>::max());
   });
+}
+
+// Adds those of factors of type T.
+template <class T>
+void AddSquares(const Context& context, std::span<const Gradient> gradients,
+                std::vector<double>* sums) {
+  std::vector<std::span<const T>> factors;
+  for (const Gradient& g : gradients) {
+    for (const Var* factor : {&g.a(), &g.b()}) {
+      const bool counts = factor->valid() && factor->dtype() == kDTypeOf<T>;
+      factors.push_back(counts ? factor->value().template span<T>() : std::span<const T>());
+    }
+  }
+  const auto more = SumsOfSquares(std::span<const std::span<const T>>(factors), context.workers());
+  std::transform(more.begin(), more.end(), sums->begin(), sums->begin(), std::plus());
+}
+
+// Of a and b of each gradient, in one loop; 0 of what is not valid.
+std::vector<double> SquaresOfFactors(const Context& context, std::span<const Gradient> gradients) {
+  std::vector<double> sums(2 * gradients.size());
+  AddSquares<float>(context, gradients, &sums);
+  AddSquares<double>(context, gradients, &sums);
+  return sums;
 }
 
 }  // namespace
@@ -224,25 +271,24 @@ double GlobalNorm(Context& context, std::span<const Gradient> gradients) {
 }
 
 bool IsFinite(Context& context, std::span<const Gradient> gradients) {
-  return std::all_of(gradients.begin(), gradients.end(), [&](const Gradient& g) {
-    return (g.is_product() && IsSurelyFinite(context, g)) ||
-           std::isfinite(SquaresOf(context, g.Value()));
-  });
+  const std::vector<double> squares = SquaresOfFactors(context, gradients);
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    const Gradient& g = gradients[i];
+    const double own = squares[2 * i];
+    if (g.is_product() && IsSurelyFinite(g.dtype(), own, squares[2 * i + 1])) continue;
+    if (!std::isfinite(g.is_product() ? SquaresOf(context, g.Value()) : own)) return false;
+  }
+  return true;
 }
 
 namespace {
 
 constexpr std::string_view kPrefix = "ema.";
-constexpr std::size_t kUpdateGrain = 65536;  // elements to a task
-
 // y = decay y + (1 - decay) x. Memory bounds it, and every compiler vectorises it.
 template <class T>
-void Blend(double decay, std::span<const T> x, std::span<T> y, const Workers& workers) {
+void Blend(double decay, std::span<const T> x, std::span<T> y) {
   const auto old = static_cast<T>(decay), rest = static_cast<T>(1 - decay);
-  workers.NoteTraffic(static_cast<double>(x.size() * 3 * sizeof(T)));
-  workers.ForRanges(x.size(), kUpdateGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) y[i] = old * y[i] + rest * x[i];
-  });
+  for (std::size_t i = 0; i < x.size(); ++i) y[i] = old * y[i] + rest * x[i];
 }
 
 }  // namespace
@@ -250,15 +296,26 @@ void Blend(double decay, std::span<const T> x, std::span<T> y, const Workers& wo
 MovingAverage::MovingAverage(Context& context, std::vector<NamedTensor> tensors, double decay)
     : context_(context), decay_(decay), tensors_(std::move(tensors)) {
   for (const NamedTensor& t : tensors_) averages_.push_back({t.name, context.Copy(t.value)});
+  for (std::size_t i = 0; i < tensors_.size(); ++i) {
+    ForPieces(tensors_[i].value.elements(), [&](std::size_t begin, std::size_t end) {
+      pieces_.push_back({i, begin, end});
+    });
+  }
 }
 
 void MovingAverage::Update() {
-  for (std::size_t i = 0; i < tensors_.size(); ++i) {
-    const Tensor& from = tensors_[i].value;
+  double bytes = 0;
+  for (const NamedTensor& t : tensors_) bytes += 3 * static_cast<double>(t.value.bytes());
+  context_.workers().NoteTraffic(bytes);
+  context_.workers().For(pieces_.size(), [&](std::size_t i, std::size_t) {
+    const Piece& piece = pieces_[i];
+    const Tensor& from = tensors_[piece.tensor].value;
+    const std::size_t count = piece.end - piece.begin;
     WithFloatType(from.dtype(), [&]<class T>(T) {
-      Blend<T>(decay_, from.span<T>(), averages_[i].value.span<T>(), context_.workers());
+      Blend<T>(decay_, from.span<T>().subspan(piece.begin, count),
+               averages_[piece.tensor].value.span<T>().subspan(piece.begin, count));
     });
-  }
+  });
 }
 
 std::vector<NamedTensor> MovingAverage::State() const {

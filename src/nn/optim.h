@@ -95,11 +95,16 @@ class Adam {
   struct Numbers {
     std::size_t begin, end;
   };
+  struct Piece {
+    std::size_t slot;
+    Numbers numbers;
+  };
   Status Check(std::span<const Gradient> gradients) const;
   // What all parameters of step steps() (1, 2, ..) share, then each of them.
   void BeginStep();
   // Numbers [begin, end); called by several threads, each with other numbers.
   void Update(Slot& slot, const Tensor& gradient, Numbers numbers);
+  void UpdatePieces(std::span<const Gradient> gradients);
   void UpdateByProduct(Slot& slot, const Gradient& product);
   void UpdateThroughMap(Slot& slot, const Tensor& gradient);
   template <class T>
@@ -110,6 +115,7 @@ class Adam {
   AdamCoefficients coefficients_;
   std::vector<Slot> slots_;
   std::vector<Var> parameters_;  // of the slots
+  std::vector<Piece> pieces_;    // of all parameters that a step moves in one loop
   std::int64_t steps_ = 0;
 };
 
@@ -143,6 +149,10 @@ class MovingAverage {
   Context& context_;
   double decay_;
   std::vector<NamedTensor> tensors_, averages_;
+  struct Piece {
+    std::size_t tensor, begin, end;
+  };
+  std::vector<Piece> pieces_;  // of all tensors: an update is one loop
 };
 
 // The averages in `state`, which may hold anything else too, under the names of their tensors.

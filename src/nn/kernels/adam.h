@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "base/parallel.h"
 
@@ -36,5 +38,10 @@ void AdamStep(const AdamProblem<double>& problem, const Workers& workers);
 // The sum of squares in double, merged in an order that n fixes.
 double SumOfSquares(const float* x, std::size_t n, const Workers& workers);
 double SumOfSquares(const double* x, std::size_t n, const Workers& workers);
+// Of each array the same sum; all in one loop.
+std::vector<double> SumsOfSquares(std::span<const std::span<const float>> arrays,
+                                  const Workers& workers);
+std::vector<double> SumsOfSquares(std::span<const std::span<const double>> arrays,
+                                  const Workers& workers);
 
 }  // namespace tilegrad::nn

@@ -135,4 +135,17 @@ TEST(Reduce, SumOfSquaresIsExactToDouble) {
   }
 }
 
+TEST(Reduce, SumsOfSquaresOfManyArraysAreThoseOfEach) {
+  Rng rng(11);
+  std::vector<std::vector<float>> numbers;
+  for (const std::size_t n : {5, 0, 200003, 65536, 65537}) numbers.push_back(RandomFloats(rng, n));
+  const std::vector<std::span<const float>> arrays(numbers.begin(), numbers.end());
+  for (const int workers : {1, 2, 16}) {
+    const std::vector<double> sums = SumsOfSquares(arrays, Workers(workers));
+    ASSERT_EQ(sums.size(), arrays.size());
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      EXPECT_EQ(sums[i], SumOfSquares(arrays[i].data(), arrays[i].size(), Workers(1))) << i;
+  }
+}
+
 }  // namespace tilegrad::nn::reduce_test
