@@ -176,7 +176,7 @@ void ExpectAgreesWithDirect(const Conv2dShape& s, std::uint64_t seed) {
   ExpectWithin(winograd.y, AsDoubles(direct.y), 2 * bound.y(), bound.inputs);
   ExpectWithin(winograd.d_x, AsDoubles(direct.d_x), 2 * bound.d_x(), bound.outputs);
   ExpectWithin(winograd.d_weight, AsDoubles(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
-  for (const int workers : {2, 7}) {
+  for (const int workers : {2, 7, 16}) {
     EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), winograd);
   }
 }
@@ -210,7 +210,7 @@ TEST(Conv2dWinograd, ErrorIsNearThatOfDirectForAnyNumberOfWorkers) {
     EXPECT_LT(d_x, 3);
     EXPECT_LT(d_weight, 3);
     EXPECT_NE(fast.y, direct.y);  // it was not the direct kernel
-    for (const int workers : {2, 7}) {
+    for (const int workers : {2, 7, 16}) {
       EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), fast);
     }
   }

@@ -24,7 +24,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 
 // How a pass of winograd.h goes through the tiles: in portions, so that memory stays small.
 // If there are enough of them, each worker takes portions of its own, which stay in its caches and
-// need no synchronisation.
+// need no synchronisation. Else all workers share each portion, in three loops.
 
 // Transformed values of both sides in a portion that all workers share, about: 8 MB. A weight's
 // gradient is summed portion by portion, so its bits depend on this.
@@ -34,6 +34,7 @@ constexpr std::size_t kOwnValues = std::size_t{1} << 19;
 // But so many tiles at least, since all weights are read again for each portion: with 38 and 19
 // tiles 256 to 512 channels took 1.14 and 1.5 times as long.
 constexpr std::size_t kOwnTiles = 64;
+constexpr std::size_t kFewWorkers = 4;
 
 // Rows of tiles, `unit` by `unit`, cut into portions.
 struct PortionCut {
@@ -46,21 +47,23 @@ inline std::size_t ValuesOfRow(const WinogradPlan& plan) {
   return (WinogradSide{plan, true}.total() + WinogradSide{plan, false}.total()) * plan.tiles_across;
 }
 
-// Does not depend on the number of workers.
-inline PortionCut SharedPortions(const WinogradPlan& plan) {
-  const std::size_t rows = std::max<std::size_t>(1, kSharedValues / ValuesOfRow(plan));
+inline PortionCut SharedPortions(const WinogradPlan& plan, std::size_t values = kSharedValues) {
+  const std::size_t rows = std::max<std::size_t>(1, values / ValuesOfRow(plan));
   return {false, 1, Panels(plan.tile_rows(), rows)};
 }
 
-// Workers' own if there are two at least for each; `unit` rows of tiles stay together.
+// Workers' own if there are two at least for each, or one of many workers, for whom to begin loops
+// together costs more than to wait for the last; `unit` rows of tiles stay together. Portions that
+// are shared grow with the number of workers, as do their caches.
 inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
   const auto count = static_cast<std::size_t>(workers.count());
   const std::size_t units = plan.tile_rows() / unit;
   const std::size_t rows =
       std::max(DivideUp(kOwnTiles, plan.tiles_across), kOwnValues / ValuesOfRow(plan));
   const std::size_t parts = std::max<std::size_t>(1, units / DivideUp(rows, unit));
-  if (unit * ValuesOfRow(plan) > kSharedValues || (count > 1 && parts < 2 * count)) {
-    return SharedPortions(plan);
+  const std::size_t least = count <= kFewWorkers ? 2 * count : count;
+  if (unit * ValuesOfRow(plan) > kSharedValues || (count > 1 && parts < least)) {
+    return SharedPortions(plan, kSharedValues * std::max<std::size_t>(1, count / kFewWorkers));
   }
   return {true, unit, Panels::Parts(units, std::min(units, RoundUp(parts, count)))};
 }
@@ -119,8 +122,8 @@ struct SharedLoops {
   const Workers& workers;
   static constexpr std::size_t owner = 0;
   template <class Task>
-  void For(std::size_t n, const Task& task) const {
-    workers.For(n, task);
+  void For(std::size_t n, const Task& task, LoopSite site = LoopSite::Here()) const {
+    workers.For(n, task, site);
   }
 };
 
@@ -128,8 +131,8 @@ struct OwnLoops {
   const Workers::Part& part;
   std::size_t owner;
   template <class Task>
-  void For(std::size_t n, const Task& task) const {
-    part.For(n, task);
+  void For(std::size_t n, const Task& task, LoopSite site = LoopSite::Here()) const {
+    part.For(n, task, site);
   }
 };
 
