@@ -8,11 +8,17 @@
 namespace tilegrad::nn {
 namespace {
 
+constexpr std::size_t kGrain = 65536;  // numbers to a task
+
 template <class From>
-Tensor Converted(Tensor tensor, std::span<const From> values) {
+Tensor Converted(Tensor tensor, std::span<const From> values, const Workers& workers) {
   assert(values.size() == tensor.elements());
   WithFloatType(tensor.dtype(), [&]<class T>(T) {
-    std::copy(values.begin(), values.end(), tensor.data<T>());  // converts, or moves bytes
+    T* const to = tensor.data<T>();
+    ForChunks(&workers, values.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      std::copy(values.begin() + static_cast<std::ptrdiff_t>(begin),
+                values.begin() + static_cast<std::ptrdiff_t>(end), to + begin);  // or moves bytes
+    });
   });
   return tensor;
 }
@@ -38,11 +44,11 @@ Tensor Context::Full(const Shape& shape, double value) const {
 }
 
 Tensor Context::From(const Shape& shape, std::span<const float> values) const {
-  return Converted(Empty(shape), values);
+  return Converted(Empty(shape), values, workers_);
 }
 
 Tensor Context::From(const Shape& shape, std::span<const double> values) const {
-  return Converted(Empty(shape), values);
+  return Converted(Empty(shape), values, workers_);
 }
 
 Tensor Context::Indices(std::span<const std::int32_t> values) const {
