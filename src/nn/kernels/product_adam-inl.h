@@ -24,13 +24,30 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 // A work item packs its columns of B for itself; rows of as many columns are long enough for
 // memory. A group of rows of C, two of them, stay in L2 beside those columns.
 constexpr GemmItems kUpdateItems{.rows = 256, .columns = 1024};
-constexpr std::size_t kGroupPanels = 2;  // row panels in a group: the best of 1 to 8
+// Down to this, so that many workers have two each of a matrix that is not large.
+constexpr GemmItems kLeastUpdateItems{.rows = 32, .columns = 256};
+constexpr std::size_t kEnoughItemsFor = 4;  // workers
+constexpr std::size_t kGroupPanels = 2;     // row panels in a group: the best of 1 to 8
 
 static_assert(kMostProductAdamSteps <= kDepth);  // or a group would be summed in several passes
 
+inline GemmItems UpdateItemsFor(const GemmProblem<float>& p, std::size_t workers) {
+  GemmItems items = kUpdateItems;
+  if (workers <= kEnoughItemsFor) return items;
+  const auto too_few = [&] {
+    return DivideUp(p.m, items.rows) * DivideUp(p.n, items.columns) < 2 * workers;
+  };
+  while (too_few() && items.rows > kLeastUpdateItems.rows) items.rows /= 2;
+  while (too_few() && items.columns > kLeastUpdateItems.columns) items.columns /= 2;
+  return items;
+}
+
 struct ProductAdamPlan {
-  ProductAdamPlan(const GemmProblem<float>& product, const AdamProblem<float>& problem)
-      : gemm(product, kUpdateItems), adam(problem), rule(problem.coefficients) {}
+  ProductAdamPlan(const GemmProblem<float>& product, const AdamProblem<float>& problem,
+                  std::size_t workers)
+      : gemm(product, UpdateItemsFor(product, workers)),
+        adam(problem),
+        rule(problem.coefficients) {}
 
   // Between rows of a group: a line more than they have, so that they do not share cache sets.
   std::size_t group_ld() const { return gemm.column_blocks.largest() * kTileColumns + kLineFloats; }
@@ -146,10 +163,10 @@ inline void UpdateItem(const ProductAdamPlan& plan, std::size_t item, const floa
 
 inline void ProductAdamTarget(const GemmProblem<float>& product, const AdamProblem<float>& adam,
                               const KernelContext& context) {
-  const ProductAdamPlan plan(product, adam);
+  const auto workers = static_cast<std::size_t>(context.workers.count());
+  const ProductAdamPlan plan(product, adam, workers);
   const std::size_t a_size = RoundUp(plan.gemm.packed_a_size(), kAlignment);
-  float* packed_a = context.scratch.Floats(
-      a_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
   context.workers.For(plan.gemm.rows.count(), [&](std::size_t panel, std::size_t) {
     PackRowPanel(plan.gemm, panel, 0, 1, packed_a);
   });

@@ -122,9 +122,11 @@ TEST(ProductAdam, BitsOfProductAndStep) {
 }
 
 TEST(ProductAdam, BitsDoNotDependOnWorkers) {
-  const Step step({700, 1100, 40});
-  const State apart = step.Apart();
-  for (const int count : {1, 2, 7}) EXPECT_EQ(step.Together(count), apart) << count;
+  for (const Case& c : {Case{700, 1100, 40}, Case{100, 300, 9}}) {
+    const Step step(c);
+    const State apart = step.Apart();
+    for (const int count : {1, 2, 7, 16}) EXPECT_EQ(step.Together(count), apart) << count;
+  }
 }
 
 TEST(ProductAdam, OfNoParametersDoesNothing) {
