@@ -166,7 +166,7 @@ void SetMaterialAndLighting(const std::string& material, const std::string& ligh
 }
 
 struct FitPictures {
-  std::string background = "auto";
+  std::string background = "auto", masks;
   double fov = train::kUsualFov;
   bool find_cameras = false;
   std::optional<UpAxis> up;
@@ -174,7 +174,9 @@ struct FitPictures {
 
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
   // OneOf has checked it.
-  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov, pictures.up, watch};
+  return {hold_out,     *train::BackgroundNamed(pictures.background),
+          pictures.fov, pictures.up,
+          watch,        pictures.masks};
 }
 
 // Warnings of the input from the `first` on, a few of them.
@@ -188,10 +190,17 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
 }
 
 void AddPictureOptions(Command* command, FitPictures* o) {
-  command->Add("--background", &o->background,
-               "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
-               "(plain), the former if there are any (auto); none: every pixel shows the object",
-               {OneOf{{"auto", "mask", "plain", "none"}}});
+  command->Add(
+      "--background", &o->background,
+      "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
+      "(plain), what all views have in common (views), the first if there are any (auto); none: "
+      "every pixel shows the object",
+      {OneOf{{"auto", "mask", "plain", "none", "views"}}});
+  command->Add(
+      "--masks", &o->masks,
+      "a folder of masks, NAME.png for each image, instead of the images' own: such as the "
+      "masks/ of an earlier fit, corrected by hand",
+      {Excludes{{"--background", "--model"}}});
   command->Add(
       "--find-cameras", &o->find_cameras,
       "look for the cameras in the images, though the folder has some; these judge the result");
@@ -283,6 +292,7 @@ Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, Out
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
   guard->AddInput(options.input);
+  if (!options.pictures.masks.empty()) guard->AddInput(options.pictures.masks);
   TILEGRAD_ASSIGN(job.input, ReadInput(options, watch));
   PrintWarnings(job.input, 0);
   if (!options.light_direction.empty()) TurnLight(job.input.up, &job.config);
@@ -386,7 +396,7 @@ Status TakeFromFit(const Path& fit, Command* command, CommandList* list) {
   if (!holds || !PathExists(fit / train::kFitSettings)) return {};
   Continuation before;
   TILEGRAD_ASSIGN(before.then, ReadGiven(fit / train::kFitSettings));
-  for (const char* name : {"input", "--start", "--truth"}) {
+  for (const char* name : {"input", "--start", "--truth", "--masks"}) {
     const auto found = before.then.find(name);
     if (found == before.then.end()) continue;
     found->second = FindFromRun(found->second, fit).value_or(found->second).string();

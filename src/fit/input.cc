@@ -9,6 +9,7 @@
 #include "fit/camera_check.h"
 #include "fit/colmap_frames.h"
 #include "fit/input_up.h"
+#include "fit/masks/start_masks.h"
 #include "fit/undistort.h"
 #include "io/camera_file.h"
 #include "train/data/dataset.h"
@@ -195,6 +196,7 @@ Status FinishInput(const InputOptions& options, FitInput* input) {
   TILEGRAD_TRY(CheckCameras(*input));
   HoldOut(options.hold_out, input);
   if (TakesMasks(options.background) && HasAlpha(*input)) WarnOfFullMasks(input);
+  TILEGRAD_TRY(SeekMasks(options.background, input));
   TILEGRAD_TRY(ApplyBackground(options.background, input, options.watch));
   TILEGRAD_TRY(DropEmptyViews(input));
   if (input->training.empty())
@@ -223,7 +225,11 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   }
   InputReader reader(&input);
   TILEGRAD_TRY(reader.AddAll(read.frames, options.watch));
-  TILEGRAD_TRY(reader.CheckMasks(options.background));
+  if (options.masks.empty()) {
+    TILEGRAD_TRY(reader.CheckMasks(options.background));
+  } else {
+    TILEGRAD_TRY(ReadMasks(options.masks, &input));
+  }
   TILEGRAD_TRY(FinishInput(options, &input));
   return input;
 }

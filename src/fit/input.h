@@ -25,8 +25,12 @@ struct FitInput {
   TargetImages images;                  // straight colours (not multiplied by alpha)
   std::vector<int> training, held_out;  // indices of views; every view is in one of them
   bool masked = false;                  // some image says where the object is
-  bool posed = true;                    // cameras are known; else only their lenses are
-  bool found = false;                   // cameras were found by looking at the images
+  // No image says where the object is, but cameras are known: masks are to be found (masks/).
+  bool seeks_masks = false;
+  // Of masks that were found: how well they agree with what all views have in common, IoU, mean.
+  std::optional<double> mask_agreement;
+  bool posed = true;   // cameras are known; else only their lenses are
+  bool found = false;  // cameras were found by looking at the images
   // Cameras as they were given, where those above were found by looking at the images all the same;
   // else empty. In a world of their own.
   std::vector<Camera> given_cameras;
@@ -39,13 +43,15 @@ struct FitInput {
 
 // Where masks come from.
 enum class Background {
-  kAuto,   // as kMask where an image has an alpha or a mask, else as kPlain
+  kAuto,   // as kMask where an image has an alpha or a mask, else as kViews or kPlain
   kMask,   // alpha and masks of the input
   kPlain,  // plain backgrounds are recognised (background.h); alpha and masks are ignored
   kNone,   // there is none: every pixel shows the object
+  kViews,  // what the views have in common, where cameras are known (masks/find_masks.h)
 };
+inline constexpr std::size_t kLeastMaskViews = 6;  // of kViews: fewer have too little in common
 
-// auto, mask, plain or none.
+// auto, mask, plain, none or views.
 std::optional<Background> BackgroundNamed(std::string_view name);
 
 struct InputOptions {
@@ -55,6 +61,7 @@ struct InputOptions {
   // The axis of the cameras' world that points up; none: as the cameras make plain, or else y.
   std::optional<UpAxis> up = std::nullopt;
   Watch watch = {};  // of reading and masks
+  Path masks = {};   // a folder of masks instead of the images' own (masks/start_masks.h)
 };
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
@@ -76,7 +83,11 @@ Status FinishInput(const InputOptions& options, FitInput* input);
 
 // Whether some pixel is not opaque.
 bool HasAlpha(const FitInput& input);
-// Sets `masked`, too. An error only if stopped.
+// Sets `seeks_masks`: whether masks are those that views have in common, which StartMasks then
+// finds. An error if that is asked for without cameras or of too few views.
+Status SeekMasks(Background background, FitInput* input);
+// Masks from alpha or plain backgrounds, unless they are to be sought; sets `masked`. An error only
+// if stopped.
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch = {});
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
 Status TakePlainBackgrounds(FitInput* input, const Watch& watch = {});

@@ -10,7 +10,7 @@
 namespace tilegrad::train {
 
 std::optional<Background> BackgroundNamed(std::string_view name) {
-  constexpr std::array<std::string_view, 4> kNames = {"auto", "mask", "plain", "none"};
+  constexpr std::array<std::string_view, 5> kNames = {"auto", "mask", "plain", "none", "views"};
   const auto at = std::ranges::find(kNames, name);
   if (at == kNames.end()) return std::nullopt;
   return static_cast<Background>(at - kNames.begin());
@@ -92,10 +92,22 @@ Status DropEmptyViews(FitInput* input) {
   return {};
 }
 
+Status SeekMasks(Background background, FitInput* input) {
+  const bool asked = background == Background::kViews;
+  if (asked) std::ranges::fill(input->images.alpha, 1.0f);
+  const std::size_t views = input->names.size();
+  input->seeks_masks = (asked || (background == Background::kAuto && !HasAlpha(*input))) &&
+                       input->posed && views >= kLeastMaskViews;
+  if (!asked || input->seeks_masks) return {};
+  return InvalidArgument(
+      "--background views takes cameras and at least {} images; there are {} images{}",
+      kLeastMaskViews, views, input->posed ? "" : " without cameras");
+}
+
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch) {
   if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
   const bool asked = background == Background::kPlain;
-  if (asked || (background == Background::kAuto && !HasAlpha(*input))) {
+  if (asked || (background == Background::kAuto && !HasAlpha(*input) && !input->seeks_masks)) {
     TILEGRAD_TRY(LookForPlainBackgrounds(asked, input, watch));
   }
   input->masked = HasAlpha(*input);

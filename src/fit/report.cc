@@ -46,6 +46,11 @@ std::string Facts(const FitJob& job, const FitOutcome& o, const Mesh& mesh) {
   if (mesh.textures.empty() && !mesh.colors.empty()) out += Row("colours", "one per vertex");
   out += Row("images fitted", WithCommas(std::ssize(job.input.training)));
   out += Row("images held out", WithCommas(std::ssize(job.input.held_out)));
+  if (job.input.mask_agreement) {
+    out += Row("masks", fmt::format("found in the images, in masks/; they agree to {:.0f} % with "
+                                    "what all have in common",
+                                    100 * *job.input.mask_agreement));
+  }
   if (o.voxel_iou)
     out += Row("3D IoU, 32 voxels a side", fmt::format("{:.1f} %", 100 * *o.voxel_iou));
   if (o.camera_error_before && o.camera_error_after) {

@@ -3,6 +3,7 @@
 //
 //   <out>/mesh.glb                the fitted mesh with its texture or colours
 //   <out>/transforms_fitted.json  the cameras of all views, as they are at the end
+//   <out>/masks/                  masks that were found, if the input had none
 //   <out>/report.html             pictures, scores, curves
 //   <out>/timelapse/, timelapse.png   pictures over the run, and the mesh at each
 //   <out>/metrics.jsonl, tensorboard/, checkpoints/

@@ -39,9 +39,10 @@ Status CheckConfig(const FitConfig& config) {
 
 // The masks are what positions and cameras are fitted by.
 Status CheckMasks(const FitJob& job) {
-  if (job.input.masked || job.config.loss.silhouette_weight == 0) return {};
+  if (job.input.masked || job.input.seeks_masks || job.config.loss.silhouette_weight == 0)
+    return {};
   return InvalidArgument(
-      "no image has alpha, a mask or a plain background: add masks (\"mask_path\" in "
+      "no image has alpha, a mask or a plain background: add masks (--masks, or \"mask_path\" in "
       "transforms.json), or fit colours alone with a silhouette weight of 0");
 }
 
@@ -238,6 +239,9 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
   TILEGRAD_TRY(CheckFit(job));
   if (!job.input.posed && !job.input.found) {
     return InvalidArgument("the images have no cameras, which `tilegrad fit` would look for first");
+  }
+  if (job.input.seeks_masks) {
+    return InvalidArgument("the images have no masks, which `tilegrad fit` would look for first");
   }
   FitStart start;
   bool from_hull = false;

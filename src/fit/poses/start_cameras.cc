@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/poses/start_cameras.h"
 
+#include "fit/masks/start_masks.h"
 #include "fit/poses/input_poses.h"
 #include "fit/sphere.h"
 
@@ -14,6 +15,7 @@ constexpr double kCamerasRest = 0.4;
 
 Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& workers,
                     const ProgressSink& progress, const StopFlag& stop) {
+  if (!search.look) TILEGRAD_TRY(StartMasks(search.resume, job, workers, {progress, &stop}));
   InputPosesJob find;
   find.options.seed = job->config.seed;
   if (!job->out.empty()) find.file = job->out / "cameras_start.json";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cameras that a fit starts from.
+// The cameras that a fit starts from, and masks where it has none.
 #pragma once
 
 #include "fit/run.h"
@@ -11,10 +11,10 @@ struct CameraSearch {
   bool resume = false;  // reads what an earlier call found and kept in <out>/cameras_start.json
 };
 
-// Cameras of images that came without, or that are not to be believed (FindInputPoses); else, where
-// cameras are to be fitted together with a shape, better ones to start from (RefineInputPoses).
-// Changes `job`: input, start_cameras, config.cameras_rest. May add warnings to the input. Errors:
-// those of the two.
+// First StartMasks, unless cameras are not to be believed. Then cameras of images that came
+// without, or that are not to be believed (FindInputPoses); else, where cameras are to be fitted
+// together with a shape, better ones to start from (RefineInputPoses). Changes `job`: input,
+// start_cameras, config.cameras_rest. May add warnings to the input. Errors: those of the two.
 Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& workers,
                     const ProgressSink& progress, const StopFlag& stop);
 

@@ -35,9 +35,10 @@ constexpr std::array kRunNames = {kTrainSettings,
 struct Series {
   const char *folder, *begin;
 };
-constexpr std::array kSeries = {Series{"checkpoints", "step_"}, Series{"samples", "step_"},
-                                Series{"timelapse", "0"},       Series{"live", "mesh_"},
-                                Series{"live", "state.js"},     Series{"tensorboard", "events."}};
+constexpr std::array kSeries = {
+    Series{"checkpoints", "step_"},  Series{"samples", "step_"}, Series{"timelapse", "0"},
+    Series{"live", "mesh_"},         Series{"masks", ""},        Series{"live", "state.js"},
+    Series{"tensorboard", "events."}};
 
 void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
   std::error_code error;

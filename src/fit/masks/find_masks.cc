@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/masks/find_masks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/error.h"
+#include "fit/masks/color_odds.h"
+#include "fit/masks/common_hull.h"
+#include "fit/masks/floor.h"
+#include "fit/masks/pixel_field.h"
+#include "fit/sphere.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSide = 192;  // pixels of the longer side, about, of all rounds but the last
+constexpr int kRounds = 10;
+// Share of the views that may see past a cell of the hull.
+constexpr double kFirstTolerance = 0.15, kLastTolerance = 0.06;
+// ln: of a pixel that nothing of the hull covers, and of one in its silhouette, in later rounds.
+constexpr float kOutsideHull = -5, kInsideHull = 0.4f;
+constexpr float kKept = 5;  // ln: of the rounds, for the last one at full resolution
+constexpr PixelField::Relaxing kRelaxing = {.rounds = 40, .coupling = 0.5f};
+constexpr float kInside = 0.5f;
+const Progress kDone = {"finding masks", kRounds + 1, kRounds + 1, ""};
+
+Camera Reduced(Camera c, float factor) {
+  c.fx /= factor;
+  c.fy /= factor;
+  c.cx /= factor;
+  c.cy /= factor;
+  return c;
+}
+
+class MaskSearch {
+ public:
+  MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers);
+
+  Status CheckReach() const;
+  Status Run(const Watch& watch);
+  Result<FoundMasks> Finish(const Watch& watch) const;  // at full resolution
+
+ private:
+  std::size_t views() const { return cameras_.size(); }
+  std::size_t plane() const { return images_.pixels(); }
+  std::span<const float> Of(std::size_t view, const std::vector<float>& values) const {
+    return std::span(values).subspan(view * plane(), plane());
+  }
+  std::span<float> Of(std::size_t view, std::vector<float>* values) const {
+    return std::span(*values).subspan(view * plane(), plane());
+  }
+
+  void Start(glm::vec3 middle);
+  void Round(double time);
+  std::vector<float> Enlarged(std::span<const float> values) const;
+  std::vector<float> FullMask(std::size_t view) const;
+  double Agreement(std::size_t view) const;
+
+  const TargetImages& full_;
+  const Workers& workers_;
+  const int factor_;
+  const TargetImages images_;
+  std::vector<Camera> cameras_;
+  ColorOdds odds_;
+  std::optional<CommonHull> hull_;
+  std::vector<PixelField> fields_;
+  std::vector<float> inside_, on_floor_;  // [N,H,W]
+};
+
+MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers)
+    : full_(input.images),
+      workers_(workers),
+      factor_(std::max(1, std::max(full_.width, full_.height) / kSide)),
+      images_(Reduce(full_, factor_)),
+      odds_(images_, workers),
+      inside_(images_.alpha.size()),
+      on_floor_(images_.alpha.size()) {
+  for (const Camera& c : input.cameras) cameras_.push_back(Reduced(c, static_cast<float>(factor_)));
+  hull_.emplace(cameras_, ImageSize{images_.width, images_.height}, middle, workers);
+  for (std::size_t v = 0; v < views(); ++v)
+    fields_.emplace_back(std::span(images_.color).subspan(3 * v * plane(), 3 * plane()),
+                         images_.width, images_.height);
+  Start(middle);
+}
+
+// Belief falls with the distance from where all views look; the hull holds all that they see.
+void MaskSearch::Start(glm::vec3 middle) {
+  hull_->Vote(std::vector<float>(inside_.size(), 1.0f), kFirstTolerance, workers_);
+  const Floor floor(images_, cameras_, {middle, hull_->reach()}, workers_);
+  const float radius = 0.5f * static_cast<float>(std::min(images_.width, images_.height));
+  workers_.For(views(), [&](std::size_t v, std::size_t) {
+    const auto at = hull_->Project(v, middle);
+    const auto wide = static_cast<std::size_t>(images_.width);
+    for (std::size_t p = 0; p < plane(); ++p) {
+      const float x = (static_cast<float>(p % wide) + 0.5f - at.x) / radius,
+                  y = (static_cast<float>(p / wide) + 0.5f - at.y) / radius;
+      const float d = x * x + y * y;
+      inside_[v * plane() + p] = 0.9f * std::exp(-d * d);
+    }
+    if (floor.found()) std::ranges::copy(floor.Agreement(v), Of(v, &on_floor_).begin());
+  });
+}
+
+void MaskSearch::Round(double time) {
+  odds_.Learn(inside_, workers_);
+  const float inside_hull = kInsideHull * static_cast<float>(std::min(1.0, 2 * time));
+  workers_.For(views(), [&](std::size_t v, std::size_t) {
+    std::vector<float> odds = odds_.Of(images_, v, Of(v, on_floor_));
+    const std::vector<float> hull = hull_->Silhouette(v);
+    for (std::size_t p = 0; p < odds.size(); ++p)
+      odds[p] += kOutsideHull * (1 - hull[p]) + inside_hull * hull[p];
+    std::ranges::copy(fields_[v].Relax(odds, kRelaxing), Of(v, &inside_).begin());
+  });
+  hull_->Vote(inside_, kFirstTolerance + time * (kLastTolerance - kFirstTolerance), workers_);
+}
+
+Status MaskSearch::CheckReach() const {
+  if (std::isnormal(hull_->reach())) return {};
+  return InvalidArgument("masks cannot be found: the views see {:.3g} of what they look at",
+                         hull_->reach());
+}
+
+Status MaskSearch::Run(const Watch& watch) {
+  for (int round = 0; round < kRounds; ++round) {
+    TILEGRAD_TRY(watch.At({"finding masks", static_cast<std::uint64_t>(round), kRounds + 1, ""}));
+    Round(static_cast<double>(round) / (kRounds - 1));
+  }
+  return watch.At({"finding masks", kRounds, kRounds + 1, ""});
+}
+
+std::vector<float> MaskSearch::Enlarged(std::span<const float> values) const {
+  std::vector<float> out(full_.pixels());
+  const auto wide = static_cast<std::size_t>(full_.width);
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    const int x = std::min(static_cast<int>(p % wide) / factor_, images_.width - 1),
+              y = std::min(static_cast<int>(p / wide) / factor_, images_.height - 1);
+    out[p] = values[static_cast<std::size_t>(y * images_.width + x)];
+  }
+  return out;
+}
+
+std::vector<float> MaskSearch::FullMask(std::size_t view) const {
+  std::vector<float> odds = odds_.Of(full_, view, Enlarged(Of(view, on_floor_)));
+  const std::vector<float> before = Enlarged(Of(view, inside_));
+  for (std::size_t p = 0; p < odds.size(); ++p) odds[p] += kKept * (2 * before[p] - 1);
+  const std::size_t pixels = full_.pixels();
+  const PixelField field(std::span(full_.color).subspan(3 * view * pixels, 3 * pixels), full_.width,
+                         full_.height);
+  return field.Relax(odds, kRelaxing);
+}
+
+double MaskSearch::Agreement(std::size_t view) const {
+  const std::vector<float> hull = hull_->Silhouette(view);
+  const auto mask = Of(view, inside_);
+  double both = 0, either = 0;
+  for (std::size_t p = 0; p < hull.size(); ++p) {
+    const bool a = mask[p] >= kInside, b = hull[p] >= kInside;
+    both += a && b;
+    either += a || b;
+  }
+  return both / std::max(either, 1.0);
+}
+
+Result<FoundMasks> MaskSearch::Finish(const Watch& watch) const {
+  FoundMasks out;
+  out.alpha.resize(full_.alpha.size());
+  out.agreement.resize(views());
+  workers_.For(views(), [&](std::size_t v, std::size_t) {
+    if (watch.stopped()) return;
+    out.agreement[v] = Agreement(v);
+    const std::vector<float> mask = FullMask(v);
+    // As a file of 8 bits keeps it.
+    std::ranges::transform(mask, out.alpha.begin() + static_cast<std::ptrdiff_t>(v * mask.size()),
+                           [](float a) { return std::floor(255 * a + 0.5f) / 255; });
+  });
+  TILEGRAD_TRY(watch.At(kDone));
+  return out;
+}
+
+}  // namespace
+
+Result<FoundMasks> FindMasks(const FitInput& input, const Workers& workers, const Watch& watch) {
+  TILEGRAD_TRY(watch.At({"finding masks", 0, kRounds + 1, ""}));
+  TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
+  MaskSearch search(input, sphere.centre, workers);
+  TILEGRAD_TRY(search.CheckReach());
+  TILEGRAD_TRY(search.Run(watch));
+  return search.Finish(watch);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/masks/start_masks.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "fit/masks/find_masks.h"
+#include "io/image_file.h"
+#include "train/data/cutout.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr double kDoubt = 0.7, kNoMasks = 0.6;  // agreement of a view; of all, the mean
+
+std::string MaskName(const FitInput& input, std::size_t view) {
+  const auto end = input.names.begin() + static_cast<std::ptrdiff_t>(view);
+  const bool taken = std::find(input.names.begin(), end, input.names[view]) != end;
+  return taken ? fmt::format("{}-{}", view, input.names[view]) : input.names[view];
+}
+
+Result<Path> FindMask(const Path& folder, const std::string& name) {
+  for (const Path& file :
+       {folder / (name + ".png"), folder / Path(name).replace_extension(".png"), folder / name}) {
+    if (IsFile(file)) return file;
+  }
+  return NotFound("{}: no such mask; every image needs one", (folder / (name + ".png")).string());
+}
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+void Take(const FoundMasks& found, FitInput* input) {
+  std::ranges::copy(found.alpha, input->images.alpha.begin());
+  input->mask_agreement = Mean(found.agreement);
+  for (std::size_t v = 0; v < input->names.size(); ++v) {
+    if (found.agreement[v] >= kDoubt) continue;
+    input->warnings.push_back(
+        fmt::format("{}: its mask is doubtful, it covers {:.0f} % of what all views have in common "
+                    "or that of it; look at masks/{}.png",
+                    input->names[v], 100 * found.agreement[v], MaskName(*input, v)));
+  }
+}
+
+Status Find(const Path& folder, FitInput* input, const Workers& workers, const Watch& watch) {
+  TILEGRAD_ASSIGN(const FoundMasks found, FindMasks(*input, workers, watch));
+  if (!(Mean(found.agreement) >= kNoMasks)) {
+    input->warnings.push_back(fmt::format(
+        "no masks were found in the images: they agree to {:.0f} %", 100 * Mean(found.agreement)));
+    return ApplyBackground(Background::kAuto, input, watch);
+  }
+  Take(found, input);
+  return folder.empty() ? Status() : WriteMasks(folder, *input);
+}
+
+}  // namespace
+
+Status WriteMasks(const Path& folder, const FitInput& input) {
+  TILEGRAD_TRY(MakeFolder(folder));
+  const TargetImages& all = input.images;
+  for (std::size_t v = 0; v < input.names.size(); ++v) {
+    ImageU8 mask(all.width, all.height, 1);
+    const auto alpha = std::span(all.alpha).subspan(v * all.pixels(), all.pixels());
+    std::ranges::transform(alpha, mask.pixels.begin(),
+                           [](float a) { return static_cast<std::uint8_t>(255 * a + 0.5f); });
+    TILEGRAD_TRY(io::SavePng(folder / (MaskName(input, v) + ".png"), mask));
+  }
+  return {};
+}
+
+Status ReadMasks(const Path& folder, FitInput* input) {
+  TargetImages& all = input->images;
+  for (std::size_t v = 0; v < input->names.size(); ++v) {
+    TILEGRAD_ASSIGN(const Path file, FindMask(folder, MaskName(*input, v)));
+    TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(file));
+    if (mask.width != all.width || mask.height != all.height) {
+      return DataLoss("{}: the mask has {} x {} pixels, its image {} x {}", file.string(),
+                      mask.width, mask.height, all.width, all.height);
+    }
+    const std::vector<std::uint8_t> values = MaskValues(mask);
+    std::ranges::transform(values,
+                           all.alpha.begin() + static_cast<std::ptrdiff_t>(v * all.pixels()),
+                           [](std::uint8_t m) { return static_cast<float>(m) / 255; });
+  }
+  return {};
+}
+
+Status StartMasks(bool resume, FitJob* job, const Workers& workers, const Watch& watch) {
+  FitInput& input = job->input;
+  if (!input.seeks_masks) return {};
+  input.seeks_masks = false;
+  const Path folder = job->out.empty() ? Path() : job->out / "masks";
+  if (job->config.loss.silhouette_weight == 0) {
+    TILEGRAD_TRY(ApplyBackground(Background::kAuto, &input, watch));
+  } else if (resume && !folder.empty() && IsFolder(folder)) {
+    TILEGRAD_TRY(ReadMasks(folder, &input));
+  } else {
+    TILEGRAD_TRY(Find(folder, &input, workers, watch));
+  }
+  input.masked = HasAlpha(input);
+  return DropEmptyViews(&input);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "base/rng.h"
+#include "fit/masks/find_masks.h"
+#include "fit/masks/floor.h"
+#include "fit/masks/start_masks.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::train::masks_test {
+
+constexpr int kWide = 96, kHigh = 72, kViews = 12;
+constexpr float kFloor = -0.35f;  // below the middle
+constexpr double kRadius = 0.3;
+
+enum class Place { kPaper, kTable, kRoom };
+
+// Blots, by bilinear interpolation of random numbers on a lattice.
+float Blots(glm::vec3 p, float per_unit, std::uint64_t channel) {
+  const glm::vec3 at = per_unit * p, low = glm::floor(at);
+  float sum = 0;
+  for (int k = 0; k < 8; ++k) {
+    const glm::vec3 corner = low + glm::vec3(k & 1, k >> 1 & 1, k >> 2);
+    const glm::vec3 share = glm::vec3(1) - glm::abs(at - corner);
+    const auto key = static_cast<std::int64_t>(corner.x) * 73856093 ^
+                     static_cast<std::int64_t>(corner.y) * 19349663 ^
+                     static_cast<std::int64_t>(corner.z) * 83492791;
+    Rng rng(static_cast<std::uint64_t>(key), channel);
+    sum += share.x * share.y * share.z * static_cast<float>(rng.Uniform());
+  }
+  return sum;
+}
+
+glm::vec3 Blotted(glm::vec3 base, float strength, glm::vec3 p, float per_unit) {
+  return base + strength * (glm::vec3(Blots(p, per_unit, 1), Blots(p, per_unit, 2),
+                                      Blots(p, per_unit, 3)) -
+                            0.5f);
+}
+
+// A ball half red, half blue, above a floor with a soft shadow, in a room that is a ball, too.
+class Capture {
+ public:
+  explicit Capture(Place place) : place_(place) {
+    input_.images.width = kWide;
+    input_.images.height = kHigh;
+    for (int v = 0; v < kViews; ++v) AddView(v);
+    input_.images.alpha.assign(truth_.size(), 1.0f);
+    input_.seeks_masks = true;
+  }
+
+  const FitInput& input() const { return input_; }
+
+  double Iou(std::span<const float> alpha) const {
+    double both = 0, either = 0;
+    for (std::size_t p = 0; p < truth_.size(); ++p) {
+      const bool a = alpha[p] >= 0.5f, b = truth_[p];
+      both += a && b;
+      either += a || b;
+    }
+    return both / either;
+  }
+
+ private:
+  void AddView(int v) {
+    const Lens lens{45, kWide, kHigh};
+    input_.cameras.push_back(OrbitCamera(lens, 360.0 * v / kViews, v % 2 ? 45 : 20, 1.7));
+    input_.names.push_back("view " + std::to_string(v));
+    input_.training.push_back(v);
+    Rng noise(7, static_cast<std::uint64_t>(v));
+    std::vector<float> planes(std::size_t{3} * kWide * kHigh);
+    for (int p = 0; p < kWide * kHigh; ++p) {
+      const glm::vec3 color = Trace(input_.cameras.back(), p % kWide + 0.5f, p / kWide + 0.5f);
+      for (int c = 0; c < 3; ++c)
+        planes[static_cast<std::size_t>(c * kWide * kHigh + p)] =
+            std::clamp(color[c] + 0.012f * static_cast<float>(noise.Normal()), 0.0f, 1.0f);
+    }
+    input_.images.color.insert(input_.images.color.end(), planes.begin(), planes.end());
+  }
+
+  glm::vec3 Trace(const Camera& c, float x, float y) {
+    const float* r = c.rotation;
+    const auto row = [&](int i) { return glm::vec3(r[3 * i], r[3 * i + 1], r[3 * i + 2]); };
+    glm::vec3 eye(0);
+    for (int i = 0; i < 3; ++i) eye -= c.translation[i] * row(i);
+    const glm::vec3 ray =
+        glm::normalize((x - c.cx) / c.fx * row(0) - (y - c.cy) / c.fy * row(1) - row(2));
+    const float ball = Hit(eye, ray, static_cast<float>(kRadius), -1);
+    truth_.push_back(ball > 0);
+    if (ball > 0) return Ball(eye + ball * ray);
+    const float down = (kFloor - eye.y) / ray.y;
+    const glm::vec3 floor = eye + down * ray;
+    if (place_ != Place::kPaper && down > 0 && std::hypot(floor.x, floor.z) < FloorRadius())
+      return FloorColor(floor);
+    return Wall(eye + Hit(eye, ray, 4, 1) * ray);
+  }
+
+  // Along a ray, to the nearer (-1) or farther side of a ball around the origin; 0 beside it.
+  static float Hit(glm::vec3 eye, glm::vec3 ray, float radius, float side) {
+    const float b = glm::dot(eye, ray), d = b * b - glm::dot(eye, eye) + radius * radius;
+    return d > 0 ? -b + side * std::sqrt(d) : 0;
+  }
+  float FloorRadius() const { return place_ == Place::kTable ? 0.9f : 3.0f; }
+
+  static glm::vec3 Ball(glm::vec3 p) {
+    const float light = 0.75f + 0.8f * p.y;
+    return light *
+           (p.x + p.y > 0.05f ? glm::vec3(0.85f, 0.2f, 0.15f) : glm::vec3(0.2f, 0.3f, 0.8f));
+  }
+  glm::vec3 FloorColor(glm::vec3 p) const {
+    const float dark = 0.55f / (1 + std::exp(8 * (std::hypot(p.x, p.z) / 0.32f - 1)));
+    const glm::vec3 wood = place_ == Place::kTable ? Blotted({0.65f, 0.5f, 0.35f}, 0.12f, p, 9)
+                                                   : Blotted({0.5f, 0.5f, 0.45f}, 0.5f, p, 6);
+    return (1 - dark) * wood;
+  }
+  glm::vec3 Wall(glm::vec3 p) const {
+    if (place_ == Place::kPaper) return glm::vec3(0.75f, 0.72f, 0.7f) + 0.02f * p.y;
+    if (place_ == Place::kTable) return Blotted({0.45f, 0.6f, 0.5f}, 0.15f, p, 0.7f);
+    return Blotted({0.5f, 0.5f, 0.5f}, 0.8f, p, 1.5f);
+  }
+
+  Place place_;
+  FitInput input_;
+  std::vector<bool> truth_;
+};
+
+TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
+  const Workers workers(2);
+  const std::pair<Place, double> cases[] = {
+      {Place::kPaper, 0.95}, {Place::kTable, 0.9}, {Place::kRoom, 0.85}};
+  for (const auto& [place, least] : cases) {
+    const Capture capture(place);
+    const auto found = FindMasks(capture.input(), workers);
+    ASSERT_TRUE(found.ok()) << found.status().message();
+    EXPECT_GT(capture.Iou(found->alpha), least) << static_cast<int>(place);
+    for (const double agreement : found->agreement) EXPECT_GT(agreement, 0.8);
+  }
+}
+
+TEST(FitMasks, AreTheSameForAnyNumberOfWorkers) {
+  const Capture capture(Place::kTable);
+  const auto one = FindMasks(capture.input(), Workers(1)),
+             three = FindMasks(capture.input(), Workers(3));
+  ASSERT_TRUE(one.ok() && three.ok());
+  EXPECT_EQ(one->alpha, three->alpha);
+  EXPECT_EQ(one->agreement, three->agreement);
+}
+
+TEST(FitMasks, StopWhenTold) {
+  const Capture capture(Place::kPaper);
+  StopFlag stop = false;
+  int seen = 0;
+  const auto sink = [&](const Progress& now) {
+    EXPECT_EQ(now.stage, "finding masks");
+    stop = ++seen == 3;
+  };
+  EXPECT_EQ(FindMasks(capture.input(), Workers(1), {sink, &stop}).status().code(),
+            StatusCode::kCancelled);
+  EXPECT_EQ(seen, 3);
+}
+
+TEST(FitMasks, AFloorStandsOutWhereThereIsOne) {
+  for (const Place place : {Place::kTable, Place::kRoom, Place::kPaper}) {
+    const FitInput input = Capture(place).input();
+    const Workers workers(1);
+    const Floor floor(input.images, input.cameras, {{0, 0, 0}, 0.9f}, workers);
+    EXPECT_EQ(floor.found(), place != Place::kPaper);
+    if (floor.found()) EXPECT_NEAR(floor.height(), kFloor, 0.02f);
+    const glm::vec3 up = UpOf(input.cameras);
+    EXPECT_NEAR(up.y, 1, 1e-4f);
+  }
+}
+
+class FitMaskFiles : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    TempFolderTest::SetUp();
+    job_.input = Capture(Place::kPaper).input();
+    job_.out = folder_ / "fit";
+  }
+  Status Start(bool resume) { return StartMasks(resume, &job_, Workers(2), {}); }
+
+  FitJob job_;
+};
+
+TEST_F(FitMaskFiles, AreReadBackToTheBit) {
+  FitInput again = job_.input;
+  ASSERT_TRUE(Start(false).ok());
+  EXPECT_TRUE(job_.input.masked);
+  EXPECT_FALSE(job_.input.seeks_masks);
+  EXPECT_GT(job_.input.mask_agreement.value_or(0), 0.8);
+  ASSERT_TRUE(ReadMasks(job_.out / "masks", &again).ok());
+  EXPECT_EQ(again.images.alpha, job_.input.images.alpha);
+  // Going on takes them from there.
+  std::ranges::fill(again.images.alpha, 1.0f);
+  std::swap(again, job_.input);
+  ASSERT_TRUE(Start(true).ok());
+  EXPECT_EQ(again.images.alpha, job_.input.images.alpha);
+  EXPECT_FALSE(job_.input.mask_agreement.has_value());
+  std::filesystem::remove(job_.out / "masks" / "view 3.png");
+  const Status missing = ReadMasks(job_.out / "masks", &again);
+  EXPECT_NE(missing.message().find("view 3.png: no such mask"), std::string::npos);
+}
+
+TEST_F(FitMaskFiles, AreSoughtWhereNoImageHasOne) {
+  EXPECT_TRUE(SeekMasks(Background::kAuto, &job_.input).ok());
+  EXPECT_TRUE(job_.input.seeks_masks);
+  EXPECT_TRUE(CheckFit(job_).ok());
+  const auto prepared = PrepareFit(job_, Workers(1));
+  EXPECT_EQ(prepared.status().message(),
+            "the images have no masks, which `tilegrad fit` would look for first");
+  job_.input.posed = false;
+  EXPECT_TRUE(SeekMasks(Background::kAuto, &job_.input).ok());
+  EXPECT_FALSE(job_.input.seeks_masks);
+  EXPECT_EQ(SeekMasks(Background::kViews, &job_.input).message(),
+            "--background views takes cameras and at least 6 images; there are 12 images without "
+            "cameras");
+  job_.input.posed = true;
+  job_.input.images.alpha[5] = 0;
+  EXPECT_TRUE(SeekMasks(Background::kAuto, &job_.input).ok());
+  EXPECT_FALSE(job_.input.seeks_masks);
+}
+
+}  // namespace tilegrad::train::masks_test
