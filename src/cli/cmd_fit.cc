@@ -16,6 +16,7 @@
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"
+#include "cli/fit_pictures.h"
 #include "cli/live_option.h"
 #include "cli/run_folder.h"
 #include "fit/config.h"
@@ -165,20 +166,6 @@ void SetMaterialAndLighting(const std::string& material, const std::string& ligh
   config->lighting = lightings.at(lighting);
 }
 
-struct FitPictures {
-  std::string background = "auto", masks;
-  double fov = train::kUsualFov;
-  bool find_cameras = false;
-  std::optional<UpAxis> up;
-};
-
-train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
-  // OneOf has checked it.
-  return {hold_out,     *train::BackgroundNamed(pictures.background),
-          pictures.fov, pictures.up,
-          watch,        pictures.masks};
-}
-
 // Warnings of the input from the `first` on, a few of them.
 void PrintWarnings(const train::FitInput& input, std::size_t first) {
   constexpr std::size_t kShown = 3;
@@ -187,31 +174,6 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
     PrintNote("tilegrad: warning: {}\n", input.warnings[first + i]);
   }
   if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
-}
-
-void AddPictureOptions(Command* command, FitPictures* o) {
-  command->Add(
-      "--background", &o->background,
-      "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
-      "(plain), what all views have in common (views), the first if there are any (auto); none: "
-      "every pixel shows the object",
-      {OneOf{{"auto", "mask", "plain", "none", "views"}}});
-  command->Add(
-      "--masks", &o->masks,
-      "a folder of masks, NAME.png for each image, instead of the images' own: such as the "
-      "masks/ of an earlier fit, corrected by hand",
-      {Excludes{{"--background", "--model"}}});
-  command->Add(
-      "--find-cameras", &o->find_cameras,
-      "look for the cameras in the images, though the folder has some; these judge the result");
-  command->Add("--up",
-               Choice<std::optional<UpAxis>>(
-                   &o->up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
-               "the axis of the cameras' world that points up: everything is turned to have y up, "
-               "as glTF wants it [what the cameras make plain, else y]",
-               {Excludes{{"--model"}}});
-  command->Add("--fov", &o->fov, "degrees that images without cameras see along their longer side",
-               {Range{5, 150}});
 }
 
 using train::FitConfig;
@@ -280,6 +242,8 @@ Status CheckResume(const FitOptions& options) {
 }
 
 Result<train::FitInput> ReadInput(const FitOptions& options, const Watch& watch) {
+  if (options.dataset_model.empty())
+    TILEGRAD_TRY(TryColmap(options.pictures, options.input, watch));
   return options.dataset_model.empty()
              ? train::ReadFitFolder(options.input,
                                     InputOptionsOf(options.pictures, options.hold_out, watch))
