@@ -132,9 +132,8 @@ nn::Tensor TensorFromPython(const nn::Context& context, const std::string& name,
     return out;
   }
   throw py::type_error(fmt::format(
-      "save_weights: {} has dtype {}; safetensors files of ours hold float32, float64, uint8, "
-      "int32 and int64",
-      name, io::NpyTypeName(npy.type)));
+      "save_weights: {} has dtype {}; supported are float32, float64, uint8, int32 and int64", name,
+      io::NpyTypeName(npy.type)));
 }
 
 py::dict TensorDict(const std::vector<nn::NamedTensor>& tensors) {
@@ -201,7 +200,7 @@ void BindArrayFiles(py::module_& m) {
   m.def("load_image", &LoadImage, py::arg("path"), py::arg("max_bytes") = 0, "(H, W, C) uint8.");
   m.def("save_png", &SavePng, py::arg("path"), py::arg("pixels"), "Writes (H, W, C) uint8.");
   m.def("load_exr", &LoadExr, py::arg("path"), py::arg("max_bytes") = 0,
-        "Names of channels, (C, H, W) float32, and what of the file is left out.");
+        "Names of channels, (C, H, W) float32, and warnings about skipped data.");
   m.def("save_exr", &SaveExr, py::arg("path"), py::arg("names"), py::arg("planes"),
         "Writes (C, H, W) float32 with names of channels.");
   m.def("load_npy", &LoadNpy, py::arg("path"), py::arg("max_bytes") = 0,

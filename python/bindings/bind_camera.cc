@@ -72,7 +72,7 @@ py::array LookAt(double fov_y, Size size, const py::object& eyes, const py::obje
       up(function, "up", ups);
   return MakeAll(function, eye.count(), [&](std::size_t i) -> Result<Camera64> {
     if (eye[i] == target[i]) {
-      return InvalidArgument("eye and target are the same point: there is no direction to look in");
+      return InvalidArgument("eye and target coincide: the viewing direction is undefined");
     }
     return LookAtCamera(lens, eye[i].data(), target[i].data(), up[i].data());
   });
@@ -204,15 +204,17 @@ py::array To(const std::string& name, const py::object& cameras, Size size, bool
 
 void BindCamera(py::module_& m) {
   m.def("camera_look_at", &LookAt, py::arg("fov_y"), py::arg("size"), py::arg("eye"),
-        py::arg("target"), py::arg("up"), "(n, 17) that look at targets.");
+        py::arg("target"), py::arg("up"), "Cameras (n, 17) from eyes and targets.");
   m.def("camera_orbit", &Orbit, py::arg("fov_y"), py::arg("size"), py::arg("orbits"),
-        "(n, 17) of azimuth, elevation, distance.");
+        "Cameras (n, 17) from azimuth, elevation, distance.");
   m.def("camera_from", &From, py::arg("convention"), py::arg("rows"), py::arg("size") = Size(0, 0),
-        py::arg("half") = false, "(n, 17) of the arguments of Camera.from_..., side by side.");
+        py::arg("half") = false,
+        "Cameras (n, 17) from the concatenated arguments of Camera.from_...");
   m.def("camera_to", &To, py::arg("convention"), py::arg("cameras"), py::arg("size") = Size(0, 0),
-        py::arg("half") = false, py::arg("far_plane") = 0.0, "The reverse.");
+        py::arg("half") = false, py::arg("far_plane") = 0.0,
+        "The arguments of Camera.from_..., concatenated, from cameras (n, 17).");
   m.def("camera_resize", &Resize, py::arg("cameras"), py::arg("from_size"), py::arg("to_size"),
-        "(n, 17) of images of another size.");
+        "Cameras (n, 17) for images of another size.");
 }
 
 }  // namespace tilegrad::python

@@ -109,15 +109,15 @@ void BindDataset(py::module_& m) {
   py::class_<Dataset>(m, "DatasetFiles", "A dataset on disk.")
       .def(py::init([](const Path& folder) { return ValueOrThrow(Dataset::Open(folder)); }),
            py::arg("folder"))
-      .def_property_readonly("info", &InfoDict, "How it was made.")
-      .def_property_readonly("models", &ModelList, "What is known of each model.")
+      .def_property_readonly("info", &InfoDict, "Source, camera and image settings.")
+      .def_property_readonly("models", &ModelList, "Metadata of each model.")
       .def_property_readonly("cameras", &Cameras, "(views, 17) float64.")
       .def("load_images", &LoadImages, py::arg("model"), "(views, 4, H, W) uint8.")
       .def("load_all_images", &LoadAllImages, py::arg("models"), py::arg("threads"),
            "(models, views, 4, H, W) uint8.")
       .def("load_cameras", &LoadCameras, py::arg("model"), "Of its views, (views, 17) float64.")
       .def("load_truth", &LoadTruth, py::arg("model"), "Occupancy, points, mesh.");
-  py::class_<train::BatchOrder>(m, "BatchOrder", "What training sees at each step.")
+  py::class_<train::BatchOrder>(m, "BatchOrder", "Training batches, one per step.")
       .def(py::init<int, int, std::uint64_t>(), py::arg("models"), py::arg("views"),
            py::arg("seed"))
       .def("batch", &Batch, py::arg("step"), py::arg("size"), py::arg("views"),

@@ -98,8 +98,8 @@ void BindPredictor(py::module_& m) {
       .def(py::init(&Model::Load), py::arg("path"), py::arg("threads"),
            "path: of a run folder or a checkpoint.")
       .def_property_readonly("image_size", &Model::image_size, "Pixels a side.")
-      .def_property_readonly("description", &Model::description, "For people.")
-      .def("template_mesh", &Model::TemplateMesh, "The sphere.")
+      .def_property_readonly("description", &Model::description, "A one-line description.")
+      .def("template_mesh", &Model::TemplateMesh, "The template sphere.")
       .def("predict", &Model::Predict, py::arg("images"),
            "Meshes of images (N, 4, size, size) uint8.")
       .def("predict_refined", &Model::PredictRefined, py::arg("image"), py::arg("picture"),

@@ -100,7 +100,7 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
   const auto number = [](auto member) {
     return [member](const Frame& f) { return f.images().*member; };
   };
-  py::class_<Frame>(m, ("Frame" + suffix).c_str(), "The record of a render.")
+  py::class_<Frame>(m, ("Frame" + suffix).c_str(), "A rendered frame.")
       .def_property_readonly("count", number(&ImagesT<T>::count), "N, images.")
       .def_property_readonly("height", number(&ImagesT<T>::height), "Pixels.")
       .def_property_readonly("width", number(&ImagesT<T>::width), "Pixels.")
@@ -117,7 +117,7 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
             return r.Render(std::move(scenes), options, OutputsOf(outputs));
           },
           py::arg("scenes"), py::arg("options"), py::arg("outputs"),
-          "The frame of a list of scenes; outputs: whether each of IMAGES is wanted.")
+          "The frame of a list of scenes; outputs: a flag for each of IMAGES.")
       .def(
           "backward",
           [](RendererObject& r, const Frame& frame, const py::dict& cotangents,
@@ -130,10 +130,10 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
 }
 
 void BindSceneArrays(py::module_& m) {
-  py::class_<SceneArrays>(m, "SceneArrays", "What a scene is made of; None: not there.")
+  py::class_<SceneArrays>(m, "SceneArrays", "The arrays of a scene; None if absent.")
       .def(py::init<>())
       .def_readwrite("fields", &SceneArrays::fields, "Arrays, by name.")
-      .def_readwrite("per_corner", &SceneArrays::per_corner, "Names of those of corners.")
+      .def_readwrite("per_corner", &SceneArrays::per_corner, "Names of the per-corner arrays.")
       .def_readwrite("textures", &SceneArrays::textures, "Each ([N,] Ht, Wt, 3)")
       .def_readwrite("wraps", &SceneArrays::wraps, "Of textures: indices into WRAPS.")
       .def_readwrite("filters", &SceneArrays::filters, "Of textures: indices into FILTERS.")

@@ -201,7 +201,7 @@ py::dict Train(const py::dict& request, const py::object& listener) {
 
 void BindRuns(py::module_& m) {
   m.def("fit", &Fit, py::arg("views"), py::arg("request"), py::arg("listener"),
-        "listener(stage, done, total) is called at each step; True stops.");
+        "listener(stage, done, total) is called at each step; returning True stops.");
   m.def("train", &Train, py::arg("request"), py::arg("listener"), "As fit.");
   m.def(
       "config_names",
@@ -210,7 +210,7 @@ void BindRuns(py::module_& m) {
         for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
         return names;
       },
-      "The configurations that train knows by name.");
+      "Names of the built-in configurations.");
 }
 
 }  // namespace tilegrad::python

@@ -22,7 +22,7 @@ Enum EnumOf(const char* function, const py::handle& value,
   const auto name = py::cast<std::string>(value);
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw py::value_error(fmt::format("{}: '{}' is none of '{}'", function, name,
+    throw py::value_error(fmt::format("{}: '{}' is not one of '{}'", function, name,
                                       fmt::join(names.begin(), names.end(), "', '")));
   }
   return static_cast<Enum>(found - names.begin());

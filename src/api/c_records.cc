@@ -89,7 +89,7 @@ const float* DataOf(std::span<const float> image) { return image.empty() ? nullp
 Status CheckStructSize(const char* name, std::size_t size) {
   constexpr std::size_t kMost = 65536;
   if (size >= sizeof(std::size_t) && size <= kMost) return {};
-  return InvalidArgument("{}.struct_size is {}: tilegrad_..._init comes first", name, size);
+  return InvalidArgument("{}.struct_size is {}: call tilegrad_..._init first", name, size);
 }
 
 Status CheckCount(const char* name, std::size_t count) {
@@ -131,7 +131,7 @@ Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
   check("textures", wanted.textures, ItemsOf(scene.textures));
   check("lights", wanted.lights, ItemsOf(scene.lights));
   if (missing == nullptr) return {};
-  return InvalidArgument("d_scene.{} is wanted, but the scene has none", missing);
+  return InvalidArgument("d_scene.{} is requested, but the scene has none", missing);
 }
 
 void CScene::Set(const tilegrad_scene& from) {

@@ -219,7 +219,7 @@ const char* TakeThreadNotice() {
   Refusal fresh = Refusal::kFresh;
   return refusal.load(std::memory_order_relaxed) == fresh &&
                  refusal.compare_exchange_strong(fresh, Refusal::kTold)
-             ? "the system refuses as many threads as were asked for; fewer do the work"
+             ? "the system allows fewer threads than requested; continuing with fewer"
              : nullptr;
 }
 

@@ -40,8 +40,8 @@ ShortageWatch::ShortageWatch() : before_(g_count) {}
 Status ShortageWatch::Check(const std::string& place) const {
   if (g_count == before_) return {};
   const int error = g_last;
-  return IoError("{}: not read, as the system refused more: {}; {}", place, std::strerror(error),
-                 Remedy(error));
+  return IoError("{}: not read, the system ran out of a resource: {}; {}", place,
+                 std::strerror(error), Remedy(error));
 }
 
 }  // namespace tilegrad

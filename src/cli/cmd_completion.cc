@@ -193,7 +193,7 @@ void AddCompletion(CommandList* list) {
   auto shell = std::make_shared<std::string>();
   Command& command = list->emplace_back(Command{
       "completion",
-      "Print the completion script of a shell, e.g. for: source <(tilegrad completion bash)"});
+      "Print a shell's completion script; load it with: source <(tilegrad completion bash)"});
   command.Add("shell", shell.get(), "bash, zsh or fish",
               {Required{}, OneOf{{"bash", "zsh", "fish"}}});
   command.action = [list, shell]() -> Status {

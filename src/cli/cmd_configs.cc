@@ -35,8 +35,8 @@ Status RunConfigs(const std::string& name) {
 
 void AddConfigs(CommandList* list) {
   const auto [command, name] = AddCommand(
-      list, "configs", "List the configurations that train --config knows by name", RunConfigs);
-  command->Add("name", name, "print this one instead, e.g. to a file to change");
+      list, "configs", "List the built-in configurations for train --config", RunConfigs);
+  command->Add("name", name, "print this one instead, for example into a file to edit");
 }
 
 }  // namespace tilegrad::cli

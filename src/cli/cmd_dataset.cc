@@ -239,7 +239,7 @@ Status Make(const DatasetOptions& options) {
             ignored == 1 ? "1 file or folder ignored"
                          : fmt::format("{} files or folders ignored", ignored),
             &train::IgnoredFile::reason);
-  Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
+  Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} reused), {:.1f} s\n",
         Count(summary.models.size(), "model"),
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
         summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
@@ -247,7 +247,7 @@ Status Make(const DatasetOptions& options) {
   if (const auto advice = train::AdviceOnFewModels(summary.models, /*streamed=*/false))
     PrintNote("tilegrad: warning: {}\n", *advice);
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);
-  Print("look at {}\n", (folder / "contact_sheet.png").string());
+  Print("preview: {}\n", (folder / "contact_sheet.png").string());
   PrintJson(summary, folder);
   return {};
 }
@@ -276,30 +276,29 @@ void AddSourceOptions(Command* command, DatasetOptions* options) {
 }
 
 void AddBuildOptions(Command* command, train::BuildOptions* build) {
-  command->Add("--size", &build->image_size, "pixels a side");
-  command->Add("--views", &build->views, "views of a model");
+  command->Add("--size", &build->image_size, "width and height of the images, pixels");
+  command->Add("--views", &build->views, "views per model");
   command->Add("--per-class", &build->per_class,
-               "at most this many shapes of a class; 0: all, or 100 if procedural");
+               "limit on shapes per class; 0: none, or 100 if procedural");
   command->Add("--liveries", &build->liveries,
-               "at most this many textures of one shape; 0: all [1 of thirteen, else 0]",
-               {NoDefault{}});
-  command->Add("--limit", &build->limit, "at most this many models in all; 0: all");
+               "limit on textures per shape; 0: none [1 for thirteen, else 0]", {NoDefault{}});
+  command->Add("--limit", &build->limit, "limit on models in total; 0: none");
   command->Add("--seed", &build->split.seed,
-               "seed of the choice of models, the split and procedural shapes", {NotNegative()});
+               "seed for model selection, split and procedural shapes", {NotNegative()});
   command->Add("--test-share", &build->split.test_share,
-               "share of each class's shapes to test with");
+               "fraction of each class's shapes in the test split");
   command->Add("--validation-share", &build->split.validation_share,
-               "share of each class's shapes to validate with");
+               "fraction of each class's shapes in the validation split");
 }
 
 }  // namespace
 
 void AddDataset(CommandList* list) {
   auto options = std::make_shared<DatasetOptions>();
-  Command& command = list->emplace_back(
-      Command{"dataset",
-              "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
-              "After Ctrl-C the same command goes on where it stopped."});
+  Command& command =
+      list->emplace_back(Command{"dataset",
+                                 "Render 3D models into a dataset: RGBA views, occupancy, surface "
+                                 "points.\nAfter Ctrl-C, the same command resumes."});
   AddSourceOptions(&command, options.get());
   AddBuildOptions(&command, &options->build);
   AddUpOption(&command, &options->build.up);

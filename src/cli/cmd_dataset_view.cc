@@ -114,7 +114,7 @@ void AddDatasetView(CommandList* list) {
                {Excludes{{"--model"}}});
   command->Add("--split", &options->split, "train, validation or test",
                {Excludes{{"--model"}}, OneOf{{"train", "validation", "test"}}});
-  command->Add("--view", &options->view, "which view", {NotNegative()});
+  command->Add("--view", &options->view, "index of the view", {NotNegative()});
   command->Add("--out", &options->out, "PNG file", {EndsIn(".png")});
   command->Add("--voxels", &options->voxels, "also write the model's 32^3 voxels there",
                {EndsIn(".binvox")});

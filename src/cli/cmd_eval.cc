@@ -152,18 +152,17 @@ void AddEval(CommandList* list) {
       list, "eval", "3D IoU and F-score of a run on held-out models, beside three baselines",
       RunEvaluation);
   AddRunOptions(command, &options->on);
-  command->Add("--views-per-model", &options->views_per_model,
-               "images of each model that are predicted from", {Range{1, 1000}});
+  command->Add("--views-per-model", &options->views_per_model, "input images per model",
+               {Range{1, 1000}});
   command->Add("--split", &options->split,
-               "which models are scored; the scores of others than test are printed only",
+               "split to score; scores of train and validation are printed, not saved",
                {OneOf{{"test", "train", "validation"}}});
   command->Add("--refine", &options->refine,
-               "steps of refinement of each prediction on its image, as of predict; the scores are "
-               "printed only",
+               "refinement steps per prediction, as in predict; scores are printed, not saved",
                {Range{0, 100000}});
   command->Add("--oracle", &options->oracle,
-               "steps of fitting the template to all views of each model, for a row that says how "
-               "good predictions can be at best; 300 take a second a model or two",
+               "add an upper-bound row: the template fitted to all views of each model in this "
+               "many steps; 300 take one to two seconds per model",
                {Range{0, 100000}});
   command->Add("--voxels", &options->voxels,
                "by whose rule the voxels of the 3D IoU are made: ours, binvox's (-cb -dc -aw, the "

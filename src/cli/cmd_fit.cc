@@ -51,15 +51,15 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 void PrintOutcome(const train::FitOutcome& o, const Path& out, std::int64_t steps) {
   const bool early = o.last_step < steps;
   Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
-        FormatDuration(o.seconds), early ? ", for more gained nothing (--stop-gain)" : "");
+        FormatDuration(o.seconds), early ? ", stopped early (--stop-gain)" : "");
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
   if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
   if (o.camera_error_before && o.camera_error_after) {
-    Print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n", *o.camera_error_before,
+    Print("camera error {:.2f} degrees at the start, {:.2f} at the end\n", *o.camera_error_before,
           *o.camera_error_after);
   }
-  Print("mesh {}\nlook at {}, or at it forming: tilegrad live {}\n", (out / "mesh.glb").string(),
+  Print("mesh {}\nreport {}, live view: tilegrad live {}\n", (out / "mesh.glb").string(),
         (out / "report.html").string(), out.string());
 }
 
@@ -196,8 +196,8 @@ Result<Mesh> LoadFitMesh(const std::string& path, UpAxis up, OutputGuard* guard)
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   if (const glm::dvec3& o = loaded.origin; o != glm::dvec3(0)) {
     return InvalidArgument(
-        "{}: too far from the origin to be fitted; move mesh and cameras by ({}, {}, {})", path,
-        -o.x, -o.y, -o.z);
+        "{}: too far from the origin to fit; move mesh and cameras by ({}, {}, {})", path, -o.x,
+        -o.y, -o.z);
   }
   // glTF has y up, whatever the cameras have; others are in the cameras' world.
   const std::string ending = LowerCase(Path(path).extension().string());
@@ -384,30 +384,31 @@ Status StartOrGoOn(FitOptions* options, Command* command, CommandList* list) {
 void AddWhat(Command* command, FitOptions* o) {
   command->Add(
       "input", &o->input,
-      "folder with transforms.json (as NeRF's) and images with alpha or masks; or a COLMAP "
-      "project; or pictures alone, whose cameras are then found; or a dataset, with --model");
+      "folder with NeRF's transforms.json and images with alpha or masks; a COLMAP project; images "
+      "alone, whose cameras are then estimated; or a dataset, with --model");
   command->Add("--model", &o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->Add("--out", &o->out, "folder for mesh.glb, report.html, ...");
   AddForceOption(command, &o->force);
   command->Add("--start,--mesh", &o->start,
-               "hull: what all masks have in common; sphere; or a mesh file; auto: the hull where "
-               "masks and cameras allow. --mesh is the old name");
+               "initial shape: hull (visual hull of the masks), sphere, a mesh file, or auto (the "
+               "hull if masks and cameras allow). --mesh is the old name");
   command->Add("--optimize", &o->optimize,
-               "any of positions, colors, texture, uv, camera, light, sh, material, exposure, "
-               "focal; separated by commas [positions and texture, or the colors that --mesh has]");
+               "what to fit: any of positions, colors, texture, uv, camera, light, sh, material, "
+               "exposure, focal, separated by commas [positions and texture, or the colors that "
+               "the initial mesh has]");
   command->Add("--material", &o->material,
-               "unlit: colors hold the light of the images; lambert, phong: light is learned "
-               "beside them, and where it comes from",
+               "unlit: lighting stays baked into the colors; lambert, phong: a light and its "
+               "direction are fitted with the colors",
                {OneOf{{"unlit", "lambert", "phong"}}});
   command->Add("--lighting", &o->lighting, "none, lambert, phong or sh",
                {OneOf{{"none", "lambert", "phong", "sh"}}});
-  command->Add("--light-direction", &o->light_direction, "x y z towards the light, world",
-               {Numbers{3}});
+  command->Add("--light-direction", &o->light_direction,
+               "direction towards the light, world axes: x y z", {Numbers{3}});
   command->Add("--filter", &o->filter, "texture lookup: bilinear or trilinear",
                {OneOf{{"bilinear", "trilinear"}}});
-  command->Add("--truth", &o->truth, "a mesh to compare with (3D IoU)");
+  command->Add("--truth", &o->truth, "ground-truth mesh to score against (3D IoU)");
   command->Add("--hold-out", &o->hold_out,
-               "hold out every N-th image to judge by; 0: those of transforms_test.json",
+               "hold out every N-th image for evaluation; 0: those of transforms_test.json",
                {NotNegative()});
 }
 
@@ -447,8 +448,9 @@ void AddFit(CommandList* list) {
                "resume the fit in --out with the settings saved there; extend a finished one by a "
                "larger --steps",
                {Excludes{{"--force"}}});
-  command->Add("--doctor", &options->doctor,
-               "only say what gets a gradient at the start, and why not");
+  command->Add(
+      "--doctor", &options->doctor,
+      "fit nothing; report which parameters get a gradient at the start, and why others do not");
   AddLiveOption(command, &options->live);
   AddWorkersOption(command, &options->workers);
 }

@@ -127,8 +127,8 @@ Status RunInfo(const InfoOptions& options) {
 void AddInfo(CommandList* list) {
   const auto [command, options] =
       AddCommand(list, "info",
-                 "Show version, SIMD targets and cores; or what mesh files hold: vertices, faces, "
-                 "materials, textures, extent, whether they are watertight",
+                 "Show version, SIMD targets and cores; or, of mesh files, vertices, faces, "
+                 "materials, textures, extent and watertightness",
                  RunInfo);
   command->Add("meshes", &options->meshes, "files: " + io::MeshFileEndings());
 }

@@ -57,10 +57,9 @@ Status RunLive(const LiveOptions& options) {
 
 void AddLive(CommandList* list) {
   const auto [command, options] = AddCommand(
-      list, "live", "Show a run or a fit in the browser: as it goes on, or after it has ended",
-      RunLive);
-  command->Add("run", &options->run, "folder of a training or a fit", {Required{}});
-  command->Add("--data", &options->data, "dataset folder [the one it was trained on]");
+      list, "live", "Live view of a running, finished or interrupted run in the browser", RunLive);
+  command->Add("run", &options->run, "folder of a training run or a fit", {Required{}});
+  command->Add("--data", &options->data, "dataset folder [the training dataset]");
 }
 
 }  // namespace tilegrad::cli

@@ -67,10 +67,10 @@ std::string ProgramPage(const std::vector<CommandNode>& tree) {
     commands +=
         fmt::format(".TP\n{}(1)\n{}\n", Bold("tilegrad-" + command.name), Roff(command.help));
   constexpr const char* kEnvironment =
-      ".SH ENVIRONMENT\n.TP\n.B TILEGRAD_THREADS\nhow many threads work where \\-\\-threads is "
-      "not given\n.TP\n.B TILEGRAD_TARGET\nthe SIMD target to use instead of the best one; "
-      "tilegrad info lists them\n.TP\n.B TILEGRAD_READ_LIMIT\nwhat one file may become in "
-      "memory, as \\-\\-read\\-limit\n";
+      ".SH ENVIRONMENT\n.TP\n.B TILEGRAD_THREADS\nnumber of threads if \\-\\-threads is not "
+      "given\n.TP\n.B TILEGRAD_TARGET\nthe SIMD target to use instead of the best one; tilegrad "
+      "info lists them\n.TP\n.B TILEGRAD_READ_LIMIT\nmemory limit per file, as "
+      "\\-\\-read\\-limit\n";
   return Page("tilegrad", "a differentiable rasterizer for CPUs, and the training system around it",
               ".B tilegrad\n\\fIcommand\\fR [\\fIoptions\\fR]",
               commands + OptionsOf(tree[0]) + kEnvironment);
@@ -125,8 +125,8 @@ void AddMan(CommandList* list) {
   };
   auto options = std::make_shared<ManOptions>();
   Command& command = list->emplace_back(
-      Command{"man", "Print a manual page, e.g. for: tilegrad man fit | man -l -"});
-  command.Add("command", &options->command, "the command that it is about [the program]");
+      Command{"man", "Print a manual page; read it with: tilegrad man fit | man -l -"});
+  command.Add("command", &options->command, "command to document [the program itself]");
   command.Add("--out", &options->out, "write all pages into this folder instead");
   command.action = [list, options] {
     const ManOptions given = std::exchange(*options, {});  // else the page took them for defaults

@@ -96,8 +96,8 @@ Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& fi
   const auto predicted = train::DirectionOf(job.object.light, train::LightingOf(job.light));
   std::vector<ImageU8> frames;
   for (int k = 0; k < kLightFrames; ++k) {
-    TILEGRAD_TRY(
-        job.watch.At({"moving the light", static_cast<std::uint64_t>(k), kLightFrames, ""}));
+    TILEGRAD_TRY(job.watch.At(
+        {"rendering the moving light", static_cast<std::uint64_t>(k), kLightFrames, ""}));
     view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kLightFrames);
     TILEGRAD_ASSIGN(const auto rgba, pictures.Draw(mesh, view, train::Appearance::kLit));
     frames.push_back(train::OnPaper(rgba, size));
@@ -208,7 +208,7 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(file));
   if (options.mask.empty() && !train::IsOpaque(image)) return image;
   if (options.mask.empty()) {
-    TILEGRAD_TRY(watch.At({"looking for a plain background", 0, 0, ""}));
+    TILEGRAD_TRY(watch.At({"segmenting the plain background", 0, 0, ""}));
     auto cutout = train::WithoutPlainBackground(image);
     return cutout.ok() ? std::move(cutout) : cutout.status().Within(file);
   }
@@ -248,11 +248,11 @@ Status Refine(const Prediction& p, const std::string& image, const ImageU8& cuto
   TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, p.workers));
   TILEGRAD_TRY(WriteMatch(refined, RecordOf(file)));
   const train::PictureMatch &before = refined.before, &after = refined.after;
-  Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
+  Print("{}: silhouette {:.0f} -> {:.0f} %, colour error {:.3f} -> {:.3f}\n", file.string(),
         100 * before.silhouette_iou, 100 * after.silhouette_iou, before.color_l1, after.color_l1);
   if (refined.rival < train::kDoubtfulRival) {
     PrintNote(
-        "tilegrad: warning: {}: the camera is doubtful, another side fits almost as well; look at "
+        "tilegrad: warning: {}: the camera is ambiguous, another side fits almost as well; check "
         "{}\n",
         image, file.string());
   }
@@ -363,7 +363,7 @@ Status RunPrediction(const PredictOptions& options) {
   const Workers workers(options.workers);
   ProgressLine line;
   const Watch watch = line.Watching();
-  TILEGRAD_TRY(watch.At({"reading the network", 0, 0, ""}));
+  TILEGRAD_TRY(watch.At({"loading the network", 0, 0, ""}));
   TILEGRAD_ASSIGN(const TrainedNetwork network, LoadNetwork(run, workers));
   TILEGRAD_TRY(CheckRelight(options.relight, network.predictor));
   OutputGuard guard(options.force);
@@ -391,7 +391,7 @@ void AddPredict(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "predict", "Predict a coloured 3D mesh from one image of an object", RunPrediction);
   command->Add("images", &options->images,
-               "pictures of an object: cut out (RGBA), before a plain background, or with --mask",
+               "images of an object: cut out (RGBA), on a plain background, or with --mask",
                {Required{}});
   command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
   command->Add("--out", &options->out,
@@ -399,16 +399,16 @@ void AddPredict(CommandList* list) {
                "animation), named after the image; NAME_2 for a second image of that name");
   AddForceOption(command, &options->force);
   command->Add("--mask", &options->mask,
-               "image of the same size: the object is white or, in one with transparency, opaque");
+               "mask of the same size: the object is white or, if the mask has alpha, opaque");
   command->Add("--keep-framing", &options->keep_framing,
-               "only resize: the image is framed like a training image already");
+               "only resize: the image is already framed like the training images");
   command->Add("--refine", &options->refine,
-               "steps of gradient descent that move the prediction onto the image, and write "
-               "NAME_match.png (image, prediction, refined) and NAME_match.json (how well they "
-               "agree); 0: the network alone",
+               "gradient-descent steps that refine the prediction on the image; writes "
+               "NAME_match.png (image, prediction, refined) and NAME_match.json (agreement before "
+               "and after); 0: network output only",
                {Range{0, 100000}});
   command->Add("--relight", &options->relight,
-               "also NAME_relit.webp: the object under a light that moves around; of a run that "
+               "also write NAME_relit.webp: the object under a moving light; needs a run that "
                "predicts light");
   AddWorkersOption(command, &options->workers);
 }

@@ -50,33 +50,30 @@ struct RenderSettings {
 };
 
 void AddViewOptions(Command* command, ViewSettings* view) {
-  command->Add(
-      "--size", &view->size,
-      "pixels of the pictures, as 512 or 640x480 [what the cameras say; 512 without --cameras]");
+  command->Add("--size", &view->size,
+               "image size in pixels, as 512 or 640x480 [from the cameras; 512 without --cameras]");
   command->Add("--cameras", &view->camera_file,
-               "a picture for each camera of: a COLMAP model or project (folder), a NeRF "
+               "render one image per camera of a COLMAP model or project (folder), a NeRF "
                "transforms.json, or OpenCV's K and poses (.json; docs/rendering.md)");
   command->Add("--opencv-centre", &view->opencv_centre,
-               "where OpenCV's K has the centre of the first pixel: at (0,0), as OpenCV does, or "
-               "at (0.5,0.5)",
+               "centre of the first pixel in OpenCV's K: (0,0), as OpenCV calibrates, or (0.5,0.5)",
                {OneOf{{"integer", "half"}}});
   command->Add("--gltf-camera", &view->gltf_camera,
                "cameras of the glTF file: a name, a number from 0, or all",
                {Excludes{{"--cameras"}}});
-  command->Add("--eye", &view->eye, "stand at X Y Z",
+  command->Add("--eye", &view->eye, "camera position X Y Z",
                {Numbers{3}, Excludes{{"--cameras", "--gltf-camera"}}});
-  command->Add("--target", &view->target, "with --eye: look at X Y Z",
+  command->Add("--target", &view->target, "with --eye: look-at point X Y Z",
                {Numbers{3}, Needs{"--eye"}});
-  command->Add("--up", &view->up,
-               "the axis of the mesh that points up: y, z or x; with --eye also X Y Z");
-  command->Add("--turntable", &view->turntable, "this many views around the mesh, numbered",
+  command->Add("--up", &view->up, "up axis of the mesh: y, z or x; with --eye also X Y Z");
+  command->Add("--turntable", &view->turntable, "number of views around the mesh",
                {NoDefault{}, Range{1, 100000}, Excludes{{"--cameras", "--gltf-camera", "--eye"}}});
-  command->Add("--fov", &view->fov, "whole vertical field of view, degrees");
-  command->Add("--azimuth", &view->azimuth, "degrees; 90 sees the side towards +z");
-  command->Add("--elevation", &view->elevation, "degrees above");
+  command->Add("--fov", &view->fov, "full vertical field of view, degrees");
+  command->Add("--azimuth", &view->azimuth, "camera azimuth, degrees; 90 looks at the +z side");
+  command->Add("--elevation", &view->elevation, "camera elevation, degrees");
   command->Add("--distance", &view->distance,
-               "from the middle of the mesh, world units; 0: so that it fills the picture");
-  command->Add("--margin", &view->margin, "share of the picture that stays free on each side");
+               "distance from the centre of the mesh, world units; 0: the mesh fills the image");
+  command->Add("--margin", &view->margin, "margin on each side, as a fraction of the image");
 }
 
 void AddShadingOptions(Command* command, RenderSettings* s) {
@@ -91,16 +88,16 @@ void AddShadingOptions(Command* command, RenderSettings* s) {
                "camera, above on the left]");
   command->Add("--light-at-camera", &s->camera_light,
                "directions of --light are in the camera's axes: x right, y up, z to the eye");
-  command->Add("--ambient", &s->ambient, "light from everywhere");
-  command->Add("--specular", &s->specular, "k_s of phong");
-  command->Add("--shininess", &s->scene.shininess, "alpha of phong");
+  command->Add("--ambient", &s->ambient, "ambient light");
+  command->Add("--specular", &s->specular, "specular coefficient k_s of phong");
+  command->Add("--shininess", &s->scene.shininess, "shininess exponent alpha of phong");
   command->Add("--sh", &s->sh, "nine coefficients of spherical harmonics [a bright sky]",
                {Numbers{9}});
   command->Add("--normals",
                Choice(&s->scene.normals, {{"auto", NormalSource::kAuto},
                                           {"smooth", NormalSource::kSmooth},
                                           {"flat", NormalSource::kFlat}}),
-               "auto (default): the file's own, flat where it has none");
+               "auto (default): the file's normals, flat if it has none");
   command->Add("--filter",
                Choice(&s->scene.filter, {{"nearest", Filter::kNearest},
                                          {"bilinear", Filter::kBilinear},
@@ -109,18 +106,19 @@ void AddShadingOptions(Command* command, RenderSettings* s) {
   command->Add(
       "--color-space",
       Choice(&s->scene.color_space, {{"linear", ColorSpace::kLinear}, {"srgb", ColorSpace::kSrgb}}),
-      "light is added in linear colours (default), as viewers do, or in the numbers of the files "
-      "(srgb), as training does");
+      "colour space of the lighting: linear (default), as in viewers, or srgb, the values in the "
+      "files, as in training");
   command->Add("--cull", &s->cull, "back faces: auto follows the file's materials",
                {OneOf{{"auto", "back", "none"}}});
 }
 
 void AddFileOptions(Command* command, RenderSettings* s) {
   command->Add("--out", &s->file.out,
-               "a file (.png, .exr, .npy) for one picture, else a folder for NAME.png "
+               "output file (.png, .exr, .npy) for one image, else a folder for NAME.png "
                "[NAME_render.png, here]");
   AddForceOption(command, &s->file.force);
-  command->Add("--format", &s->file.format, "in a folder: png (default), exr or npy",
+  command->Add("--format", &s->file.format,
+               "file format in an output folder: png (default), exr or npy",
                {OneOf{{"png", "exr", "npy"}}});
   command->Add("--outputs", &s->file.outputs,
                "any of color, alpha, depth, normals, uv, faces; separated by commas",
@@ -130,11 +128,11 @@ void AddFileOptions(Command* command, RenderSettings* s) {
   command->Add("--supersample", &s->supersampling,
                "samples along each side of a pixel, for colour and alpha", {Range{1, 16}});
   command->Add("--soft-delta", &s->soft_delta,
-               "alpha is the soft silhouette of equation 6 with this delta, above 0",
+               "make alpha the soft silhouette of equation 6 with this delta, above 0",
                {NoDefault{}, AboveZero()});
   command->Add("--write-cameras", &s->write_cameras,
-               "write the cameras too: FILE.json as NeRF's transforms, else a COLMAP folder");
-  command->Add("--explain", &s->explain, "print what was computed, how much, and the time");
+               "also write the cameras: FILE.json as NeRF's transforms, else a COLMAP folder");
+  command->Add("--explain", &s->explain, "print the stages that ran, with counts and times");
 }
 
 // Declares them on `command`, which writes to `settings` when it is parsed.
@@ -147,7 +145,7 @@ void AddRenderOptions(Command* command, RenderSettings* settings) {
   AddWorkersOption(command, &settings->workers);
 }
 
-// After parsing. An option that would change nothing is a mistake: what it is for is not asked for.
+// After parsing. An option without effect is a mistake on the command line.
 Status CheckRenderOptions(const Command& command, const RenderSettings& s) {
   const bool phong = s.lighting == Lighting::kPhong, lit = UsesLights({.lighting = s.lighting});
   const bool from_file = !s.view.camera_file.empty() || !s.view.gltf_camera.empty();
@@ -155,26 +153,26 @@ Status CheckRenderOptions(const Command& command, const RenderSettings& s) {
   struct Effect {
     const char* option;
     bool there;
-    const char* what;
+    const char* why;
   };
   const Effect effects[] = {
-      {"--light", lit, "--shading lambert or phong"},
-      {"--light-at-camera", lit && !s.lights.empty(), "--light"},
-      {"--ambient", lit, "--shading lambert or phong"},
-      {"--specular", phong, "--shading phong"},
-      {"--shininess", phong, "--shading phong"},
-      {"--sh", s.lighting == Lighting::kSphericalHarmonics, "--shading sh"},
-      {"--opencv-centre", !s.view.camera_file.empty(), "--cameras"},
-      {"--up", !from_file, "cameras that are not of a file"},
-      {"--fov", !from_file, "cameras that are not of a file"},
-      {"--azimuth", framed, "a camera that is framed by itself"},
-      {"--elevation", framed, "a camera that is framed by itself"},
-      {"--distance", framed, "a camera that is framed by itself"},
-      {"--margin", framed, "a camera that is framed by itself"},
+      {"--light", lit, "without --shading lambert or phong"},
+      {"--light-at-camera", lit && !s.lights.empty(), "without --light"},
+      {"--ambient", lit, "without --shading lambert or phong"},
+      {"--specular", phong, "without --shading phong"},
+      {"--shininess", phong, "without --shading phong"},
+      {"--sh", s.lighting == Lighting::kSphericalHarmonics, "without --shading sh"},
+      {"--opencv-centre", !s.view.camera_file.empty(), "without --cameras"},
+      {"--up", !from_file, "with cameras from a file"},
+      {"--fov", !from_file, "with cameras from a file"},
+      {"--azimuth", framed, "without automatic framing"},
+      {"--elevation", framed, "without automatic framing"},
+      {"--distance", framed, "without automatic framing"},
+      {"--margin", framed, "without automatic framing"},
   };
-  for (const auto& [option, there, what] : effects) {
+  for (const auto& [option, there, why] : effects) {
     if (!command.Given(option) || there) continue;
-    return InvalidArgument("{} has no effect here; it is for {}", option, what);
+    return InvalidArgument("{} has no effect {}", option, why);
   }
   for (const auto& [x, y, z, intensity] : s.lights) {
     if (x == 0 && y == 0 && z == 0) {
@@ -227,8 +225,7 @@ std::vector<std::string> MaterialNotes(const Mesh& mesh, bool soft) {
   for (const Material& m : mesh.materials) {
     const bool opaque = m.alpha_mode == AlphaMode::kOpaque;
     if (opaque && m.base_color.a <= 0) {
-      notes.push_back(
-          fmt::format("material \"{}\": its alpha of 0 is drawn as if it were 1", m.name));
+      notes.push_back(fmt::format("material \"{}\": alpha 0 is drawn as 1", m.name));
     } else if (soft && (!opaque || m.base_color.a < 1)) {
       notes.push_back(fmt::format(
           "material \"{}\": --soft-delta draws it opaque, without holes or transparency", m.name));
@@ -298,7 +295,7 @@ Status RenderRun::ClaimFiles(const PictureName& name) {
   for (const Path& file : PictureFiles(settings_.file, name)) {
     if (!files_.insert(file).second) {
       return InvalidArgument(
-          "{}: two pictures have this name; render these meshes into folders of their own",
+          "{}: two images have this name; render these meshes into separate folders",
           file.string());
     }
     TILEGRAD_TRY(guard_.Check(file));
@@ -414,7 +411,7 @@ Status RunRender(const RenderSettings& settings) {
 
 void AddRender(CommandList* list) {
   auto settings = std::make_shared<RenderSettings>();
-  Command& command = list->emplace_back(Command{"render", "Render mesh files to pictures"});
+  Command& command = list->emplace_back(Command{"render", "Render mesh files to images"});
   AddRenderOptions(&command, settings.get());
   command.action = [&command, settings]() -> Status {
     TILEGRAD_TRY(CheckRenderOptions(command, *settings));

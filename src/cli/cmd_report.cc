@@ -45,10 +45,9 @@ Status RunReport(const ReportOptions& options) {
         Count(static_cast<std::size_t>(summary->models), "model"),
         static_cast<double>(summary->bytes) / 1e6);
   if (!summary->sheet_columns.empty())
-    Print("{}: the same models in one picture; columns: {}\n", job.sheet.string(),
+    Print("{}: the same models in one image; columns: {}\n", job.sheet.string(),
           summary->sheet_columns);
-  if (!summary->evaluated)
-    Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
+  if (!summary->evaluated) Print("no scores yet: run tilegrad eval, then tilegrad report again\n");
   PrintResult({{"page", job.out.string()},
                {"sheet", summary->sheet_columns.empty() ? "" : job.sheet.string()},
                {"models", summary->models},
@@ -61,13 +60,13 @@ Status RunReport(const ReportOptions& options) {
 
 void AddReport(CommandList* list) {
   const auto [command, options] = AddCommand(
-      list, "report",
-      "One page about a run: scores, curves, pictures, meshes to turn in the browser", RunReport);
+      list, "report", "Report of a run on one page: scores, curves, images, interactive meshes",
+      RunReport);
   AddRunOptions(command, &options->on);
-  command->Add("--models", &options->models, "held-out models to show", {Range{0, 200}});
+  command->Add("--models", &options->models, "number of held-out models to show", {Range{0, 200}});
   command->Add("--out", &options->out,
-               "the page [RUN/report.html]; the models in one picture go to RUN/summary.png, or "
-               "PAGE_summary.png beside it",
+               "output page [RUN/report.html]; the summary image becomes RUN/summary.png, or "
+               "PAGE_summary.png beside the page",
                {EndsIn(".html")});
   AddForceOption(command, &options->force);
 }

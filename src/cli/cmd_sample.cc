@@ -235,27 +235,26 @@ Status RunSampling(const SampleOptions& options) {
 
 void AddSample(CommandList* list) {
   const auto [command, options] = AddCommand(
-      list, "sample", "Make new textured 3D objects with a trained generator", RunSampling);
+      list, "sample", "Generate textured 3D objects with a trained generator", RunSampling);
   command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
   command->Add("--count", &options->count, "objects", {Range{1, 999}});
   command->Add("--out", &options->out,
                "folder for sample_001.glb and so on, sheet.png (each from the front and from "
                "behind) and turntable.webp");
   command->Add("--seed", &options->seed,
-               "of the latent codes: the same seed makes the same objects, to the bit");
-  command->Add(
-      "--interpolate", &options->interpolate,
-      "steps from each object to the next, for interpolation.png (a row for each pair) and "
-      "interpolation.webp; 0: none",
-      {Range{0, 64}});
+               "seed of the latent codes; the same seed gives the same objects, bit for bit");
+  command->Add("--interpolate", &options->interpolate,
+               "interpolation steps from each object to the next, for interpolation.png (a row for "
+               "each pair) and interpolation.webp; 0: none",
+               {Range{0, 64}});
   command->Add("--score", &options->score,
-               "compare as many objects more with true ones, as sets: scores.md, scores.json, and "
-               "nearest.png with the nearest training objects");
+               "compare a further set of generated objects with real ones: scores.md, scores.json, "
+               "and nearest.png with the nearest training objects");
   command->Add("--data", &options->data, "with --score: dataset [the run's own]");
   command->Add("--judge", &options->judge,
-               "with --score: run of configs/classify.toml whose features pictures are compared by "
-               "[cells of the pictures]");
-  command->Add("--score-count", &options->score_count, "with --score: objects of each set",
+               "with --score: run of configs/classify.toml whose features compare the images "
+               "[cells of the images]");
+  command->Add("--score-count", &options->score_count, "with --score: objects per set",
                {Range{16, 100000}});
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);

@@ -43,7 +43,8 @@ Result<std::vector<Check>> ChooseChecks(const std::string& only) {
   if (!chosen.empty()) return chosen;
   std::string titles = Titles(all);
   titles.pop_back();
-  return InvalidArgument("--only {}: no check has that in its title; there are:\n{}", only, titles);
+  return InvalidArgument("--only {}: no check has this in its title; the checks are:\n{}", only,
+                         titles);
 }
 
 Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& context) {
@@ -110,15 +111,13 @@ Status RunSelftest(const SelftestOptions& options) {
 }  // namespace
 
 void AddSelftest(CommandList* list) {
-  const auto [command, options] =
-      AddCommand(list, "selftest",
-                 "Check this program on this machine: images, gradients, networks, files, on every "
-                 "SIMD target, within seconds",
-                 RunSelftest);
-  command->Add("--only", &options->only,
-               "run checks whose title has this in it (upper and lower case are the same)");
+  const auto [command, options] = AddCommand(list, "selftest",
+                                             "Check images, gradients, networks and files on this "
+                                             "machine, on every SIMD target, in seconds",
+                                             RunSelftest);
+  command->Add("--only", &options->only, "run checks whose title contains this (case-insensitive)");
   AddWorkersOption(command, &options->workers);
-  command->Add("--list", &options->list, "print the titles of the checks, run none");
+  command->Add("--list", &options->list, "list the checks without running them");
 }
 
 }  // namespace tilegrad::cli

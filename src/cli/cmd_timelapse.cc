@@ -109,15 +109,14 @@ Status RunTimelapse(const TimelapseOptions& options) {
 }  // namespace
 
 void AddTimelapse(CommandList* list) {
-  const auto [command, options] =
-      AddCommand(list, "timelapse",
-                 "Animate a fit: its mesh turns while it forms, as an animated WebP", RunTimelapse);
+  const auto [command, options] = AddCommand(
+      list, "timelapse", "Animate a fit as a WebP: the mesh turns while it forms", RunTimelapse);
   command->Add("run", &options->run, "folder of a fit", {Required{}});
-  command->Add("--out", &options->out, "the animation [RUN/timelapse.webp]", {EndsIn(".webp")});
-  command->Add("--size", &options->size, "pixels a side", {Range{16, 2048}});
-  command->Add("--frames", &options->frames, "pictures in it", {Range{2, 2000}});
-  command->Add("--seconds", &options->seconds, "how long it takes", {AboveZero()});
-  command->Add("--turns", &options->turns, "about the object, in that time");
+  command->Add("--out", &options->out, "output file [RUN/timelapse.webp]", {EndsIn(".webp")});
+  command->Add("--size", &options->size, "width and height, pixels", {Range{16, 2048}});
+  command->Add("--frames", &options->frames, "number of frames", {Range{2, 2000}});
+  command->Add("--seconds", &options->seconds, "duration, seconds", {AboveZero()});
+  command->Add("--turns", &options->turns, "turns about the object over the animation");
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
 }

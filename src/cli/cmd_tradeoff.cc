@@ -102,14 +102,15 @@ Status RunTradeoff(const TradeoffOptions& options) {
 void AddTradeoff(CommandList* list) {
   const auto [command, options] =
       AddCommand(list, "tradeoff",
-                 "Measure what max_alpha_error costs and gains: time, error of alpha and of "
-                 "gradients against float64, and what a network learns with it",
+                 "Measure the trade-off of max_alpha_error: time, error of alpha and gradients "
+                 "against float64, and the effect on training",
                  RunTradeoff);
   command->Add("mesh", &options->mesh, "mesh file [two built-in scenes]");
-  command->Add("--out", &options->out,
-               "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs");
+  command->Add(
+      "--out", &options->out,
+      "folder for tradeoff.md, .csv and .svg, and with --training for training.csv and the runs");
   AddForceOption(command, &options->force);
-  command->Add("--size", &options->size, "pixels of a mesh file's image, each axis",
+  command->Add("--size", &options->size, "width and height of a mesh file's image, pixels",
                {Needs{"mesh"}, Range{1, 4096}});
   command->Add("--errors", &options->errors, "values of max_alpha_error, in [0, 1]",
                {SplitAtCommas{}, Range{0, 1}});
@@ -118,11 +119,11 @@ void AddTradeoff(CommandList* list) {
                {SplitAtCommas{}, AboveZero()});
   command->Add("--repetitions", &options->repetitions, "timings of each setting", {Range{1, 1000}});
   command->Add("--training", &options->data,
-               "dataset folder: also train and evaluate with --training-errors");
+               "dataset folder: also train and evaluate a network for each of --training-errors");
   command->Add("--training-errors", &options->training_errors, "for --training",
                {Needs{"--training"}, SplitAtCommas{}, Range{0, 1}});
   command->Add("--config", &options->config, "for --training", {Needs{"--training"}});
-  command->Add("--steps", &options->steps, "of each training",
+  command->Add("--steps", &options->steps, "steps of each training run",
                {Needs{"--training"}, Range{1, 10000000}});
   AddWorkersOption(command, &options->workers);
 }

@@ -99,8 +99,7 @@ train::PictureSink TellOfSheets(ProgressLine* line, std::int64_t every) {
   return [line, every, told = false](const Path& file) mutable {
     if (std::exchange(told, true)) return;
     line->Finish();
-    PrintRemark("sample sheet: {} (a new one beside it every {} steps or sooner)\n", file.string(),
-                every);
+    PrintRemark("sample sheet: {} (a new one at least every {} steps)\n", file.string(), every);
   };
 }
 
@@ -138,20 +137,21 @@ Status RunTraining(const TrainOptions& given) {
 
 void AddTrain(CommandList* list) {
   const auto [command, options] =
-      AddCommand(list, "train", "Train what a configuration names on a dataset", RunTraining);
-  command->Add("--config", &options->config,
-               "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file");
+      AddCommand(list, "train", "Train the network of a configuration on a dataset", RunTraining);
+  command->Add(
+      "--config", &options->config,
+      "name of a configuration (tilegrad configs lists them: quick, paper, ...) or a TOML file");
   command->Add("--data", &options->data, "dataset folder (see: tilegrad dataset)");
   command->Add("--out", &options->out, "run folder: checkpoints, curves, samples");
   command->Add("--set", &options->overrides,
                "override a key: --set schedule.steps=100 (repeatable)");
   AddForceOption(command, &options->force);
   command->Add("--resume", &options->resume,
-               "continue the run in this folder, with its configuration and dataset; without a "
-               "folder the one in --out (started if there is none)",
+               "resume the run in this folder with its configuration and dataset; without a "
+               "folder, the run in --out, started if there is none",
                {ValueMayLack{kRunInOut, "[RUN]"}, Excludes{{"--force"}}});
   command->Add("--steps", &options->steps,
-               "as --set schedule.steps=N; with --resume it may be more than the run began with",
+               "same as --set schedule.steps=N; with --resume, a larger number extends the run",
                {NoDefault{}, Range{1, 0x1p40}});
   command->Add("--max-minutes", &options->max_minutes,
                "save and stop after this many minutes; 0: no limit", {NotNegative()});

@@ -44,18 +44,18 @@ Status RunViews(const ViewsOptions& options) {
 void AddViews(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "views",
-      "Render a mesh from all around into a folder of images and cameras for tilegrad fit",
-      RunViews);
+      "Render views around a mesh into a folder of images and cameras for tilegrad fit", RunViews);
   command->Add("mesh", &options->mesh, "a file: " + io::MeshFileEndings(), {Required{}});
-  command->Add("--out", &options->out, "folder to fill", {Required{}});
+  command->Add("--out", &options->out, "output folder", {Required{}});
   AddForceOption(command, &options->force);
   AddUpOption(command, &options->up);
   AddTextureOption(command, &options->texture);
   train::ViewsOptions& v = options->views;
-  command->Add("--views", &v.views, "images to fit");
-  command->Add("--held-out", &v.held_out, "more images, to judge a fit by");
-  command->Add("--size", &v.size, "pixels a side");
-  command->Add("--distance", &v.distance, "of the cameras; the mesh is scaled to 0.9 across");
+  command->Add("--views", &v.views, "number of views to fit");
+  command->Add("--held-out", &v.held_out, "number of held-out views");
+  command->Add("--size", &v.size, "width and height of the images, pixels");
+  command->Add("--distance", &v.distance,
+               "camera distance; the mesh is scaled to an extent of 0.9");
   command->Add("--fov", &v.fov_y, "vertical field of view, degrees");
   command->Add("--lowest", &v.lowest, "elevation of the lowest camera, degrees");
   command->Add("--highest", &v.highest, "elevation of the highest camera, degrees");

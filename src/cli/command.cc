@@ -43,7 +43,7 @@ WordCheck NotNegative() {
 WordCheck EndsIn(const std::string& ending) {
   const auto fault = [ending](const std::string& name) {
     const std::string given = LowerCase(std::filesystem::path(name).extension().string());
-    return given.empty() || given == ending ? "" : name + ": it is written as " + ending;
+    return given.empty() || given == ending ? "" : name + ": the file must end in " + ending;
   };
   return {fault, ""};
 }

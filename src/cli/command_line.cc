@@ -151,7 +151,7 @@ constexpr Sentence kSentences[] = {
     {"Could not convert: ", " = ", "{0}: invalid value {1}"},
     {"A subcommand is required", "", "no command given"},
     {"", " was given a disallowed flag override", "--{0} takes no value"},
-    {"", ": At Most 1 required but received ", "{0} is given {1} times"},
+    {"", ": At Most 1 required but received ", "{0} was given {1} times"},
     {"", ": At Most ", "{0}: too many values"},
     {"", ": 1 required ", "{0} needs a value"},
     {"", " required ", "{0} values are needed"},  // "--eye: 3" of them
@@ -188,7 +188,7 @@ std::unique_ptr<CLI::App> MakeApp(const CommandList& commands) {
       "tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
       "tilegrad");
   app->footer(
-      "tilegrad help COMMAND shows the options of a command; tilegrad configs, the networks "
+      "tilegrad help COMMAND shows the options of a command; tilegrad configs lists the networks "
       "that train knows by name.");
   app->set_version_flag("--version", TILEGRAD_VERSION);
   app->require_subcommand(1);
@@ -298,7 +298,7 @@ std::vector<CommandNode> ReadCommandTree(const CommandList& commands) {
 
 namespace {
 
-constexpr const char* kGivenHead = "# What the command was given; --resume goes on with it.\n";
+constexpr const char* kGivenHead = "# Options of this run; --resume uses them again.\n";
 constexpr const char* kGivenIs = " = ";
 
 // A line break and the backslash itself.

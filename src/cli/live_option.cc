@@ -17,8 +17,8 @@ bool HasDesktop() {
 
 void AddLiveOption(Command* command, bool* live) {
   command->Add("--live", live,
-               "keep a page in the output folder, live.html, that shows curves, pictures and the "
-               "mesh as they form; on a desktop, open it");
+               "write live.html with curves, images and the mesh to the output folder as the run "
+               "progresses; on a desktop, open it");
 }
 
 Status Live::Start(train::LiveSource source) {

@@ -8,11 +8,11 @@ namespace tilegrad::cli {
 
 void AddUpOption(Command* command, UpAxis* up) {
   command->Add("--up", Choice(up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
-               "the axis of the mesh that points up: y (default), z or x");
+               "up axis of the mesh: y (default), z or x");
 }
 
 void AddTextureOption(Command* command, std::string* file) {
-  command->Add("--texture", file, "an image for those materials of the mesh that have no texture");
+  command->Add("--texture", file, "texture image for the materials that have none");
 }
 
 Status TakeTexture(const std::string& file, io::LoadedMesh* loaded) {

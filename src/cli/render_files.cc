@@ -217,11 +217,11 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
   // A folder pic.jpg with a PNG in it is not what anybody asks for.
   for (const char* other : {"jpg", "jpeg", "bmp", "gif", "tga", "tif", "tiff", "webp", "ppm"}) {
     if (ending != other) continue;
-    return InvalidArgument("--out {}: pictures are written as .png, .exr or .npy", settings.out);
+    return InvalidArgument("--out {}: images are written as .png, .exr or .npy", settings.out);
   }
   const bool is_file = ending == "png" || ending == "exr" || ending == "npy";
   if (is_file && !single) {
-    return InvalidArgument("--out {}: there are several pictures; name a folder", settings.out);
+    return InvalidArgument("--out {}: there are several images; name a folder", settings.out);
   }
   if (is_file && !settings.format.empty() && settings.format != ending)
     return InvalidArgument("--out {} and --format {} disagree", settings.out, settings.format);

@@ -39,12 +39,11 @@ Result<int> ThreadsFromEnvironment() {
 void AddWorkersOption(Command* command, int* workers) {
   const auto threads = ThreadsFromEnvironment();  // main looks at its error
   if (threads.ok()) *workers = *threads;
-  command->Add(
-      "--threads", workers,
-      fmt::format(
-          "0: one per core. The result does not depend on it. Default: {} in the environment",
-          kThreadsVariable),
-      {Range{0, kMostThreads}});
+  command->Add("--threads", workers,
+               fmt::format("number of threads; 0: one per core; results do not depend on it. "
+                           "Default: {} in the environment",
+                           kThreadsVariable),
+               {Range{0, kMostThreads}});
   command->Add("--workers", workers, "the name in earlier versions",
                {Hidden{}, Range{0, kMostThreads}});
 }
@@ -64,15 +63,13 @@ void AddReadLimitOption(Command* command) {
 }
 
 void AddForceOption(Command* command, bool* force) {
-  command->Add(
-      "--force", force,
-      "start anew where an earlier call has been, and replace files that are there; never what is "
-      "read here");
+  command->Add("--force", force,
+               "start over and replace existing output files; inputs are never overwritten");
 }
 
 void AddRunOptions(Command* command, RunOptions* options) {
   command->Add("--run", &options->run, "run folder [the newest below runs/]");
-  command->Add("--data", &options->data, "dataset folder [the one it was trained on]");
+  command->Add("--data", &options->data, "dataset folder [the training dataset]");
   AddWorkersOption(command, &options->workers);
 }
 
@@ -111,7 +108,7 @@ Result<Path> ChooseRun(const std::string& given) {
     return NotFound(
         "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
         "--help)");
-  PrintRemark("{}: taking the newest run below runs/; --run chooses another\n",
+  PrintRemark("{}: using the newest run below runs/; --run chooses another\n",
               newest->second.string());
   return newest->second;
 }

@@ -30,7 +30,7 @@ Status ValidateProjected(const ProjectedBatchT<T>& batch, const ImageSize& size,
   TILEGRAD_TRY(CheckImageSize("width", size.width));
   TILEGRAD_TRY(CheckImageSize("height", size.height));
   if (batch.faces > kMost) {
-    return InvalidArgument("{} faces an image are more than {}", batch.faces, kMost);
+    return InvalidArgument("{} faces per image; the limit is {}", batch.faces, kMost);
   }
   const std::size_t faces = batch.images * batch.faces;
   TILEGRAD_TRY(CheckSize("face_vertices_image", batch.xy.size(), 6 * faces));

@@ -248,8 +248,8 @@ std::string Separation::Doubt() const {
   }
   const auto object = std::ranges::count(place_, Place::kObject);
   const double share = static_cast<double>(object) / static_cast<double>(pixels());
-  if (share < kLeastObject) return "nothing stands out from the background";
-  if (share > kMostObject) return "almost nothing looks like the border: no background was found";
+  if (share < kLeastObject) return "no foreground differs from the background";
+  if (share > kMostObject) return "almost no pixel resembles the border: no background was found";
   return {};
 }
 

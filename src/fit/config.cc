@@ -58,21 +58,25 @@ int LevelsOf(const FitConfig& config, ImageSize size) {
 
 ConfigFields FieldsOfDescent(FitConfig* c) {
   return {
-      {"steps", &c->steps, 1, 1e7, "gradient steps, at most"},
+      {"steps", &c->steps, 1, 1e7, "maximum number of gradient steps"},
       {"stop_gain", &c->stop_gain, 0, 1,
-       "share of the loss by which 100 steps must lower it, else the fit hurries to its end; 0: it "
-       "takes all steps"},
-      {"views_per_step", &c->views_per_step, 1, 1e6, "images a step looks at"},
+       "relative decrease of the loss over 100 steps, below which the fit stops early; 0: take all "
+       "steps"},
+      {"views_per_step", &c->views_per_step, 1, 1e6, "images per step"},
       {"levels", &c->levels, 0, 8,
-       "resolutions, coarse to fine, each twice the one before; 0: as it suits the start"},
+       "resolution levels, coarse to fine, each twice the one before; 0: chosen for the initial "
+       "shape"},
       {"delta_start", &c->delta_start, 0, 1e3,
-       "softness of outlines at the start, squared NDC; 0: as it suits the start"},
-      {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.3 pixels"},
-      {"texture_size", &c->texture_size, 2, 8192, "texels along a blank texture"},
+       "softness of silhouettes at the start, squared NDC; 0: chosen for the initial shape"},
+      {"delta", &c->delta, 0, 1e3,
+       "softness of silhouettes at the end, squared NDC; 0: 0.3 pixels"},
+      {"texture_size", &c->texture_size, 2, 8192, "width and height of a new texture, texels"},
       {"mask_tolerance", &c->mask_tolerance, 0, 0.5,
-       "share of the masks that may lack a point of the hull, if masks have gaps"},
-      {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
-      {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
+       "fraction of the masks that may miss a point of the hull, for masks with gaps"},
+      {"template_level", &c->template_level, 0, 7,
+       "subdivision level of the sphere: 3 has 642 vertices, 4 has 2562"},
+      {"smoothing", &c->smoothing, 0, 1e4,
+       "smoothing of vertex steps (lambda of Large Steps); 0: none"},
   };
 }
 
@@ -82,7 +86,7 @@ ConfigFields FieldsOfRegularizers(FitConfig* c) {
     if (field.key == "smoothness") field.key = "flatness";  // "smoothing" is another option
     if (field.key != "area") continue;
     field.low = -1;
-    field.help = "weight of the surface's area; -1: as it suits the start";
+    field.help = "weight of the surface area; -1: chosen for the initial shape";
   }
   return fields;
 }
@@ -90,13 +94,13 @@ ConfigFields FieldsOfRegularizers(FitConfig* c) {
 ConfigFields FieldsOfRun(FitConfig* c) {
   const auto reporting = Affects::kReporting;
   return {
-      {"color_weight", &c->loss.color_weight, 0, 1e6, "of the L1 loss of colours"},
-      {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "of the IoU loss of masks"},
+      {"color_weight", &c->loss.color_weight, 0, 1e6, "weight of the L1 loss of colours"},
+      {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "weight of the IoU loss of masks"},
       {"perturb_cameras", &c->perturb_cameras, 0, 180,
-       "turn each camera by this many degrees at random, to try out refining them"},
-      {"seed", &c->seed, 0, kNoLimit, "of the choice of images"},
+       "rotate each camera by this many degrees in a random direction, to test camera refinement"},
+      {"seed", &c->seed, 0, kNoLimit, "seed of the choice of images"},
       {"checkpoint_every", &c->checkpoint_every, 1, 1e9, "steps", reporting},
-      {"timelapse", &c->timelapse, 0, 1e6, "pictures of the run; 0: none", reporting},
+      {"timelapse", &c->timelapse, 0, 1e6, "number of timelapse frames; 0: none", reporting},
   };
 }
 

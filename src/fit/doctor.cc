@@ -142,23 +142,22 @@ std::string WhyNoColor(const FitterOptions& options, const Sight& s, Parameter p
     return "only the silhouette counts (the colour weight is 0), and it does not depend on this";
   }
   if (s.drawn_on_object == 0) {
-    return "the mesh is drawn only where the masks say that there is nothing";
+    return "the mesh covers only pixels outside the masks";
   }
   if (p == Parameter::kLight || p == Parameter::kMaterial) {
-    return "every surface that is seen faces away from the light";
+    return "every visible surface faces away from the light";
   }
-  return "the colours that are seen do not change with it, or are as the images have them";
+  return "the visible colours do not depend on it, or already match the images";
 }
 
 std::string WhyBlocked(const FitterOptions& options, const FitStep& step, const Sight& s,
                        const FitValues& values, Parameter p) {
-  if (values.image_loss == 0) return "the images are already as they should be: the loss is 0";
+  if (values.image_loss == 0) return "the renders already match the images: the loss is 0";
   std::string unseen = WhyUnseen(s);
   if (!unseen.empty()) return unseen;
   if (OnlyColor(p)) return WhyNoColor(options, s, p);
   if (options.loss.silhouette_weight > 0 && s.lost_far > 0) return FarSentence(s, step);
-  return "nothing that the loss sees depends on it: the silhouettes agree, and colours are "
-         "constant";
+  return "the loss does not depend on it: the silhouettes agree and colours are constant";
 }
 
 const char* UnitOf(Parameter p) {

@@ -179,7 +179,7 @@ Status Fitter::LoadState(const std::vector<nn::NamedTensor>& state) {
   const nn::Tensor here = context_.Copy(faces);
   TILEGRAD_TRY(nn::CopyByName(state, own));
   if (!std::ranges::equal(faces.span<std::int32_t>(), here.span<std::int32_t>()))
-    return DataLoss("\"{}\": the fit began with another mesh", kFaces);
+    return DataLoss("\"{}\": the fit was started with another mesh", kFaces);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const std::int64_t steps = *own[4 * (i + 1)].value.data<std::int64_t>();
     if (steps < 0) return DataLoss("\"{}.steps\" is {}", blocks_[i].name(), steps);

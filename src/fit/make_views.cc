@@ -25,8 +25,9 @@ constexpr const char* kTruthName = "truth.glb";
 
 Status CheckViews(const ViewsOptions& o) {
   if (o.views < 1 || o.held_out < 0 || o.views + o.held_out > 100000) {
-    return InvalidArgument("{} views and {} held out: needs 1 or more, and not over 100000 in all",
-                           o.views, o.held_out);
+    return InvalidArgument(
+        "{} views and {} held out: must be 1 or more, and at most 100000 in total", o.views,
+        o.held_out);
   }
   if (o.size < 8 || o.size > 4096) return InvalidArgument("size is {}, must be 8 to 4096", o.size);
   if (!(o.distance > 0 && o.distance < 1e6)) {

@@ -116,19 +116,19 @@ std::string Setting(const std::string& name, const std::string& value, const cha
 // What each setting means beside its value: choices first, then the numbers.
 std::string Settings(const FitJob& job) {
   static const std::map<std::string, const char*> kMeanings = {
-      {"parameters", "what was fitted"},
-      {"material", "what the surface does with light"},
-      {"lighting", "how light reaches the surface"},
-      {"light_direction", "towards the light, in the world"},
-      {"start", "the shape that the fit started from, unless a mesh was given"},
-      {"mesh", "the mesh that was given to start from"},
-      {"filter", "how the texture is looked up"},
-      {"vertex_colors", "colours at vertices instead of a texture"},
-      {"max_alpha_error", "the most by which soft outlines may be off"},
+      {"parameters", "fitted parameters"},
+      {"material", "reflection model"},
+      {"lighting", "lighting model"},
+      {"light_direction", "direction towards the light, world axes"},
+      {"start", "initial shape, unless a mesh was given"},
+      {"mesh", "initial mesh, if given"},
+      {"filter", "texture filter"},
+      {"vertex_colors", "vertex colours instead of a texture"},
+      {"max_alpha_error", "bound on the error of soft silhouettes"},
       {"rates", "learning rates of positions, colors, texture, uv, camera, light, sh, material"},
       {"rate_exposure", "learning rate of exposures"},
       {"rate_focal", "learning rate of focal lengths"},
-      {"final_rate", "the share of these rates that is left at the end"}};
+      {"final_rate", "final fraction of these rates"}};
   std::string choices, numbers;
   FitConfig config = job.config;
   const ConfigFields fields = FieldsOf(&config);

@@ -230,7 +230,7 @@ Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& st
 Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers,
                                          const Watch& watch) {
   TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job, workers, watch));
-  TILEGRAD_TRY(watch.At({"looking at gradients", 0, 0, ""}));
+  TILEGRAD_TRY(watch.At({"checking gradients", 0, 0, ""}));
   return DiagnoseStart(job, start, workers);
 }
 
@@ -241,7 +241,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_TRY(CheckExistingRun(job.out, job.existing));  // before the work
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers, watch));
   if (!start.note.empty() && job.warn) job.warn(start.note);
-  TILEGRAD_TRY(watch.At({"looking at gradients", 0, 0, ""}));
+  TILEGRAD_TRY(watch.At({"checking gradients", 0, 0, ""}));
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(const auto fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);

@@ -28,19 +28,19 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter) {
     case Parameter::kUv:
       if (!textured) return "the scene has no texture to look up";
       return scene.filter == Filter::kNearest
-                 ? "the nearest texel does not depend on where in it a lookup falls: choose the "
-                   "bilinear or trilinear filter"
+                 ? "the nearest filter has no gradient to texture coordinates: choose the bilinear "
+                   "or trilinear filter"
                  : "";
     case Parameter::kLight:
       return scene.uses_lights() ? "" : "only Lambert and Phong light have a direction";
     case Parameter::kSh:
       return scene.shading.lighting == Lighting::kSphericalHarmonics
                  ? ""
-                 : "the light is not made of spherical harmonics";
+                 : "the lighting is not spherical harmonics";
     case Parameter::kMaterial:
       return scene.uses_lights() ? "" : "only Lambert and Phong light read a material";
     case Parameter::kExposure:
-      return scene.gains.size() > 1 ? "" : "there is one image, and nothing to compare it with";
+      return scene.gains.size() > 1 ? "" : "exposures need more than one image";
     default:
       return "";
   }

@@ -26,7 +26,8 @@ Status CheckConfig(const FitConfig& config) {
   FitConfig c = config;
   TILEGRAD_TRY(CheckFields(FieldsOf(&c)));
   if (c.loss.color_weight + c.loss.silhouette_weight == 0) {
-    return InvalidArgument("both weights, of colour and silhouette, are 0: nothing is left to fit");
+    return InvalidArgument(
+        "the weights of colour and silhouette are both 0: there is no loss to minimise");
   }
   const auto& d = c.light_direction;
   if (!(std::isfinite(d[0]) && std::isfinite(d[1]) && std::isfinite(d[2])) ||
@@ -238,7 +239,7 @@ Status CheckFit(const FitJob& job) {
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch) {
   TILEGRAD_TRY(CheckFit(job));
   if (!job.input.posed && !job.input.found) {
-    return InvalidArgument("the images have no cameras, which `tilegrad fit` would look for first");
+    return InvalidArgument("the images have no cameras; `tilegrad fit` estimates them");
   }
   if (job.input.seeks_masks) {
     return InvalidArgument("the images have no masks, which `tilegrad fit` would look for first");

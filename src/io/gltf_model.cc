@@ -120,8 +120,9 @@ Status CheckGltfExtensions(const tinygltf::Model& model, const std::string& plac
     }
   }
   if (unread.empty()) return {};
-  warnings->push_back(fmt::format("the file uses {}, not read: viewers that do draw it otherwise",
-                                  fmt::join(unread, ", ")));
+  warnings->push_back(
+      fmt::format("the file uses {}, which is not read: other viewers may show it differently",
+                  fmt::join(unread, ", ")));
   return {};
 }
 

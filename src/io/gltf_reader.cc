@@ -82,7 +82,7 @@ Result<GltfAccessor> OpenFour(const tinygltf::Model& model, const tinygltf::Prim
                               const std::string& key, std::size_t vertices,
                               const std::string& what) {
   const auto found = p.attributes.find(key);
-  if (found == p.attributes.end()) return DataLoss("{}: no {} beside its other half", what, key);
+  if (found == p.attributes.end()) return DataLoss("{}: no {} beside its counterpart", what, key);
   const std::string place = what + ": " + key;
   TILEGRAD_ASSIGN(GltfAccessor out, GltfAccessor::OpenAttribute(model, found->second, 4, place));
   if (out.count() != vertices)

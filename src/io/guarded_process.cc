@@ -386,7 +386,7 @@ rlim_t OwnLimit(decltype(RLIMIT_AS) resource, std::size_t granted) {
 Status TooMuchMemory(const GuardLimits& limits) {
   if (const rlim_t own = OwnLimit(RLIMIT_AS, AddressSpace(limits)); own > 0) {
     NoteShortage(ENOMEM);
-    return IoError("had not enough memory: {} MB may be mapped here (ulimit -v)", own >> 20);
+    return IoError("ran out of memory: {} MB may be mapped here (ulimit -v)", own >> 20);
   }
   return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
 }
@@ -397,7 +397,7 @@ Status TooLargeAResult(const GuardLimits& limits) {
   if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes) {
     return TooMuchMemory(limits);
   }
-  return IoError("could not hand over its result: files may have {} bytes here (ulimit -f)",
+  return IoError("could not return its result: files are limited to {} bytes here (ulimit -f)",
                  own.rlim_max);
 }
 
@@ -407,7 +407,7 @@ Status StatusOfSignal(int signal, const GuardLimits& limits) {
   if (signal == SIGXFSZ) return TooLargeAResult(limits);
   if (signal == SIGKILL) {  // nobody else kills it: it volunteers when memory runs out
     NoteShortage(ENOMEM);
-    return IoError("was killed by the system, which was short of memory");
+    return IoError("was killed by the system for lack of memory");
   }
   const char* name = ::sigdescr_np(signal);
   return DataLoss("crashed ({})", name == nullptr ? "unknown signal" : name);
@@ -420,7 +420,7 @@ Status StatusOfExit(int status, const GuardLimits& limits) {
   if (code == kChildOutOfMemory) return TooMuchMemory(limits);
   if (code == kChildCannotDeliver) {
     NoteShortage(ENOMEM);
-    return IoError("could not hand over its result");
+    return IoError("could not return its result");
   }
   if (code == kChildThrew) return DataLoss("failed with an exception");
   return DataLoss("ended the process with code {}", code);

@@ -88,7 +88,7 @@ Result<MatPlace> MatPlace::Field(std::size_t index, const std::string& name) con
   if (found == array_->fields.end())
     return InvalidArgument("{}: no field \"{}\" in it", where_, name);
   if (index >= array_->places())
-    return InvalidArgument("{}: {} elements, but element {} is wanted", where_, array_->places(),
+    return InvalidArgument("{}: {} elements, but element {} is needed", where_, array_->places(),
                            index + 1);
   const auto field = static_cast<std::size_t>(found - array_->fields.begin());
   std::string where = where_;

@@ -48,8 +48,7 @@ void FinishMaterial(ColorNumbers numbers, float full, Material& material,
   if (Most(c) <= 1) full = 1;  // 1 is no shade of black
   if (Most(c) > 1 + 1e-3f) {
     warnings->push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is {}", material.name,
-                                    c.r, c.g, c.b,
-                                    full > 1 ? "taken as counted from 0 to 255" : "cut to 1"));
+                                    c.r, c.g, c.b, full > 1 ? "read as 0 to 255" : "cut to 1"));
   }
   material.base_color = Finished(c, full, numbers);
 }
@@ -67,7 +66,7 @@ void FinishColors(ColorNumbers numbers, std::vector<glm::vec4>* colors,
   for (const glm::vec4& c : *colors) most = std::max(most, Most(c));
   const float full = FullOf(*colors, most);
   if (full > 1) {
-    WarnOnce(fmt::format("vertex colours are taken as counted from 0 to {}", full), warnings);
+    WarnOnce(fmt::format("vertex colours are read as 0 to {}", full), warnings);
   } else if (most > 1 + 1e-3f) {
     WarnOnce("vertex colours beyond 1 are cut to 1", warnings);
   }

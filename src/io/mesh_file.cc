@@ -88,7 +88,7 @@ void DropNonFiniteNormals(LoadedMesh& loaded) {
     }
   }
   if (dropped)
-    loaded.warnings.emplace_back("normals that are not finite numbers: the surface's own instead");
+    loaded.warnings.emplace_back("normals that are not finite are computed from the surface");
 }
 
 // Files hold normals of any length, zero included.

@@ -177,7 +177,7 @@ Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::strin
   const auto data = bytes.subspan(split->second);
   const auto wanted = ByteCount(header->shape, NpyTypeSize(type));
   if (!wanted || *wanted != data.size()) {
-    return DataLoss("{}: the header promises {} bytes of data, the file has {}", name,
+    return DataLoss("{}: the header declares {} bytes of data, the file has {}", name,
                     wanted ? std::to_string(*wanted) : "more than 2^64", data.size());
   }
   NpyArray array{type, header->shape, {}};

@@ -116,7 +116,7 @@ class OffReader {
     AddFaceColors();
     if (odd_lines_ > 0) {
       out_.warnings.push_back(
-          fmt::format("left out what stands behind {} of vertices or faces: no colour",
+          fmt::format("extra values on {} of vertices or faces left out: not a colour",
                       Count(odd_lines_, "line")));
     }
     return {};

@@ -83,8 +83,8 @@ Result<SgiHeader> ReadHeader(ByteSpan bytes, const std::string& name) {
                       colormap = BigEndian(bytes.subspan(104, 4));
   if (bytes[2] > 1 || bytes[3] < 1 || bytes[3] > 2 || dimensions < 1 || dimensions > 3) {
     return DataLoss(
-        "{}: corrupt SGI image: storage {}, {} bytes a sample, {} dimensions; 0 or 1, 1 or 2, and "
-        "1 to 3 are possible",
+        "{}: corrupt SGI image: storage {}, {} bytes a sample, {} dimensions; must be 0 or 1, 1 or "
+        "2, and 1 to 3",
         name, bytes[2], bytes[3], dimensions);
   }
   if (colormap != 0)

@@ -102,7 +102,7 @@ Status CheckCounts(const PlyHeader& header, const std::string& place) {
       return DataLoss("{}: element \"{}\" has no property", place, element.name);
     // The last number of a text may lack its space.
     if (element.count > 0 && element.count > (header.data.size() + 1) / row) {
-      return DataLoss("{}: the header promises {} \"{}\", but only {} bytes follow", place,
+      return DataLoss("{}: the header declares {} \"{}\", but only {} bytes follow", place,
                       element.count, element.name, header.data.size());
     }
   }

@@ -86,8 +86,8 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
 
 bool IsPossibleResult(const char* op, const Var& operand, const Shape& result) {
   if (result.IsPossible()) return true;
-  operand.context().Fail(InvalidArgument("{}: {} would give {}, which no tensor can be", op,
-                                         operand.shape().ToString(), result.ToString()));
+  operand.context().Fail(InvalidArgument("{}: {} would give {}, which is too large for a tensor",
+                                         op, operand.shape().ToString(), result.ToString()));
   return false;
 }
 

@@ -133,7 +133,7 @@ class Backward {
     if (visit.d.empty()) return;  // nothing arrived: the derivative is zero
     if (node.released) {
       context_.Fail(InvalidArgument(
-          "the graph of \"{}\" was released by an earlier Grad; ask that one to keep_graph",
+          "the graph of \"{}\" was released by an earlier Grad; give that one keep_graph",
           node.info.name));
       return;
     }

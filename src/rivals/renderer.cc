@@ -255,7 +255,7 @@ Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
 template <class T>
 Status CheckBatch(const BatchT<T>& batch) {
   if (batch.size < 1 || batch.size > 16384)
-    return InvalidArgument("images have {} pixels a side; 1 to 16384 are possible", batch.size);
+    return InvalidArgument("images have {} pixels a side; must be 1 to 16384", batch.size);
   if (batch.meshes == 0 || batch.positions.size() % (3 * batch.meshes) != 0 ||
       batch.cameras.size() % batch.meshes != 0) {
     return InvalidArgument("{} numbers of positions and {} cameras do not make {} equal meshes",
@@ -279,7 +279,7 @@ Status CheckPlanes(const char* rule, double near_plane, double far_plane) {
 
 Status CheckResolution(const char* name, int value, int least, int most) {
   if (value >= least && value <= most) return {};
-  return InvalidArgument("{} is {}; {} to {} are possible", name, value, least, most);
+  return InvalidArgument("{} is {}; must be {} to {}", name, value, least, most);
 }
 
 // sum <- the sum of `part` of the images of mesh b, in their order.
@@ -295,7 +295,7 @@ void SumViews(std::size_t views, std::size_t b, std::span<T> sum, const PartOf& 
 template <class T>
 Status CheckTextures(const BatchT<T>& batch, const Options& options) {
   if (batch.textures.empty()) return {};
-  if (options.rule != Rule::kN3mr) return InvalidArgument("textures of faces are N3MR's alone");
+  if (options.rule != Rule::kN3mr) return InvalidArgument("only N3MR has face textures");
   if (!batch.colors.empty()) return InvalidArgument("a batch has colors or textures, not both");
   return CheckSize("textures", batch.textures.size(),
                    batch.meshes * batch.faces.size() * options.n3mr_colors.texels());

@@ -58,7 +58,7 @@ Status Check(const Framing& framing, double extent) {
     return InvalidArgument("a margin of {}; it must be in [0, 1)", framing.margin);
   if (!(framing.distance >= 0) || !std::isfinite(framing.distance))
     return InvalidArgument("a camera distance of {}; it must be 0 or above", framing.distance);
-  if (!(extent > 0)) return InvalidArgument("the mesh has no extent: nothing to look at");
+  if (!(extent > 0)) return InvalidArgument("the mesh has no extent, so no camera can frame it");
   return {};
 }
 

@@ -93,7 +93,7 @@ Status Validate(const Mesh& mesh) {
   TILEGRAD_TRY(CheckCount("corner_normals", mesh.corner_normals.size(), 3 * faces, "corner"));
   TILEGRAD_TRY(CheckCount("corner_colors", mesh.corner_colors.size(), 3 * faces, "corner"));
   if (!mesh.colors.empty() && !mesh.corner_colors.empty())
-    return InvalidArgument("colors and corner_colors are both there; a mesh has one of them");
+    return InvalidArgument("the mesh has both colors and corner_colors; give one of them");
   TILEGRAD_TRY(CheckCount("face_materials", mesh.face_materials.size(), faces, "face"));
   TILEGRAD_TRY(CheckFaces(mesh));
   TILEGRAD_TRY(CheckMaterials(mesh));

@@ -8,8 +8,8 @@ namespace tilegrad::train {
 namespace {
 
 ConfigFields FieldsOfParts(std::string* name, std::string* kind, Schedule* schedule, Task* task) {
-  ConfigFields fields = {{"name", name, 0, 0, "of the run, for people", Affects::kReporting},
-                         {"task.kind", kind, 0, 0, "what is trained"}};
+  ConfigFields fields = {{"name", name, 0, 0, "display name of the run", Affects::kReporting},
+                         {"task.kind", kind, 0, 0, "the task to train"}};
   for (const ConfigFields& part : {task->Fields(), FieldsOf(schedule)})
     fields.insert(fields.end(), part.begin(), part.end());
   return fields;

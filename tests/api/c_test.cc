@@ -212,11 +212,11 @@ TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
   float numbers[48] = {};
   d_scene.sh = numbers;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
-            "scene 0: d_scene.sh is wanted, but the scene has none");
+            "scene 0: d_scene.sh is requested, but the scene has none");
   d_scene.sh = nullptr;
   d_scene.normals = numbers;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
-            "scene 0: d_scene.normals is wanted, but the scene has none");
+            "scene 0: d_scene.normals is requested, but the scene has none");
 }
 
 TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
@@ -234,12 +234,12 @@ TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
   float* textures[1] = {};
   d_scene.textures = textures;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
-            "scene 0: d_scene.textures is wanted, but the scene has none");
+            "scene 0: d_scene.textures is requested, but the scene has none");
   tilegrad_light d_light = {};
   d_scene.textures = nullptr;
   d_scene.lights = &d_light;
   EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
-            "scene 0: d_scene.lights is wanted, but the scene has none");
+            "scene 0: d_scene.lights is requested, but the scene has none");
 }
 
 // -1 as a size, for one.
@@ -289,7 +289,7 @@ TEST_F(CApi, SaysWhatIsWrong) {
             "scene 0: textures[0]: is -5 x 4 texels; each side must be in 1..16384");
   c.texture.width = 5;
   c.scene.struct_size = 0;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: scene.struct_size is 0: tilegrad_..._init comes first");
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: scene.struct_size is 0: call tilegrad_..._init first");
   tilegrad_images images;
   tilegrad_images_init(&images);
   ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);

@@ -207,7 +207,7 @@ TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {
   const std::string dataset = "dataset --out " + In("d");
   ExpectError(dataset + " --source procedural --split-list a", "--split-list", "shapenet");
   ExpectError(dataset + " --source procedural --input a", "--input", "procedural");
-  ExpectError(dataset + " --source nmr --input a --test-share 0.1", "--test-share", "its own");
+  ExpectError(dataset + " --source nmr --input a --test-share 0.1", "--test-share", "fixed split");
   ExpectError(dataset + " --source shapenet --input a --split-list b --validation-share 0.1",
               "--validation-share", "--split-list");
   ExpectError("dataset-view --data " + Data() + " --model a --class b", "--class", "--model");
@@ -223,7 +223,7 @@ TEST_F(BrokenInputs, TheNewestRunIsTheOneThatWasTrainedLast) {
     last_write_time(entry.path(), now - std::chrono::hours(1));
   last_write_time(folder_ / "runs/old", now + std::chrono::hours(1));
   const std::string here = "cd " + folder_.string() + " && ";
-  ExpectIn(ExpectDone("report", here), "runs/new: taking the newest run");
+  ExpectIn(ExpectDone("report", here), "runs/new: using the newest run");
   for (const char* run : {"runs/new", "runs/old"}) std::filesystem::remove_all(folder_ / run);
   EXPECT_EQ(RunProgram("report", here).exit_code, 3);
 }

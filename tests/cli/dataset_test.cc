@@ -98,8 +98,8 @@ TEST_F(DatasetTest, WhatAFolderHoldsBesidesIsNamed) {
   Write("set/notes.txt", "none");
   Write("set/wedge/a.max", "none");
   PicturesOf("set");
-  ExpectIn(ExpectDone(Dataset("set")), "2 files or folders ignored", "notes.txt: is no model",
-           "a.max: is of no kind that is read");
+  ExpectIn(ExpectDone(Dataset("set")), "2 files or folders ignored", "notes.txt: is not a model",
+           "a.max: is not a supported format");
 }
 
 }  // namespace tilegrad::dataset_test

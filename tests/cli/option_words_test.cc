@@ -78,7 +78,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {"dataset procedural", "unexpected argument \"procedural\""},
            {"timelapse f --seconds 0", "0 must be a number above 0"},
            {"dataset-view --data d --view -1", "-1 must be a number, 0 or above"},
-           {"report --out page.pdf", "page.pdf: it is written as .html"},
+           {"report --out page.pdf", "page.pdf: the file must end in .html"},
            {render + "--backgroud 1 1 1", "did you mean --background?"},
            {render + "--fvo=30", "did you mean --fov?"},
            {render + "--shading fancy", "fancy is not one of lambert,none,phong,sh"},

@@ -102,7 +102,7 @@ TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   EXPECT_GT(record["color_l1"][0], record["color_l1"][1]);
   for (const char* score : {"silhouette_iou", "color_l1"})
     EXPECT_EQ(said[0][score], record[score]) << score;
-  EXPECT_EQ(output.find("the camera is doubtful") != std::string::npos,
+  EXPECT_EQ(output.find("the camera is ambiguous") != std::string::npos,
             said[0]["camera_doubtful"].get<bool>());
   EXPECT_EQ(record["camera"]["size"], train::kRefineSize);
   // A rotation: its rows have length 1.
@@ -117,7 +117,7 @@ TEST_F(Predict, TellsItsStagesAndEndsAtCtrlC) {
       " --force --run " + In("r") + " --out " + In("out") + " " + In("known.png");
   TerminalProgram whole("predict --refine 20" + to, 200);
   EXPECT_EQ(whole.Finish(), 0) << whole.said();
-  for (const char* stage : {"reading the network", "predicting from ", "looking for the camera",
+  for (const char* stage : {"loading the network", "predicting from ", "looking for the camera",
                             "refining", "drawing ", "coding the animation"})
     EXPECT_NE(whole.said().find(stage), std::string::npos) << stage << "\n" << whole.said();
   TerminalProgram cut("predict --refine 100000" + to, 200);

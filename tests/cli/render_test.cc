@@ -195,7 +195,7 @@ TEST_F(Render, MeshesWithAnotherAxisUp) {
   // Cameras are those of the file: its turntable goes around z.
   ExpectRefused("--up 0 0 1", 2, "--up 0,0,1");
   ExpectRefused("--up w", 2, "--up w");
-  ExpectRefused("--gltf-camera 0 --up z", 2, "--up has no effect here");
+  ExpectRefused("--gltf-camera 0 --up z", 2, "--up has no effect with cameras");
   ProgramTest::ExpectDone("render " + In("z.glb") +
                           " --up z --size 8 --turntable 4 --elevation 0 " + "--out " + In("t") +
                           " --write-cameras " + In("t.json"));
@@ -305,8 +305,7 @@ TEST_F(Render, ViewsOfOneNameDoNotOverwriteEachOther) {
 TEST_F(Render, PicturesOfOneNameAreRefused) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "ball_depth.glb", Icosphere(1, 1)).ok());
   const std::string rest = "--size 8 --outputs color,depth --out " + In("out");
-  ExpectRefused(In("ball_depth.glb") + " " + rest, 2,
-                "ball_depth.png: two pictures have this name");
+  ExpectRefused(In("ball_depth.glb") + " " + rest, 2, "ball_depth.png: two images have this name");
 }
 
 TEST_F(Render, ExplainSaysWhatWasDone) {
@@ -331,7 +330,7 @@ TEST_F(Render, WrongCommandLines) {
   ExpectRefused("--size 0", 2, "--size");
   ExpectRefused("--size 10x", 2, "--size");
   ExpectRefused("--size 16000 --supersample 3", 2, "samples");
-  ExpectRefused("--eye 0 0 0", 2, "same point");
+  ExpectRefused("--eye 0 0 0", 2, "coincide");
   ExpectRefused("--eye 0 0 4 --turntable 3", 2, "");
   ExpectRefused("--target 0 0 4", 2, "");
   ExpectRefused("--fov 180", 2, "--fov");
@@ -353,15 +352,15 @@ TEST_F(Render, EndingsInCapitalsAreTheSameFormats) {
 
 TEST_F(Render, OptionsThatWouldDoNothing) {
   ExpectRefused("--sh 1 0 0 0 0 0 0 0 0", 2, "--shading sh");
-  ExpectRefused("--shading none --light 0 0 1 1", 2, "--light has no effect here");
-  ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient has no effect here");
+  ExpectRefused("--shading none --light 0 0 1 1", 2, "--light has no effect without --shading");
+  ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient has no effect without --shading");
   ExpectRefused("--specular 0.3", 2, "--shading phong");
   ExpectRefused("--shininess 3", 2, "--shading phong");
   ExpectRefused("--light-at-camera", 2, "it is for --light");
   ExpectRefused("--light 0 0 0 1", 2, "towards the light");
   ExpectRefused("--opencv-centre half", 2, "--cameras");
-  ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth has no effect here");
-  ExpectRefused("--gltf-camera 0 --fov 30", 2, "--fov has no effect here");
+  ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth has no effect without automatic framing");
+  ExpectRefused("--gltf-camera 0 --fov 30", 2, "--fov has no effect with cameras");
   ExpectRefused("--background 1 1 1 --out " + In("a.exr"), 2, "--background");
   ExpectDone("--size 8 --fov 30 --azimuth 9 --elevation 9 --distance 9 --out " + In("a.png"));
   ExpectDone(

@@ -161,7 +161,7 @@ class FewThreads : public ProgramTest {
         std::filesystem::remove_all(folder_ / *std::filesystem::path(file).begin());
       const Outcome outcome = RunWith(granted, command + " --workers 4");
       EXPECT_EQ(outcome.exit_code, 0) << granted << ": " << outcome.output;
-      const std::string warning = "warning: the system refuses as many threads";
+      const std::string warning = "warning: the system allows fewer threads";
       const auto at = outcome.output.find(warning);
       EXPECT_EQ(at != std::string::npos, granted < 3) << granted << ": " << outcome.output;
       EXPECT_EQ(outcome.output.rfind(warning), at) << "twice: " << outcome.output;

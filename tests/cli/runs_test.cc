@@ -77,7 +77,7 @@ TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
   MakeData();
   const Outcome said = RunProgram(Start("run") + " --set schedule.steps=12");
   const std::string line = "sample sheet: " + In("run/samples/step_00000010.png") +
-                           " (a new one beside it every 1000 steps or sooner)\n";
+                           " (a new one at least every 1000 steps)\n";
   const auto at = said.output.find(line);
   ASSERT_NE(at, std::string::npos) << said.output;
   EXPECT_EQ(said.output.find("sample sheet", at + 1), std::string::npos) << said.output;

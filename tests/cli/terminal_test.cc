@@ -59,7 +59,7 @@ TEST_F(TerminalTest, EveryStageOfAFitIsTold) {
   EXPECT_EQ(fit.Finish(), 0);
   for (const char* stage :
        {"reading images", "carving the visual hull", "simplifying the visual hull",
-        "placing the texture", "looking at gradients", "fitting", "filling the texture",
+        "placing the texture", "checking gradients", "fitting", "filling the texture",
         "scoring views"}) {
     EXPECT_GT(Longest(fit.Lines(), stage), 0u) << stage << "\n" << fit.said();
   }

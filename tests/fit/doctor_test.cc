@@ -111,7 +111,7 @@ TEST(Doctor, OnlyTheSilhouetteCounts) {
 TEST(Doctor, DrawnWhereTheMaskHasNothing) {
   Patient patient;
   patient.targets.alpha.assign(patient.targets.alpha.size(), 0.0f);
-  ExpectBlocked(patient.Ask(Parameter::kColors), "only where the masks say");
+  ExpectBlocked(patient.Ask(Parameter::kColors), "only pixels outside the masks");
 }
 
 TEST(Doctor, FacesAwayFromTheLight) {

@@ -61,8 +61,8 @@ void CheckReport(const std::string& page, const Mesh& mesh) {
   const auto has = [&](const std::string& text) {
     EXPECT_NE(page.find(text), std::string::npos) << text;
   };
-  has("<th scope=\"row\">lighting</th><td>none</td><td>how light reaches the surface</td>");
-  has("<th scope=\"row\">views_per_step</th><td>4</td><td>images a step looks at</td>");
+  has("<th scope=\"row\">lighting</th><td>none</td><td>lighting model</td>");
+  has("<th scope=\"row\">views_per_step</th><td>4</td><td>images per step</td>");
   has(fmt::format("<th scope=\"row\">faces</th><td>{}</td>", WithCommas(std::ssize(mesh.faces))));
   has(fmt::format("<td>{} × {} texels</td>", mesh.textures[0].image.width,
                   mesh.textures[0].image.height));

@@ -139,7 +139,7 @@ TEST(ImportedScene, RoundTrip) {
 
 TEST(ImportedScene, ErrorsAreHandedOver) {
   ExpectMessage(DecodeScene(EncodeScene(DataLoss("line 3"))).status(), "line 3");
-  ExpectMessage(DecodeScene(EncodeScene(DataLoss(""))).status(), "not whole");
+  ExpectMessage(DecodeScene(EncodeScene(DataLoss(""))).status(), "incomplete data");
 }
 
 TEST(ImportedScene, IndicesAndCountsAreChecked) {

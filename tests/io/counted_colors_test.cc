@@ -76,14 +76,13 @@ std::vector<std::uint8_t> OrangeBytes() {
 std::vector<float> OrangeFloats() { return {255, 128, 0, 255, 128, 0, 255, 128, 0}; }
 
 TEST_F(CountedColors, OfGltfThatAreNotNormalised) {
-  const Mesh bytes =
-      Load(Gltf<std::uint8_t>({OrangeBytes()}, kByte, false), "counted from 0 to 255");
+  const Mesh bytes = Load(Gltf<std::uint8_t>({OrangeBytes()}, kByte, false), "read as 0 to 255");
   ASSERT_EQ(bytes.colors.size(), 3u);
   for (const glm::vec4& color : bytes.colors) ExpectNear(color, kOrange);
   const std::uint16_t full = 65535, half = 128 * 257;
   const std::vector<std::uint16_t> shorts = {full, half, 0,    full, full, half,
                                              0,    full, full, half, 0,    full};
-  const Mesh words = Load(Gltf<std::uint16_t>({shorts}, kShort, false), "counted from 0 to 65535");
+  const Mesh words = Load(Gltf<std::uint16_t>({shorts}, kShort, false), "read as 0 to 65535");
   for (const glm::vec4& color : words.colors) ExpectNear(color, kOrange);
   // As the format has it: linear.
   const Mesh plain = Load(Gltf<std::uint8_t>({OrangeBytes()}, kByte, true), "");
@@ -94,7 +93,7 @@ TEST_F(CountedColors, OfGltfThatAreNotNormalised) {
 
 TEST_F(CountedColors, OfGltfAsFractions) {
   for (const glm::vec4& color :
-       Load(Gltf<float>({OrangeFloats()}, kFloat, false), "counted from 0 to 255").colors)
+       Load(Gltf<float>({OrangeFloats()}, kFloat, false), "read as 0 to 255").colors)
     ExpectNear(color, kOrange);
   std::vector<float> alpha;
   for (int v = 0; v < 3; ++v) alpha.insert(alpha.end(), {255, 128, 0, 51});
@@ -111,7 +110,7 @@ TEST_F(CountedColors, OfGltfAsFractions) {
 TEST_F(CountedColors, OfOnePartOnly) {
   const Mesh mesh =
       Load(Gltf<float>({OrangeFloats(), {}, {0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1}}, kFloat, false),
-           "counted from 0 to 255");
+           "read as 0 to 255");
   ASSERT_EQ(mesh.colors.size(), 9u);
   ExpectNear(mesh.colors[0], kOrange);
   ExpectNear(mesh.colors[3], kWhite);
@@ -126,7 +125,7 @@ TEST_F(CountedColors, OfTextFormats) {
            " blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" +
            "0 0 0 255 128 0\n1 0 0 255 128 0\n0 1 0 255 128 0\n3 0 1 2\n";
   };
-  const std::string counted = "counted from 0 to 255";
+  const std::string counted = "read as 0 to 255";
   for (const auto& [name, text, said] : std::vector<std::array<std::string, 3>>{
            {"uchar.ply", ply("uchar"), ""},
            {"float.ply", ply("float"), counted},
@@ -169,8 +168,7 @@ TEST_F(CountedColors, OfMaterials) {
   ExpectNear(loaded->mesh.materials.at(1).base_color, {0.2f, 0.2f, 0.2f, 1});
   ExpectNear(loaded->mesh.materials.at(2).base_color, {1, 0, 0.5f, 1});
   ASSERT_EQ(loaded->warnings.size(), 2u);
-  EXPECT_EQ(loaded->warnings[0],
-            "material \"a\": its colour (255, 128, 0) is taken as counted from 0 to 255");
+  EXPECT_EQ(loaded->warnings[0], "material \"a\": its colour (255, 128, 0) is read as 0 to 255");
   const Json factor = {255, 128, 0, 1};
   const Mesh mesh = Load(Gltf<float>({{}}, kFloat, false, factor), "(255, 128, 0) is taken as");
   ExpectNear(mesh.materials.at(0).base_color, kOrange);

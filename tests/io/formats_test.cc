@@ -359,7 +359,7 @@ TEST_F(FormatsTest, BrokenNpyHeadersAreErrors) {
   };
   ExpectMessage(
       error("{'descr': '<f4', 'fortran_order': False, 'shape': (1000000000, 1000000000), }", 8),
-      "bad.npy", "promises");
+      "bad.npy", "declares");
   ExpectMessage(
       error("{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999,), }", 8),
       "bad.npy");

@@ -182,7 +182,7 @@ TEST_F(GuardedProcessTest, ALimitOfFilesIsNotCalledOneOfMemory) {
     const Status status = Guarded([](AskParent) { return Bytes(5000, 1); }).status();
     return status.code() == StatusCode::kIo &&
            status.message() ==
-               "could not hand over its result: files may have 1024 bytes here (ulimit -f)";
+               "could not return its result: files are limited to 1024 bytes here (ulimit -f)";
   }));
 }
 

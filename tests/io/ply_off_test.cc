@@ -93,7 +93,7 @@ TEST_F(PlyOffTest, PlyWithATexture) {
 
 TEST_F(PlyOffTest, PlyWithLyingNumbers) {
   ExpectMessage(LoadPly(Header("ascii", "4000000000") + kTextBody), "bad.ply",
-                "promises 4000000000 \"face\"");
+                "declares 4000000000 \"face\"");
   ExpectMessage(LoadPly(Header("ascii", "99999999999999999999") + kTextBody), "bad.ply", "line 12",
                 "element face");
   ExpectMessage(LoadPly(Header("ascii", "-1") + kTextBody), "bad.ply", "line 12");

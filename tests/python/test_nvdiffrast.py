@@ -401,7 +401,7 @@ class Errors(unittest.TestCase):
         self.check(ValueError, "mip was made of a texture", dr.texture, tex, uv, da,
                    mip=dr.texture_construct_mip(torch.ones(1, 4, 4, 3)))
         one = torch.ones(1, 1, 1, 3)
-        self.check(ValueError, "levels of sizes that do not belong together", dr.texture,
+        self.check(ValueError, "the sizes of the levels do not match", dr.texture,
                    one, uv[:1], da[:1], mip=[one] * 40)
         for level in (-1, 0.5, math.nan, math.inf, "2"):
             self.check(ValueError, f"max_mip_level is {level!r}, must be a whole number, 0 or more",

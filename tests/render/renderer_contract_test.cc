@@ -203,7 +203,7 @@ TEST(ShadedPlan, AlphaIsNamedByItsRule) {
     EXPECT_TRUE(StageOf(report, "alpha").what.starts_with(backward))
         << StageOf(report, "alpha").what;
     report = session.Render(Request(true, false));
-    EXPECT_EQ(StageOf(report, "alpha").what, "alpha is not wanted");
+    EXPECT_EQ(StageOf(report, "alpha").what, "alpha is not requested");
   }
 }
 

@@ -267,7 +267,7 @@ TEST(RivalRenderer, ErrorsNameTheOptionThatIsOutOfRange) {
   EXPECT_EQ(message([](Options& o) { o.n3mr.eps = -1; }),
             "N3MR: eps is -1, but must be positive and finite");
   EXPECT_EQ(message([](Options& o) { o.n3mr_colors.resolution = 1; }),
-            "N3MR: resolution is 1; 2 to 32 are possible");
+            "N3MR: resolution is 1; must be 2 to 32");
 }
 
 TEST(RivalRenderer, ErrorsSayWhatDoesNotFit) {

@@ -39,7 +39,7 @@ class CheckpointTest : public TempFolderTest {
   void ExpectStops(const std::string& reason) {
     std::vector<Path> before = Files();
     const Status status = LoadNewestCheckpoint(context_, folder_).status();
-    ExpectMessage(status, "step_00000020", reason, "nothing was changed", "moved away");
+    ExpectMessage(status, "step_00000020", reason, "nothing was changed", "move this file away");
     EXPECT_EQ(Files(), before);
   }
   std::vector<Path> Files() const {

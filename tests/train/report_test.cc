@@ -179,9 +179,11 @@ TEST_F(ReportTest, ComparesPicturesUnderTheirLights) {
   e.rows.back().mean.light_angle = 12.34;
   ASSERT_TRUE(WriteEvaluation(job_.run, e).ok());
   const std::string page = Page();
-  EXPECT_EQ(
-      Count(page, "its pictures are off by <b>0.0050</b> of 1, undeformed template by 0.0200"), 1);
-  EXPECT_EQ(Count(page, "its lights are 12.3 degrees off."), 1);
+  EXPECT_EQ(Count(page,
+                  "the mean colour error of its renders is <b>0.0050</b> of 1; undeformed "
+                  "template: 0.0200"),
+            1);
+  EXPECT_EQ(Count(page, "the predicted lights are off by 12.3 degrees."), 1);
   EXPECT_EQ(Count(page, "width:80.0%\"></span><span class=\"value\">0.0200</span>"), 1);
   EXPECT_EQ(Count(page, "width:20.0%\"></span><span class=\"value\">0.0050</span>"), 1);
   EXPECT_EQ(Count(page, "baselines"), 0);

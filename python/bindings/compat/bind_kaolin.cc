@@ -146,7 +146,7 @@ py::array SoftMaskBackward(const py::array& xy, const py::array& ids, const py::
 
 void BindMaskOptions(py::module_& m) {
   py::class_<kaolin::ProjectedMaskOptions>(m, "ProjectedMaskOptions",
-                                           "How projected_soft_mask works.")
+                                           "Options of projected_soft_mask.")
       .def(py::init([](double delta, double max_alpha_error) {
              kaolin::ProjectedMaskOptions options;
              options.delta = delta;
@@ -183,8 +183,8 @@ void BindKaolin(py::module_& m) {
   m.def("rasterize_projected_backward", &RasterizeFacesBackward, py::arg(kFaces),
         py::arg("face_features"), py::arg("face_idx"), py::arg("gradient"), py::arg("eps"),
         py::arg("wants_face_vertices_image"), py::arg("wants_face_features"), py::arg("threads"),
-        "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and face_features\n"
-        "(N, F, 3, C); empty where not wanted");
+        "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and "
+        "face_features\n(N, F, 3, C); empty if not requested");
   m.def("projected_soft_mask", &SoftMask, py::arg(kFaces), py::arg("selected_face_idx"),
         py::arg("options"), py::arg("threads"),
         "face_vertices_image (N, F, 3, 2), selected_face_idx (N, H, W) int32 -> the mask\n"

@@ -224,17 +224,16 @@ py::tuple AntialiasBackward(const py::array& color, const py::array& rast, const
 }
 
 void BindNvdiffrastRasterize(py::module_& m) {
-  py::class_<NvdiffrastRasterizer>(
-      m, "NvdiffrastRasterizer",
-      "Memory that rasterizing reuses. Several threads may share one: whoever finds it at work\n"
-      "takes memory of his own.")
+  py::class_<NvdiffrastRasterizer>(m, "NvdiffrastRasterizer",
+                                   "Scratch memory that rasterization reuses. Threads may share "
+                                   "one; a thread that finds it in\nuse allocates its own.")
       .def(py::init<>())
       .def("rasterize", &NvdiffrastRasterizer::Rasterize, py::arg("pos"), py::arg("tri"),
            py::arg("ranges"), py::arg("height"), py::arg("width"), py::arg("peeled"),
            py::arg("threads"),
-           "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n"
-           "[N, 2]; tri [F, 3]; peeled [N, height, width] float32: only what lies behind is seen,\n"
-           "and it moves there; infinity at first.");
+           "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n[N, "
+           "2]; tri [F, 3]; peeled [N, height, width] float32: only surfaces behind this "
+           "depth\nare drawn, and the depth is updated; start with infinity.");
   m.def("nvdiffrast_rasterize_backward", &RasterizeBackward, py::arg("pos"), py::arg("tri"),
         py::arg("rast"), py::arg("d_rast"), py::arg("d_rast_db"), py::arg("threads"),
         "The gradient of pos from those of rast and rast_db, either of them None.");
@@ -243,7 +242,7 @@ void BindNvdiffrastRasterize(py::module_& m) {
 void BindInterpolate(py::module_& m) {
   py::class_<InterpolateCall>(
       m, "InterpolateCall",
-      "What interpolates attributes: tri [F, 3], rast and rast_db [N, H, W, 4], diff_attrs [D].")
+      "Interpolates attributes: tri [F, 3], rast and rast_db [N, H, W, 4], diff_attrs [D].")
       .def(py::init([](py::array tri, py::array rast, OptionalArray rast_db, py::array diff_attrs,
                        int threads) {
              return InterpolateCall{std::move(tri), std::move(rast), std::move(rast_db),
@@ -255,7 +254,7 @@ void BindInterpolate(py::module_& m) {
         "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
   m.def("nvdiffrast_interpolate_backward", &InterpolateBackward, py::arg("attr"), py::arg("call"),
         py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"),
-        "The gradients of attr, rast and rast_db, None where not wanted.");
+        "The gradients of attr, rast and rast_db, None if not requested.");
 }
 
 void BindAntialias(py::module_& m) {
@@ -271,7 +270,7 @@ void BindAntialias(py::module_& m) {
         "color [N, H, W, C] with smooth silhouettes.");
   m.def("nvdiffrast_antialias_backward", &AntialiasBackward, py::arg("color"), py::arg("rast"),
         py::arg("pos"), py::arg("tri"), py::arg("rings"), py::arg("gradient"), py::arg("wanted"),
-        py::arg("threads"), "The gradients of color and pos, None where not wanted.");
+        py::arg("threads"), "The gradients of color and pos, None if not requested.");
 }
 
 }  // namespace

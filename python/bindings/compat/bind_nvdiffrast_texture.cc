@@ -95,7 +95,7 @@ struct TextureArguments {
              size.width == std::max(1, fine.width / 2) && from[l].ndim() == from[0].ndim() &&
              from[l].shape(0) == from[0].shape(0) && ChannelsOf(from[l]) == ChannelsOf(from[0]);
     }
-    if (!fits) throw py::value_error("texture: levels of sizes that do not belong together");
+    if (!fits) throw py::value_error("texture: the sizes of the levels do not match");
     if (from[0].size() / from[0].shape(0) / ChannelsOf(from[0]) > kMostTexels) {
       throw py::value_error("texture: tex has more than 2^31 - 1 texels");
     }
@@ -212,7 +212,8 @@ void BindNvdiffrastTexture(py::module_& m) {
         "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
   m.def("nvdiffrast_texture_backward", &SampleBackward, py::arg("levels"), py::arg("call"),
         py::arg("gradient"), py::arg("wanted"),
-        "The gradients of the levels (a list, empty if not wanted), uv, uv_da and mip_level_bias.");
+        "The gradients of the levels (a list, empty if not requested), uv, uv_da and "
+        "mip_level_bias.");
   m.def("nvdiffrast_mip", &ConstructMip, py::arg("tex"), py::arg("most"), py::arg("threads"),
         "The levels below tex, at most `most` of them, or all if that is negative.");
   m.def("nvdiffrast_mip_backward", &MipBackward, py::arg("d_levels"), py::arg("threads"),

@@ -64,7 +64,7 @@ py::array LayersBackward(const py::array& faces, const py::array& ids, const py:
 }
 
 void BindLayeredOptions(py::module_& m) {
-  py::class_<pytorch3d::LayeredOptions>(m, "LayeredOptions", "What rasterize_layers draws.")
+  py::class_<pytorch3d::LayeredOptions>(m, "LayeredOptions", "Options of rasterize_layers.")
       .def(py::init([](int height, int width, int faces_per_pixel, double blur_radius,
                        bool perspective_correct, bool clip_barycentrics, bool cull_backfaces) {
              return pytorch3d::LayeredOptions{{width, height},

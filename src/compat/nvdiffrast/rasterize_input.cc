@@ -34,8 +34,7 @@ template <class T>
 Status CheckInput(const RasterizeInput<T>& input) {
   const std::size_t faces = input.faces.size() / 3;
   if (faces > kMostFaces) {
-    return InvalidArgument("{} faces, but at most {} have numbers that float holds", faces,
-                           kMostFaces);
+    return InvalidArgument("{} faces; float holds the ids of at most {}", faces, kMostFaces);
   }
   const PixelGrid& grid = input.grid;
   if (grid.width < 1 || grid.height < 1 || grid.width > raster::kMaxImageSize ||

@@ -197,7 +197,7 @@ Status ValidateLayeredAdjoint(std::span<const T> face_vertices, const LayeredOpt
                             static_cast<std::size_t>(options.size.height) *
                             static_cast<std::size_t>(options.faces_per_pixel);
   if (n % image != 0) {
-    return InvalidArgument("pix_to_face has {} numbers, no multiple of {}", n, image);
+    return InvalidArgument("pix_to_face has {} numbers, not a multiple of {}", n, image);
   }
   const auto faces = static_cast<std::int64_t>(face_vertices.size() / 9);
   for (std::size_t i = 0; i < n; ++i) {

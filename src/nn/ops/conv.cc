@@ -34,8 +34,9 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   // The caller may request an image of any size.
   if (!e.x.IsPossible() || !e.weight.IsPossible() ||
       !PaddedShape(e.x, options.padding).IsPossible()) {
-    return InvalidArgument("conv2d: input {} with weight {}, padding {}: no tensor has such a size",
-                           e.x.ToString(), e.weight.ToString(), options.padding);
+    return InvalidArgument(
+        "conv2d: input {} with weight {}, padding {}: the output is too large for a tensor",
+        e.x.ToString(), e.weight.ToString(), options.padding);
   }
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
   if (options.padding_mode != PadMode::kZero && options.padding > 0) {

@@ -84,8 +84,8 @@ Var Extremum(const ExtremumCall& call, const Var& x, const AxisSet& axes, Keep k
   const Reduction plan = Plan(x.shape(), axes);
   if (plan.layout.inputs_each() == 0 ||
       x.shape().elements() > std::numeric_limits<std::int32_t>::max()) {
-    return Fail(x, InvalidArgument("{}: shape {} has nothing to choose from, or too much",
-                                   call.name, x.shape().ToString()));
+    return Fail(
+        x, InvalidArgument("{}: shape {} is empty or too large", call.name, x.shape().ToString()));
   }
   Context& context = x.context();
   Tensor y = context.Empty(keep == Keep::kYes ? plan.kept_as_one : plan.dropped, x.dtype());

@@ -88,7 +88,7 @@ Status CheckRefused(const CheckContext& context, const BadNumber& bad, float val
   std::vector<std::uint8_t> text(message.begin(), message.end());
   context.Take("message", text);
   message.assign(text.begin(), text.end());
-  if (status.ok()) return InternalError("{} is {}, and nothing is said", bad.place, value);
+  if (status.ok()) return InternalError("{} is {}, but no error was reported", bad.place, value);
   if (message.find(bad.place) != std::string::npos) return {};
   return InternalError("{} is {}, but the error is: {}", bad.place, value, message);
 }

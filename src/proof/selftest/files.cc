@@ -108,7 +108,7 @@ Result<Finding> Glb(const CheckContext& context) {
   TILEGRAD_TRY(io::SaveGlb(folder / "sphere.glb", mesh));
   TILEGRAD_ASSIGN(const auto loaded, io::LoadMesh(folder / "sphere.glb"));
   TILEGRAD_TRY(ExpectMesh(context, loaded.mesh, mesh, 0x1.0p-24));
-  if (loaded.mesh.textures.size() != 1) return InternalError("the texture is not there");
+  if (loaded.mesh.textures.size() != 1) return InternalError("the texture is missing");
   TILEGRAD_TRY(ExpectBytes(context, "texels", loaded.mesh.textures[0].image.pixels,
                            mesh.textures[0].image.pixels));
   return Finding{"written and read back"};
@@ -165,7 +165,7 @@ Result<Finding> Safetensors(const CheckContext& context) {
   for (const auto& [name, tensor] : written) {
     const nn::Tensor* read = nn::Find(file.tensors, name);
     if (read == nullptr || !(read->shape() == tensor.shape()) || read->dtype() != tensor.dtype()) {
-      return InternalError("{} is not there as it was", name);
+      return InternalError("{} has changed", name);
     }
     const auto bytes = [](const nn::Tensor& t) {
       const auto* begin = reinterpret_cast<const std::uint8_t*>(t.raw());

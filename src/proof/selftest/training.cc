@@ -190,7 +190,7 @@ Result<Finding> SameBitsOfTraining(const CheckContext& context) {
     const auto before = game.Weights();
     for (std::uint64_t step = 0; step < 3; ++step) TILEGRAD_TRY(game.Step(step));
     auto weights = game.Weights();
-    if (weights == before) return InternalError("training changes no weight");
+    if (weights == before) return InternalError("training changed no weight");
     if (first.empty()) first = weights;
     context.Take("weights", weights);
     TILEGRAD_TRY(ExpectSameBits("weight", weights, first).Within(fmt::format("{} workers", count)));

@@ -17,7 +17,7 @@ std::size_t PixelCount(const PictureRequest& r) {
 
 Status Check(const PictureRequest& r) {
   if (r.width < 1 || r.height < 1 || r.supersampling < 1)
-    return InvalidArgument("a picture of {} x {} pixels, {} samples along each side", r.width,
+    return InvalidArgument("an image of {} x {} pixels, {} samples along each side", r.width,
                            r.height, r.supersampling);
   if (std::max(r.width, r.height) > raster::kMaxImageSize / r.supersampling) {
     return InvalidArgument(

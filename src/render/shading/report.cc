@@ -53,10 +53,9 @@ StageReport Only(std::string_view name, std::int64_t count, std::string_view uni
 void AddShading(const SceneParts& parts, const ShadeWork& w, std::vector<StageReport>* out) {
   out->push_back(
       Only("gather", w.pixels, "pixels", w.gather, "foreground only", "attributes are the image"));
-  out->push_back(
-      Only("normalise", w.normals, "pixels", w.normal, "normals", "no normal is needed"));
+  out->push_back(Only("normalise", w.normals, "pixels", w.normal, "normals", "no normal needed"));
   out->push_back(Only("texture", w.lookups, "lookups", w.texture,
-                      parts.trilinear ? "between levels" : "one level", "no texture is needed"));
+                      parts.trilinear ? "between levels" : "one level", "no texture needed"));
   const std::string light = LightingName(parts.shading.lighting);
   out->push_back(Only("light", w.lit, "pixels", w.light,
                       w.highlights > 0 ? light + " with highlight" : light, "nothing is lit"));
@@ -64,9 +63,9 @@ void AddShading(const SceneParts& parts, const ShadeWork& w, std::vector<StageRe
 
 void AddScene(const SceneParts& parts, const SceneWork& w, std::vector<StageReport>* out) {
   out->push_back(Only("normals", w.normals, "faces", w.normals_ms,
-                      NormalName(parts.shading.normals), "none is derived"));
+                      NormalName(parts.shading.normals), "none computed"));
   out->push_back(Only("textures", w.texels, "texels", w.textures_ms,
-                      parts.trilinear ? "with their levels" : "level 0 only", "none is needed"));
+                      parts.trilinear ? "with their levels" : "level 0 only", "none needed"));
 }
 
 // The rule, and what it evaluated if it counts that.
@@ -101,7 +100,7 @@ PlanReport ReportForward(const ForwardPlan& plan, const CallWork& work) {
   out.push_back(Only("scatter", shade.pixels, "pixels", shade.scatter, "into images",
                      "attributes are the image"));
   out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
-                     Evaluated(work.stats), "alpha is not wanted"));
+                     Evaluated(work.stats), "alpha is not requested"));
   return report;
 }
 
@@ -113,9 +112,9 @@ PlanReport ReportBackward(const BackwardPlan& plan, const CallWork& work) {
   out.push_back(Only("pack", work.scene.packed, "numbers", work.scene.pack_ms, NamesOf(plan.pulled),
                      "attributes are used as they are"));
   out.push_back(Only("prepare", work.stats.prepared, "images", work.times.prepare, "project, clip",
-                     "as the last call left it"));
+                     "kept from the forward pass"));
   out.push_back(Only("recompute", Numbers(shade, plan.recomputed), "numbers",
-                     work.times.interpolate, NamesOf(plan.recomputed), "no value is needed again"));
+                     work.times.interpolate, NamesOf(plan.recomputed), "no value is recomputed"));
   AddShading(plan.parts, shade, &out);
   out.push_back(Only("adjoint", shade.pixels, "pixels", shade.adjoint, "to " + NamesOf(plan.pulled),
                      "attributes are the image"));
@@ -126,7 +125,7 @@ PlanReport ReportBackward(const BackwardPlan& plan, const CallWork& work) {
                      plan.geometry ? "of attributes and geometry" : "of attributes",
                      "no attribute has a gradient"));
   out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
-                     Evaluated(work.stats, ", to geometry"), "alpha pulls on nothing"));
+                     Evaluated(work.stats, ", to geometry"), "alpha has no gradient"));
   out.push_back(Only("merge", work.stats.merged, "arrays", work.times.merge + work.scene.merge_ms,
                      "from faces to the scene", "nothing to merge"));
   return report;

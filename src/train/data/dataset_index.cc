@@ -63,19 +63,18 @@ Status ReadCamera(const nlohmann::json& json, const std::string& place, DatasetI
   TILEGRAD_TRY(fields.status());
   const CameraRule& r = *rule;
   if (!(r.lens.fov_y > 0 && r.lens.fov_y < 180)) {
-    return DataLoss("{}: \"fov_y\" is {}; degrees above 0 and below 180 are possible", place,
+    return DataLoss("{}: \"fov_y\" is {}; must be above 0 and below 180 degrees", place,
                     r.lens.fov_y);
   }
   if (!(std::abs(r.elevation) <= 90)) {
-    return DataLoss("{}: \"elevation\" is {}; degrees from -90 to 90 are possible", place,
-                    r.elevation);
+    return DataLoss("{}: \"elevation\" is {}; must be -90 to 90 degrees", place, r.elevation);
   }
   // A dataset's objects are half_extent large: of a camera at their centre nothing is seen.
   for (const auto& [key, value] :
        {std::pair("distance", r.distance), std::pair("half_extent", r.half_extent)}) {
     if (!(value > 0 && value <= kMostUnits)) {
-      return DataLoss("{}: \"{}\" is {}; world units above 0 and up to {:g} are possible", place,
-                      key, value, kMostUnits);
+      return DataLoss("{}: \"{}\" is {}; must be above 0 and at most {:g} world units", place, key,
+                      value, kMostUnits);
     }
   }
   if (!(std::abs(r.azimuth_step) <= kMostUnits)) {

@@ -15,9 +15,9 @@ std::optional<std::string> AdviceOnFewModels(const std::vector<ModelInfo>& model
   const std::size_t shapes = CountShapes(training);
   if (shapes >= (streamed ? kFewStreamedShapes : kFewShapes)) return std::nullopt;
   return fmt::format(
-      "{} training shape{} few{}: a network learns {} by heart and knows "
-      "nothing else. Add models (--source procedural makes any number, --per-class), {}or, for one "
-      "object, take `tilegrad fit`",
+      "{} training shape{} few{}: a network memorises {} and does not generalise. Add models "
+      "(--source procedural makes any number, --per-class), {}or, for one object, use `tilegrad "
+      "fit`",
       shapes, shapes == 1 ? " is" : "s are",
       streamed ? ", also with streamed variants of each" : "", shapes == 1 ? "it" : "them",
       streamed ? "" : "train with --set stream.share=0.5 --set schedule.mirrored=0.5, ");

@@ -12,9 +12,10 @@ ConfigFields FieldsOf(RegularizerWeights* w, const std::string& table) {
   return {
       {table + "smoothness", &w->smoothness, 0, kNoLimit,
        "weight of the normal difference of neighbouring faces"},
-      {table + "laplacian", &w->laplacian, 0, kNoLimit, "weight of the Laplacian of the movement"},
+      {table + "laplacian", &w->laplacian, 0, kNoLimit,
+       "weight of the Laplacian of the displacement"},
       {table + "edge_length", &w->edge_length, 0, kNoLimit, "weight of unequal edges"},
-      {table + "area", &w->area, 0, kNoLimit, "weight of the surface's area"},
+      {table + "area", &w->area, 0, kNoLimit, "weight of the surface area"},
   };
 }
 

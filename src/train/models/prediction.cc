@@ -39,7 +39,7 @@ Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std
   if (prediction.textures.valid()) AddTexture(sphere, prediction, i, &mesh);
   if (prediction.colors.valid()) AddColors(ItemOf(prediction.colors, i), &mesh);
   if (const Status valid = Validate(mesh); !valid.ok())
-    return InternalError("the prediction is broken: {}", valid.message());
+    return InternalError("the prediction is invalid: {}", valid.message());
   return mesh;
 }
 

@@ -35,7 +35,7 @@ Result<std::string> Page(const ReportFacts& facts) {
       {{"name", EscapeHtml(facts.run.config.name)},
        {"summary", SummaryHtml(facts)},
        {"comparison", ComparisonHtml(facts)},
-       {"meshes_title", made ? "Generated meshes to turn" : "Predicted meshes to turn"},
+       {"meshes_title", made ? "Generated meshes, interactive" : "Predicted meshes, interactive"},
        {"models_title", made ? "Generated objects" : "Held-out models"},
        {"models", models},
        {"scores", ScoresHtml(facts)},

@@ -35,13 +35,15 @@ bool IsOfLight(const Evaluation& evaluation) {
 std::string ComparisonOfLight(const Evaluation& evaluation) {
   const Score& own = evaluation.rows.back().mean;
   std::string out = fmt::format(
-      ". Under the light that it predicts its pictures are off by <b>{:.4f}</b> of 1", *own.lit_l1);
+      ". Under the predicted light, the mean colour error of its renders is <b>{:.4f}</b> of 1",
+      *own.lit_l1);
   for (std::size_t i = 0; i + 1 < evaluation.rows.size(); ++i) {
     const EvaluationRow& row = evaluation.rows[i];
     if (!row.mean.lit_l1) continue;
-    out += fmt::format(", {} by {:.4f}", EscapeHtml(row.method), *row.mean.lit_l1);
+    out += fmt::format("; {}: {:.4f}", EscapeHtml(row.method), *row.mean.lit_l1);
   }
-  if (own.light_angle) out += fmt::format("; its lights are {:.1f} degrees off", *own.light_angle);
+  if (own.light_angle)
+    out += fmt::format("; the predicted lights are off by {:.1f} degrees", *own.light_angle);
   return out + ".";
 }
 

@@ -162,10 +162,10 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
     }
     const Status status = checkpoint.status();
     if (!damaged) {
-      return Status(status.code(), status.message() +
-                                       "; nothing was changed: once that is mended it goes on from "
-                                       "here, or from the checkpoint before, if this file is moved "
-                                       "away");
+      return Status(status.code(),
+                    status.message() +
+                        "; nothing was changed: fix this to resume from here, or move this file "
+                        "away to resume from the previous checkpoint");
     }
     found.warnings.push_back(status.message());
     found.broken.push_back(*file);

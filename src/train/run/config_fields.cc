@@ -73,8 +73,8 @@ Status PassOver(const ConfigFields& fields, const std::string& key, const toml::
   if (gone == std::end(kGone)) return UnknownKey(fields, key);
   const auto value = node.is_boolean() ? node.ref<bool>() : node.value<double>();
   if (!gone->value || value == gone->value) return {};
-  return InvalidArgument("{} no longer exists, and this version does what {} meant; leave it out",
-                         key, node.is_boolean() ? "true" : fmt::format("{}", *gone->value));
+  return InvalidArgument("{} was removed, and this version behaves as with {}; leave it out", key,
+                         node.is_boolean() ? "true" : fmt::format("{}", *gone->value));
 }
 
 Status CheckRange(const ConfigField& field, double value) {

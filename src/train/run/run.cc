@@ -115,7 +115,7 @@ Status Session::Restore() {
   TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
                              compared ? kStepsKey : plan_.may_differ));
   if (info.step > plan_.schedule.steps) {
-    return InvalidArgument("{}: it has {} already, more than {}", file, Count(info.step, "step"),
+    return InvalidArgument("{}: has {} already, more than {}", file, Count(info.step, "step"),
                            plan_.schedule.steps);
   }
   if (info.image_size != plan_.image_size) {

@@ -74,7 +74,8 @@ Result<bool> HoldsRun(const Path& folder) {
     std::error_code error;
     if (std::filesystem::exists(folder / name, error)) return true;
     if (error)
-      return IoError("{}: cannot be looked for: {}", (folder / name).string(), error.message());
+      return IoError("{}: cannot check whether it exists: {}", (folder / name).string(),
+                     error.message());
   }
   return !ListCheckpoints(folder).empty();
 }

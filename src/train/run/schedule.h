@@ -31,16 +31,17 @@ inline bool SampleIsDue(const Schedule& s, std::int64_t steps) {
 // Its keys, in table [schedule].
 inline ConfigFields FieldsOf(Schedule* s) {
   const auto reporting = Affects::kReporting;
-  return {{"schedule.steps", &s->steps, 1, kNoLimit, "steps of the whole run"},
-          {"schedule.seed", &s->seed, 0, kNoLimit, "of weights, order and views"},
+  return {{"schedule.steps", &s->steps, 1, kNoLimit, "number of training steps"},
+          {"schedule.seed", &s->seed, 0, kNoLimit, "seed of weights, order and views"},
           {"schedule.portions", &s->portions, 1, 1 << 20,
-           "of a batch, each computed by itself, for as many processes; a power of two"},
+           "portions of a batch, each computed independently, for up to as many processes; a power "
+           "of two"},
           {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
           {"schedule.sample_every", &s->sample_every, 1, kNoLimit,
-           "steps; before them after 10, 20, 40 and so on", reporting},
+           "steps between samples; the first ones are at 10, 20, 40 and so on", reporting},
           {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},
           {"schedule.keep_checkpoints", &s->keep_checkpoints, 1, kNoLimit,
-           "the newest ones are kept", reporting}};
+           "number of newest checkpoints to keep", reporting}};
 }
 
 }  // namespace tilegrad::train

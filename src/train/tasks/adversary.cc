@@ -13,7 +13,7 @@ constexpr CriticRole kAdversaryRole = {
     .prefix = "critic.",
     .keys = "adversarial",
     .adversarial = {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
-    .distance = {"critic_distance", "How far the critic tells true from rendered pictures"},
+    .distance = {"critic_distance", "Critic's margin between true and rendered pictures"},
     .penalty = {"critic_penalty", "Gradient penalty of the critic"}};
 constexpr std::uint64_t kCriticWeightStream = 0x637269746963, kPenaltyStream = 0x70656e616c7479;
 
@@ -21,23 +21,24 @@ constexpr std::uint64_t kCriticWeightStream = 0x637269746963, kPenaltyStream = 0
 
 ConfigFields FieldsOf(AdversaryConfig* c) {
   return {
-      {"adversarial.weight", &c->weight, 0, kNoLimit, "of equation 15; 0.5 in the paper"},
+      {"adversarial.weight", &c->weight, 0, kNoLimit, "weight of equation 15; 0.5 in the paper"},
       {"adversarial.features", &c->features, 0, kNoLimit,
-       "weight of the difference of the critic's features"},
+       "weight of the difference in the critic's features"},
       {"adversarial.perceptual", &c->perceptual, 0, kNoLimit,
-       "weight of the difference of a trained network's features; 1 in the paper"},
-      {"adversarial.network", &c->network, 0, 0, "that network: \"classify\" or \"vgg16\""},
+       "weight of the difference in a trained network's features; 1 in the paper"},
+      {"adversarial.network", &c->network, 0, 0,
+       "the network of the perceptual loss: \"classify\" or \"vgg16\""},
       {"adversarial.network_file", &c->network_file, 0, 0,
-       "its run folder, or the safetensors file of its weights"},
+       "run folder of that network, or the safetensors file of its weights"},
       {"adversarial.penalty", &c->penalty, 0, kNoLimit, "weight of the gradient penalty"},
       {"adversarial.place", &c->place, 0, 0,
-       "of the penalty: at \"rendered\" pictures or at \"interpolates\""},
+       "where the penalty is evaluated: at \"rendered\" pictures or at \"interpolates\""},
       {"adversarial.learning_rate", &c->learning_rate, 0, 1, "of the critic's Adam"},
       {"adversarial.beta1", &c->beta1, 0, 0.999999, "of the critic's Adam"},
       {"adversarial.beta2", &c->beta2, 0, 0.99999999, "of the critic's Adam"},
       {"adversarial.base", &c->base, 1, 4096, "the critic's channels at half size; they double"},
-      {"adversarial.halvings", &c->halvings, 1, 8, "of the critic"},
-      {"adversarial.updates", &c->updates, 1, 100, "of the critic in each step"},
+      {"adversarial.halvings", &c->halvings, 1, 8, "halvings of the critic"},
+      {"adversarial.updates", &c->updates, 1, 100, "updates of the critic per step"},
   };
 }
 

@@ -26,7 +26,7 @@ ConfigFields FieldsOf(SphereConfig* c) {
        "subdivisions of the icosahedron; 3: 642 vertices"},
       {"network.template_radius", &c->radius, 1e-3, 10, "world units"},
       {"network.smoothing", &c->smoothing, 0, 64,
-       "rounds of diffusion over the template that offsets go through"},
+       "diffusion rounds that smooth the offsets over the template"},
       {"network.symmetric", &c->symmetric, 0, 1, "every shape is symmetric at x = 0"},
   };
 }
@@ -34,7 +34,7 @@ ConfigFields FieldsOf(SphereConfig* c) {
 ConfigFields FieldsOf(const UNetKeys& keys) {
   return {
       {"network.base", keys.base, 1, 4096, "U-Net: channels of the first level; they double"},
-      {"network.most", keys.most, 1, 4096, "to at most this many"},
+      {"network.most", keys.most, 1, 4096, "up to this many channels"},
       {"network.levels", keys.levels, 1, 10, "halvings"},
       {"network.enlarge", keys.enlarge, 0, 4, "the texture is 2^this times as large as the image"},
       {"network.skips", keys.skips, 0, 1, "the U-Net's skip connections"},
@@ -56,10 +56,10 @@ ConfigFields FieldsOf(LossConfig* c) {
 
 ConfigFields FieldsOf(RenderConfig* c) {
   return {
-      {"render.rule", &c->rule, 0, 0, "whose renderer trains: \"dibr\", \"softras\" or \"n3mr\""},
+      {"render.rule", &c->rule, 0, 0, "training renderer: \"dibr\", \"softras\" or \"n3mr\""},
       {"render.sharpness", &c->sharpness, 1e-3, 1e9, "1/delta of equation 5, per squared NDC unit"},
       {"render.sharpness_start", &c->sharpness_start, 1e-3, 1e9,
-       "at step 0; reaches sharpness geometrically at half of the run"},
+       "sharpness at step 0; grows geometrically to render.sharpness at half of the run"},
       {"render.max_alpha_error", &c->max_alpha_error, 0, 1, "bound on the error of alpha"},
   };
 }
@@ -68,12 +68,12 @@ ConfigFields FieldsOf(OptimizerConfig* c) {
   return {
       {"optimizer.learning_rate", &c->learning_rate, 0, 1, "of Adam"},
       {"optimizer.final_factor", &c->final_factor, 0, 1,
-       "share of the rate at the end (half cosine); 1: constant"},
-      {"optimizer.warmup", &c->warmup, 0, kNoLimit, "steps of linear rise"},
+       "final fraction of the learning rate (half cosine); 1: constant"},
+      {"optimizer.warmup", &c->warmup, 0, kNoLimit, "steps of linear warm-up"},
       {"optimizer.beta1", &c->beta1, 0, 0.999999, "of Adam"},
       {"optimizer.beta2", &c->beta2, 0, 0.99999999, "of Adam"},
       {"optimizer.average", &c->average, 0, 0.999999,
-       "decay of a moving average of the weights, which predicts; 0: none"},
+       "decay of the moving average of the weights that is used for prediction; 0: none"},
   };
 }
 

@@ -29,7 +29,7 @@ std::string SourceName(const std::string& source) {
       {"ships", "of FlightGear's ships"},
       {"cars", "of the games TORCS, Trigger Rally and UFO: Alien Invasion"},
       {"thirteen", "of Sweet Home 3D, FlightGear and three games"},
-      {"folder", "of a folder of one's own"},
+      {"folder", "of a local folder"},
       {"procedural", "made by the built-in generator"}};
   const auto at = names.find(source);
   return at == names.end() ? "of " + source : at->second;

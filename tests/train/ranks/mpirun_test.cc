@@ -334,7 +334,7 @@ TEST_F(Ranks, MakeADatasetOfTheSameBytes) {
   ExpectDone(words("one"));
   const Ended ended = Do(OnRanks(3, words("three")));
   ASSERT_EQ(ended.code, 0) << ended.output;
-  ExpectIn(ended.output, "(0 model files kept from earlier)");
+  ExpectIn(ended.output, "(0 model files reused)");
   const auto files = Contents(folder_ / "one");
   EXPECT_GT(files.size(), 9u);
   EXPECT_TRUE(files == Contents(folder_ / "three"));

@@ -244,7 +244,7 @@ class Builder {
     const bool cancelled = failure_.code() == StatusCode::kCancelled;
     if (!failure_.ok() && !cancelled) return failure_;
     if (!cancelled && (!stop_ || done == chosen_.size())) return {};
-    return Cancelled("stopped; what is finished is in {}; the same command resumes there",
+    return Cancelled("stopped; finished models are in {}; the same command resumes",
                      folder_.string());
   }
 

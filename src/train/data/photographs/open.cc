@@ -39,7 +39,7 @@ Status CheckKeypoints(const Photograph& photo) {
 
 Status CheckCamera(const WeakPerspective& camera) {
   if (!(camera.scale >= kSmallestScale && camera.scale <= kLargestScale))
-    return InvalidArgument("its camera's scale is {}; {:g} to {:g} pixels for a unit are possible",
+    return InvalidArgument("its camera's scale is {}; must be {:g} to {:g} pixels per unit",
                            camera.scale, kSmallestScale, kLargestScale);
   for (const double t : camera.translation) {
     if (IsFarther(t, kFarthestPlace))
@@ -54,7 +54,7 @@ Status CheckWorld(const std::vector<std::array<double, 3>>& places, const char* 
   for (const auto& place : places) {
     for (const double x : place) {
       if (IsFarther(x, kLargestScale))
-        return InvalidArgument("{} is at {}, {:g} from the middle at most is possible", what, x,
+        return InvalidArgument("{} is at {}; must be within {:g} of the middle", what, x,
                                kLargestScale);
     }
   }

@@ -259,7 +259,7 @@ Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder) {
   const Path place = IsFolder(images) ? images : folder;
   const io::PictureNames pictures = io::PicturesIn(place);
   if (!pictures.others.empty())
-    return InvalidArgument("{}: {}; convert them, or take them out of the folder", place.string(),
+    return InvalidArgument("{}: {}; convert them or remove them from the folder", place.string(),
                            pictures.DescribeOthers());
   if (pictures.read.empty()) return std::optional<PhotographSet>();
   TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(place, pictures.read));

@@ -60,9 +60,9 @@ class FolderList {
       if (IsFolder(path))
         ReadClass(path);
       else if (IsModel(path))
-        Ignore(path, "lies in no class's folder: expected CLASS/MODEL");
+        Ignore(path, "is not in a class folder: expected CLASS/MODEL");
       else if (!BelongsToModels(path))
-        Ignore(path, "is no model");
+        Ignore(path, "is not a model");
     }
     return {};
   }
@@ -86,7 +86,7 @@ class FolderList {
       else if (IsModel(file))
         Add(folder, file);
       else if (!BelongsToModels(file))
-        Ignore(file, "is of no kind that is read");
+        Ignore(file, "is not a supported format");
     }
     if (entries.size() == before) Ignore(folder, "holds no model: no class");
   }

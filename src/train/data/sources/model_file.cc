@@ -34,7 +34,7 @@ template <class T>
 Result<std::vector<T>> Take(const NpyArray& array, const std::string& name,
                             const ArrayShape& wanted) {
   if (!Matches(array.shape, wanted)) {
-    return DataLoss("array \"{}\" has another shape than dataset.json promises", name);
+    return DataLoss("array \"{}\" does not have the shape that dataset.json declares", name);
   }
   auto values = array.As<T>();
   if (!values.ok()) return values.status().Within(fmt::format("array \"{}\"", name));

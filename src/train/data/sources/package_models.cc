@@ -232,8 +232,8 @@ class Models : public ModelSource {
     }
     if (!found) {
       return NotFound(
-          "{}: the models are not there; install them with `sudo apt-get install "
-          "--no-install-recommends {}`",
+          "{}: models not found; install them with `sudo apt-get install --no-install-recommends "
+          "{}`",
           archive.string(), package.name);
     }
     credits_.emplace_back(package.credit);

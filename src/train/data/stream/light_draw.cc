@@ -67,19 +67,22 @@ std::array<float, 3> DrawDirection(const LightConfig& config, Rng& rng) {
 
 ConfigFields FieldsOf(LightConfig* c) {
   return {
-      {"light.model", &c->model, 0, 0, "\"none\", \"lambert\", \"phong\" or \"harmonics\""},
+      {"light.model", &c->model, 0, 0,
+       "lighting model: \"none\", \"lambert\", \"phong\" or \"harmonics\""},
       {"light.from", &c->from, 0, 0,
-       "where lights come from: \"hemisphere\" of light.spread, \"front\" (the authors' test "
-       "code), \"above\" (the paper's figure)"},
+       "light directions: \"hemisphere\" of light.spread, \"front\" (the authors' test code), "
+       "\"above\" (the paper's figure)"},
       {"light.spread", &c->spread, 0, 180,
-       "degrees; lights of \"hemisphere\" come from that far around the camera; 90: all that face "
-       "it"},
-      {"light.ambient", &c->ambient, 0, 1, "of Lambert and Phong surfaces; the paper has none"},
-      {"light.shininess_low", &c->shininess_low, 1, 1000, "of Phong surfaces, log-uniform"},
-      {"light.shininess_high", &c->shininess_high, 1, 1000, "of Phong surfaces"},
-      {"light.sky_low", &c->sky_low, 0, 1,
-       "of harmonics: share of the light that comes from everywhere"},
-      {"light.sky_high", &c->sky_high, 0, 1, "the rest comes from a direction"},
+       "largest angle between a light of \"hemisphere\" and the camera, degrees; 90: every light "
+       "that faces the object's front"},
+      {"light.ambient", &c->ambient, 0, 1,
+       "ambient light of Lambert and Phong surfaces; the paper has none"},
+      {"light.shininess_low", &c->shininess_low, 1, 1000,
+       "lowest shininess of Phong surfaces, drawn log-uniformly"},
+      {"light.shininess_high", &c->shininess_high, 1, 1000, "highest shininess of Phong surfaces"},
+      {"light.sky_low", &c->sky_low, 0, 1, "lowest ambient fraction of harmonics"},
+      {"light.sky_high", &c->sky_high, 0, 1,
+       "highest ambient fraction of harmonics; the rest is directional"},
   };
 }
 

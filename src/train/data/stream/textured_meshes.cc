@@ -97,7 +97,7 @@ class Loader {
   }
   Status Changed(int model, const char* how) const {
     return InvalidArgument(
-        "{}: the model {}/{} of {} {} there; make the dataset again from what is there now",
+        "{}: the model {}/{} of {} {} there; rebuild the dataset from the current files",
         dataset_.folder().string(), ClassOf(model), InfoOf(model).id, source_->name(), how);
   }
 

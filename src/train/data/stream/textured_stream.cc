@@ -51,14 +51,14 @@ ConfigFields FieldsOf(TexturedStreamConfig* c) {
                     "of a mesh; larger ones are clustered; 0: none"});
   fields.push_back(CacheField(&c->meshes.cache));
   fields.push_back({"stream.max_texture", &c->meshes.max_texture, 1, 4096,
-                    "texels a side of the source's textures; larger ones are averaged down"});
+                    "largest texture of the source, texels a side; larger ones are averaged down"});
   fields.push_back({"stream.models", &c->meshes.folder, 0, 0,
                     "folder with the models of --source folder; \"\": the installed packages, or "
                     "else the dataset's coloured meshes"});
   fields.push_back({"stream.crease", &c->meshes.crease, 0, 180,
-                    "degrees; light is smooth across edges of less; 0: every face is flat"});
-  fields.push_back({"stream.mirrored", &c->mirrored, 0, 1,
-                    "share of the objects shown mirrored, left to right"});
+                    "edges below this angle are shaded smoothly, degrees; 0: flat shading"});
+  fields.push_back(
+      {"stream.mirrored", &c->mirrored, 0, 1, "fraction of the objects mirrored left to right"});
   return fields;
 }
 

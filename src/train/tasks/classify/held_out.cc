@@ -186,7 +186,7 @@ Result<Example> Exhibit(const Dataset& dataset, int model, ClassifierModel& clas
 Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
                                       const Workers& workers, const ProgressSink& progress,
                                       const StopFlag& stop) {
-  if (job.change) return InvalidArgument("a classifier predicts no meshes that could be refined");
+  if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
   if (job.oracle_steps > 0)
@@ -204,10 +204,10 @@ Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel&
   TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
   TILEGRAD_TRY(CheckClasses(dataset, model));
   Showcase out = AboutDataset(dataset, request.header);
-  out.purpose = "to tell what an object is from one image";
+  out.purpose = "to classify an object from one image";
   out.note =
-      "The network saw none of these in training. Below each picture stands what it calls the "
-      "object. The models are spread over the classes in the dataset's order, not picked by hand.";
+      "The network saw none of these in training. The predicted class stands below each picture. "
+      "The models are spread over the classes in the dataset's order, not picked by hand.";
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int m : chosen) {
     if (stop) return Cancelled("stopped while classifying; nothing was written");

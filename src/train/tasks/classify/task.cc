@@ -146,8 +146,7 @@ Result<nn::Var> ClassifyTask::Loss(const UpdateIndex& /*at*/, const Slots& slots
   sum.Add("cross_entropy", "Cross entropy of the classes", 1,
           nn::CrossEntropy(scores, batch.labels));
   if (scores.valid()) {
-    sum.Watch("right", "Share of the step's pictures that are told right",
-              ShareRight(scores.value(), batch.labels));
+    sum.Watch("right", "Accuracy on the step's pictures", ShareRight(scores.value(), batch.labels));
   }
   out->images = slots.count;
   return sum.total();
@@ -162,8 +161,7 @@ std::vector<nn::NamedTensor> ClassifyTask::State() {
 Status ClassifyTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
   TILEGRAD_ASSIGN(const auto classes, ReadClassNames(state));
   if (classes == dataset_->info().classes) return NetworkTask::LoadState(state, steps);
-  return InvalidArgument("{}: its classes are not those that the run was started with",
-                         dataset_->folder().string());
+  return InvalidArgument("{}: the run was started with other classes", dataset_->folder().string());
 }
 
 // Held-out models in a frame: blue where the class is told right, orange where not.

@@ -235,7 +235,8 @@ void GanLearner::AddScores(LossSum* sum) const {
     const auto watch = [&](const char* name, const char* label, T score) {
       sum->Watch(name, label, static_cast<double>(score));
     };
-    watch("distance", "Kernel distance to true pictures, times 1000, by which the best is kept",
+    watch("distance",
+          "Kernel distance to true pictures, times 1000; selects the generator that is kept",
           scores[kDistance]);
     watch("spread_shapes", "Spread of shapes, as a share of the data's", scores[kShapes]);
     watch("spread_colors", "Spread of colours, as a share of the data's", scores[kColors]);

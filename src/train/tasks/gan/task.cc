@@ -140,7 +140,7 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
                                const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   Showcase out = AboutDataset(dataset, request.header);
-  out.purpose = "to make textured objects from noise";
+  out.purpose = "to generate textured objects from noise";
   out.generated = true;
   out.data += " Critics saw only pictures of the training models, no 3D data.";
   out.note = "Objects of the first latent codes, not picked by hand.";

@@ -268,7 +268,7 @@ Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers&
   if (job.oracle_steps > 0) return InvalidArgument("photographs have no oracle");
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(job.data));
   if (!set.photographs[0].camera)
-    return InvalidArgument("{}: no cameras, so nothing to score by", job.data.string());
+    return InvalidArgument("{}: no cameras to score with", job.data.string());
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOutPhotographs(job.run, set, job.split));
   auto& model = *job.predictor.model().photographs();
   const nn::Var weights = model.network().KeypointWeights();

@@ -105,7 +105,7 @@ void PhotographStep::AddCamera(const Prediction& predicted, const PhotographBatc
       rows.push_back(static_cast<std::int32_t>(rows.size()) * count + nearest.back());
     }
     cameras = nn::Gather(predicted.camera_choices, 0, context_.Indices(rows));
-    sum->Add("azimuth", "Which camera is the likeliest (cross entropy)", config_.loss.azimuth,
+    sum->Add("azimuth", "Camera hypothesis (cross-entropy)", config_.loss.azimuth,
              nn::CrossEntropy(predicted.choice_logits, context_.Indices(nearest)));
   }
   sum->Add("camera", "Camera (rotation, scale and shift)", config_.loss.camera,
@@ -140,7 +140,7 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, St
   if (config_.camera == "given") {
     AddCamera(predicted, batch, &sum);
   }
-  sum.Add("deformation", "Mean length of movements", w.deformation,
+  sum.Add("deformation", "Mean displacement", w.deformation,
           nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
   sum.Add("laplacian", "Cotangent Laplacian", w.laplacian,
           CotangentLaplacianLoss(predicted.positions, edges_));

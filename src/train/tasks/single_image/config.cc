@@ -8,7 +8,8 @@ namespace {
 
 ConfigFields FieldsOf(NetworkConfig* c) {
   return Joined(
-      {{{"network.channels", &c->channels, 1, 4096, "of the first convolution; then 2x and 4x"},
+      {{{"network.channels", &c->channels, 1, 4096,
+         "channels of the first convolution; then 2x and 4x"},
         {"network.blocks", &c->blocks, 0, 16,
          "residual blocks after the second and after the third convolution"},
         {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
@@ -21,19 +22,18 @@ ConfigFields FieldsOf(NetworkConfig* c) {
         {"network.output_deviation", &c->output_deviation, 0, 10,
          "the decoders' last weights start as N(0, this^2)"},
         {"network.color_bias", &c->color_bias, -1, 2,
-         "what vertex colours start at, without picture_colors"},
+         "initial vertex colours, without picture_colors"},
         {"network.picture_colors", &c->picture_colors, 0, 1,
-         "vertices look up their colours in the picture"},
+         "look up vertex colours in the input image"},
         {"network.n3mr_vertices", &c->sphere.n3mr_vertices, 0, 1,
          "N3MR's sigmoids and centroid instead of offsets"}}});
 }
 
 ConfigFields ScheduleFields(SingleImageConfig* c) {
   return {
-      {"schedule.batch", &c->batch, 2, 65536, "objects a step; batch norm needs two"},
-      {"schedule.views", &c->views, 1, 64, "rendered per object: its own view and random others"},
-      {"schedule.mirrored", &c->mirrored, 0, 1,
-       "share of the objects shown mirrored, left to right"},
+      {"schedule.batch", &c->batch, 2, 65536, "objects per step; batch norm needs two"},
+      {"schedule.views", &c->views, 1, 64, "views rendered per object: its own and random others"},
+      {"schedule.mirrored", &c->mirrored, 0, 1, "fraction of the objects mirrored left to right"},
   };
 }
 

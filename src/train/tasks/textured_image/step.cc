@@ -211,12 +211,12 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   }
   const bool lit = LightingOf(config_.light) != Lighting::kNone;
   if (lit && colored && config_.color.light > 0) {
-    sum.Add("light", "Light (mean square distance to the one that explains a picture)",
-            config_.color.light, LightLoss(objects, batch));
+    sum.Add("light", "Light (mean square distance to the best-fitting one)", config_.color.light,
+            LightLoss(objects, batch));
   }
   if (adversary_ != nullptr) AddAdversary(renders.images, batch, &sum);
   if (lit) {
-    sum.Watch("light_angle", "Angle of the light (degrees, not learned from)",
+    sum.Watch("light_angle", "Angle of the light (degrees, not part of the loss)",
               LightAngle(objects, batch));
   }
   return sum.total();

@@ -103,8 +103,8 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
       {"deep/inner", "too deep"},
       {"deep", "no model"},
       {"empty", "no model"},
-      {"loose.obj", "no class's folder"},
-      {"solid/b.max", "no kind that is read"}};
+      {"loose.obj", "not in a class folder"},
+      {"solid/b.max", "not a supported format"}};
   ASSERT_EQ(ignored.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_EQ(ignored[i].file, (folder_ / "set" / expected[i].first).string());

@@ -309,7 +309,7 @@ TEST_F(TexturedMeshes, ChangesSinceThenAreErrors) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "models" / "ball" / "a.glb", box).ok());
   ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "has another shape");
   std::filesystem::remove(folder_ / "models" / "ball" / "a.glb");
-  ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "is not there any more");
+  ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "no longer exists");
 }
 
 }  // namespace tilegrad::train::textured_stream_test

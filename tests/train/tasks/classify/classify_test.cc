@@ -118,7 +118,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   const auto report = Ok(WriteReport(job, workers_, kSilent, stop_));
   const std::string page = ReadText(job.out).value();
   for (const char* part :
-       {"to tell what an object is", "a mean accuracy of", "nearest training picture",
+       {"to classify an object", "a mean accuracy of", "nearest training picture",
         "most frequent class", "called red", "accuracy, %"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   EXPECT_EQ(page.find("3D IoU at"), std::string::npos);

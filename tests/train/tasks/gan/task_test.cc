@@ -171,8 +171,8 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
   const std::string text = ReadText(page.out).value();
   for (const char* part :
-       {"to make textured objects from noise", "Wasserstein estimate", "sample 1 from behind",
-        "Generated meshes to turn", "tilegrad sample --score --run"})
+       {"to generate textured objects from noise", "Wasserstein estimate", "sample 1 from behind",
+        "Generated meshes, interactive", "tilegrad sample --score --run"})
     EXPECT_NE(text.find(part), std::string::npos) << part;
   for (const char* part : {"Held-out models", "has not been evaluated", "unnamed creator"})
     EXPECT_EQ(text.find(part), std::string::npos) << part;
