@@ -173,7 +173,7 @@ const Convention& ConventionOf(const std::string& name) {
   for (const Convention& c : kConventions) {
     if (c.name == name) return c;
   }
-  throw py::value_error("no convention of cameras is called " + name);
+  throw py::value_error("unknown camera convention " + name);
 }
 
 py::array From(const std::string& name, const py::object& rows, Size size, bool half) {

@@ -35,7 +35,7 @@ NamedImage<T> ImageNamed(std::string_view name, const FrameObject<T>& frame) {
         if (!one) out.shape.insert(out.shape.begin() + 1, planes);
       },
       images);
-  if (out.shape.empty()) throw py::value_error(fmt::format("no image is called {}", name));
+  if (out.shape.empty()) throw py::value_error(fmt::format("unknown image {}", name));
   return out;
 }
 

@@ -19,7 +19,7 @@ _TOOL_MODULES = ("cameras", "dataset", "files", "images", "losses", "meshes", "p
                  "weights")
 _FUNCTIONS = {"fit": "runs", "render": "_show", "train": "runs"}
 _HAS_TOOLS = _find_spec("tilegrad._tools") is not None
-_WITHOUT_TOOLS = "this build of tilegrad is the renderer alone (TILEGRAD_PROGRAM=OFF)"
+_WITHOUT_TOOLS = "this build of tilegrad has the renderer only (TILEGRAD_PROGRAM=OFF)"
 
 
 def __getattr__(name: str) -> _Any:

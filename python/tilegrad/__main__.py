@@ -8,7 +8,7 @@ import sys
 
 
 def program() -> str:
-    """The path of the program: the one of this package, or else the one on the PATH.
+    """The path of the program: that of this package, else the one on the PATH.
     FileNotFoundError: there is none."""
     own = pathlib.Path(__file__).parent / "bin/tilegrad"
     if own.exists():

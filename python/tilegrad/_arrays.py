@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of the caller as NumPy arrays: what may share memory does, what may not is copied once
-and counted, what is wrong is refused with the function's name, the argument, and what was expected
-and got. The one home of these checks in Python.
+"""Arrays of the caller as NumPy arrays: memory is shared where possible; otherwise the array is
+copied once, and the copy is counted. Errors name the function, the argument, and what was expected
+and got. All such checks of the Python package are here.
 
 Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
 the CPU) or `__array__`, numbers, and nested sequences of numbers. Masked arrays only if nothing in
-them is masked: rendering has no place for numbers that do not count.
+them is masked.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _lock = threading.Lock()
 
 
 def stats() -> dict[str, int]:
-    """How many arrays came in (`arrays`), how many of them had to be copied (`copies`) because of
-    their dtype or layout, and the sum of the copies' sizes (`bytes_copied`), in this process."""
+    """Counts of this process: arrays received (`arrays`), those copied because of their dtype or
+    layout (`copies`), and the total size of the copies (`bytes_copied`)."""
     return dict(_counts)
 
 
@@ -196,8 +196,8 @@ def as_text(function: str, argument: str, value: Any) -> str:
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise ValueError(f"{function}: {argument} {value!r} has half of a pair of surrogates, which "
-                         f"is no character: no file can hold it") from None
+        raise ValueError(f"{function}: {argument} {value!r} has an unpaired surrogate, "
+                         f"which no file can hold") from None
     return value
 
 
@@ -232,12 +232,12 @@ def _count_masked(value: Any, depth: int = 0) -> int:
 
 
 def refuse_masked(function: str, argument: str, value: Any) -> None:
-    """TypeError if numbers of `value` are masked: NumPy would take what is behind the mask."""
+    """TypeError if numbers of `value` are masked: NumPy would use the values behind the mask."""
     count = _count_masked(value)
     if count:
         what = "is a masked array" if isinstance(value, np.ndarray) else "holds masked arrays"
         raise TypeError(f"{function}: {argument} {what}, and {count} of its numbers are masked; "
-                        f"put numbers there first, by filled()")
+                        f"fill them first, with filled()")
 
 
 def plain(function: str, argument: str, value: Any) -> np.ndarray:

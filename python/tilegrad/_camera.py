@@ -42,16 +42,16 @@ class Camera(Packed):
     rotation: (3, 3) or (N, 3, 3), orthonormal; its rows are the camera's axes in the world.
     translation: (3,) or (N, 3), world units.
     fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, not 0, and principal point.
-    near_plane: number or (N,), > 0, world units; what is nearer is cut away.
+    near_plane: number or (N,), > 0, world units; nearer geometry is clipped.
     size: (width, height) of the images that fx, fy, cx, cy are for, pixels; None: not known.
-        Noted by constructors that are told width and height, and by readers of files. An image of
-        another size is an error wherever it is known; `resize` makes the camera of that size.
+        Set by constructors that take width and height, and by readers of files. If it is known,
+        rendering at another size is an error; `resize` makes the camera of that size.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
     for what is not an array of these shapes; render refuses numbers that are not finite, focal
     lengths of 0, and near planes that are not above 0.
 
-    That `rotation` is one is not checked: any matrix is applied as it stands. A mirror (determinant
+    `rotation` is not checked; any matrix is applied as is. A mirror (determinant
     -1, or one negative focal length) shows the mirror image, and its front faces are back faces here; with scale or shear
     specular light takes -rotation.T @ translation for the place of the eye, which it then is not.
     Camera.from_... and files.save_cameras refuse such matrices.
@@ -127,11 +127,11 @@ class Camera(Packed):
     @classmethod
     def framing(cls, mesh: Any, *, azimuth=60, elevation=20, fov_y: float = _core.FOV_Y,
                 margin: float = 0.05, width: int = 512, height: int = 512) -> "Camera":
-        """From that side, as near as all of the mesh is in the picture.
+        """From that direction, at the smallest distance that shows the whole mesh.
 
         mesh: what `tilegrad.meshes.as_mesh` takes, or points (V, 3). azimuth, elevation: degrees;
-            numbers or (N,); azimuth 90 sees the side towards +z.
-        margin: share of the picture that stays free on each side, [0, 0.5).
+            numbers or (N,); azimuth 90 looks at the +z side.
+        margin: margin on each side, as a fraction of the image, [0, 0.5).
         """
         function = "Camera.framing"
         margin = _arrays.as_number(function, "margin", margin, float)

@@ -30,8 +30,8 @@ def check_dense(function: str, argument: str, tensor: torch.Tensor) -> None:
 
 
 def full_precision(function: Function) -> Function:
-    """The function in torch.autocast as outside of it: in float32, whatever half of it its tensors
-    are, alone or in lists. bfloat16 has eight binary digits, and an image of 512 pixels has nine."""
+    """Makes a function ignore torch.autocast: half-precision tensors, alone or in lists, become
+    float32. bfloat16 has eight binary digits; a position in an image of 512 pixels needs nine."""
     @functools.wraps(function)
     def full(*arguments: Any, **named: Any) -> Any:
         if not _in_autocast():
@@ -68,8 +68,8 @@ Gradients = tuple[Optional[torch.Tensor], ...]
 
 
 def first_derivative_only(backward: Callable[..., Any]) -> Callable[..., Any]:
-    """For the `backward` of an autograd.Function, which has saved its inputs: whoever differentiates
-    the gradients once more gets a RuntimeError.
+    """For the `backward` of an autograd.Function that saved its inputs: differentiating the
+    gradients again raises a RuntimeError.
 
     torch's once_differentiable raises where backward() passes. What asks for gradients of some
     inputs (functional.jvp, functional.hessian) does not find its node, and says 0.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of indices, which rarely change and often come in another whole type than int32."""
+"""Arrays of indices, which rarely change and often have another integer type than int32."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _copies: dict[int, tuple[Any, Any]] = {}  # of arrays by id: who it is, and its 
 
 def as_indices(function: str, argument: str, value: Any, shape: Sequence[_arrays.Axis],
                sizes: Optional[_arrays.Sizes] = None) -> np.ndarray:
-    """As `as_array` of int32. An array that has to be copied is copied once: where it comes again,
-    with the numbers that it had, the copy of before serves."""
+    """As `as_array` of int32. An array that must be copied is copied once; the copy is reused while
+    the array keeps its values."""
     if isinstance(value, _arrays.NUMBERS):
         return _arrays.as_array(function, argument, value, np.int32, shape, sizes)
     array = value if type(value) is np.ndarray else _arrays.foreign(function, argument, value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mesh lit as people expect it to be."""
+"""A mesh with default lighting."""
 
 from __future__ import annotations
 

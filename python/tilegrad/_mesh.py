@@ -26,9 +26,9 @@ class Material:
 
     base_color: r, g, b, a, 0 to 1; multiplies the texture. texture: index into Mesh.textures, -1:
     none. wrap: "repeat", "mirror" or "clamp"; "repeat clamp" and the like: one way along u, another
-    along v. nearest: texels as squares. alpha_mode: "opaque", "mask" (not there where alpha is less
-    than alpha_cutoff) or "blend"; `scene` draws all three opaque. double_sided: False: viewers do not draw back faces. unlit: the colour is
-    shown as it is, whatever the light.
+    along v. nearest: texels as squares. alpha_mode: "opaque", "mask" (cut out where alpha is below
+    alpha_cutoff) or "blend"; `scene` draws all three opaque. double_sided: False: viewers do not
+    draw back faces. unlit: the colour ignores the light.
     """
 
     name: str = ""
@@ -111,7 +111,7 @@ class Mesh:
         texture. corner_normals: (F, 3, 3) float32. corner_colors: (F, 3, 4) or (F, 3, 3) float32,
         instead of colors.
     face_materials: (F,) int32, indices into materials; all 0 if None.
-    warnings: what a file lacked, and what stands in for it. cameras: those of a glTF file.
+    warnings: what a file lacked, and its substitute. cameras: those of a glTF file.
     tables: the lists of an OBJ file that corner_uvs and corner_normals were looked up in; nothing
         follows changes to them.
     origin: (3,) float64: what was subtracted from the file's coordinates, because they are too far
@@ -135,7 +135,7 @@ class Mesh:
 
     def scene_arguments(self, *, color_space: str = "srgb",
                         normals: str = "auto") -> dict[str, Any]:
-        """What a `Scene` has to be told beside positions, faces, camera and light, by argument:
+        """The arguments of a `Scene` other than positions, faces, camera and light:
         colours, uvs, textures, surfaces, normals.
 
         color_space: "srgb": colours are the numbers of the file, as training takes them; "linear":
@@ -189,7 +189,7 @@ class Mesh:
         return mesh
 
     def _repr_png_(self) -> bytes:
-        """What notebooks show."""
+        """The display in notebooks."""
         camera = Camera.framing(self)
         return lit(self, camera, camera.size)._repr_png_()
 
@@ -245,7 +245,7 @@ class Mesh:
 
 
 def mesh_of_dict(arrays: dict[str, Any]) -> Mesh:
-    """From the form in which C++ hands meshes over."""
+    """From the dictionary that C++ returns."""
     parts = dict(arrays)
     parts["materials"] = [Material(**material) for material in arrays["materials"]]
     parts["textures"] = [MeshTexture(**texture) for texture in arrays["textures"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colours that are bytes, where numbers from 0 to 1 are meant."""
+"""Detects colours in bytes where 0 to 1 is expected."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tilegrad import _arrays
 
 
 def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
-    """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
-    be 255 times too bright, and nothing would say so."""
+    """TypeError if `value` is of bytes where 0 to 1 is expected: the result would silently be 255
+    times too bright."""
     array = value if type(value) is np.ndarray else _arrays.foreign(function, argument, value)
     if array.dtype == np.uint8:
         raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
@@ -21,14 +21,14 @@ def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
 
 
 def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
-    """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is meant: most of
-    those that are not black are above 1. Highlights may be; some 4096 numbers are looked at."""
+    """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is expected: most
+    of those that are not black exceed 1. Highlights may. About 4096 numbers are checked."""
     sample = np.ravel(array)[::max(1, array.size // 4096)]
     colored = sample[sample > 0]
     if colored.size == 0 or not 2 < colored.max() <= 255 or np.mean(colored > 1) <= 0.5:
         return
-    warnings.warn(f"{function}: {argument} has numbers up to {colored.max():g}, where 0 to 1 is "
-                  f"meant: divide by 255 if they are bytes", RuntimeWarning, stacklevel=5)
+    warnings.warn(f"{function}: {argument} has numbers up to {colored.max():g}, expected 0 "
+                  f"to 1: divide by 255 if they are bytes", RuntimeWarning, stacklevel=5)
 
 
 def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[_arrays.Axis],

@@ -77,7 +77,7 @@ class Packed:
         parts = {name: getattr(self, name) for name in self._names()}
         unknown = sorted(set(changes) - set(parts))
         if unknown:
-            raise TypeError(f"{type(self).__name__}.replace: no part is called {unknown[0]!r}")
+            raise TypeError(f"{type(self).__name__}.replace: no part {unknown[0]!r}")
         return type(self)(**{**parts, **changes})
 
     @classmethod
@@ -86,12 +86,12 @@ class Packed:
 
     def __len__(self) -> int:
         if self.numbers.ndim < 2:
-            raise TypeError(f"{type(self).__name__}: a single one has no length")
+            raise TypeError(f"{type(self).__name__}: a single record has no length")
         return len(self.numbers)
 
     def __getitem__(self: Record, index: Any) -> Record:
         if self.numbers.ndim < 2:
-            raise TypeError(f"{type(self).__name__}: a single one cannot be indexed")
+            raise TypeError(f"{type(self).__name__}: a single record cannot be indexed")
         return type(self).of_numbers(self.numbers[index])
 
     def __repr__(self) -> str:
@@ -110,7 +110,7 @@ def stacked(function: str, argument: str, value: Any, kind: type) -> np.ndarray:
                         f"got {type(value).__name__}")
     shapes = sorted({record.numbers.shape[:-1] for record in records})
     if not shapes:
-        raise ValueError(f"{function}: {argument} is an empty sequence; None stands for none")
+        raise ValueError(f"{function}: {argument} is an empty sequence; give None instead")
     if len(shapes) > 1:
         raise ValueError(f"{function}: {argument} has records of leading axes {shapes[0]} and "
                          f"{shapes[1]}: they must be alike")

@@ -15,7 +15,7 @@ def name_of(path: Path) -> str:
     try:
         if b"\0" not in os.fsencode(name):
             return name
-    except UnicodeEncodeError:  # half of a pair of surrogates
+    except UnicodeEncodeError:  # an unpaired surrogate
         pass
     raise ValueError(f"{name!r} cannot be the name of a file")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames as pictures for people: in files, and in notebooks."""
+"""Frames as images in files and notebooks."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tilegrad import _arrays
 
 
 class Pictured:
-    """What a Frame has for people."""
+    """Display and export of a Frame."""
 
     __slots__ = ()
     background: Optional[Sequence[float]]  # r, g, b that pictures are drawn over; unset: none
 
     def picture(self, index: int = 0) -> np.ndarray:
-        """An image for people: (H, W, 4) uint8, transparent, or over `background` if that is
+        """An image for display: (H, W, 4) uint8, transparent, or over `background` if that is
         set."""
         return pixels_of(self, index, getattr(self, "background", None))
 
@@ -30,7 +30,7 @@ class Pictured:
         save_image(path, self.picture(index))
 
     def _repr_png_(self) -> bytes:
-        """What notebooks show: up to eight images side by side."""
+        """The display in notebooks: up to eight images side by side."""
         return _encoded(np.hstack([self.picture(i) for i in range(min(len(self), 8))]))
 
 

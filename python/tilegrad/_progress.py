@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a run is, and the line that shows it to whoever watches."""
+"""The progress of a run, and the line that displays it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _COLUMNS, _NOTEBOOK_COLUMNS = 80, 100
 
 @dataclasses.dataclass(frozen=True)
 class Progress:
-    """Where a run is: steps that are done, of how many; `values` are those that were logged last,
-    by name ("loss", "silhouette", ...; "seconds"). stage: "fitting", "training", or what comes
-    before and after these; its steps are of its own kind, 0 of 0 where their number is not known,
-    and values is empty."""
+    """The progress of a run: steps done and their total; `values` holds the last logged values by
+    name ("loss", "silhouette", ...; "seconds"). stage: "fitting", "training", or a
+    stage before or after these; such a stage counts its own steps, 0 of 0 if their number is
+    unknown, and values is empty."""
 
     step: int
     steps: int
@@ -27,8 +27,7 @@ class Progress:
 
 
 class ProgressLine:
-    """A callback that shows the stage of a run, how much of it is done, how long the rest takes and
-    the loss, in one line that it rewrites."""
+    """A callback that shows stage, progress, remaining time and loss of a run on one line."""
 
     stages = True
 
@@ -87,7 +86,7 @@ class ProgressLine:
 
 
 def watched_line() -> Optional[ProgressLine]:
-    """For a terminal or a notebook; None where nobody watches."""
+    """For a terminal or a notebook; None elsewhere."""
     if _in_notebook():
         return ProgressLine(sys.stdout, _NOTEBOOK_COLUMNS)
     try:

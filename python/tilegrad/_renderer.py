@@ -74,8 +74,8 @@ class Image:
 class Frame(Pictured):
     """The images of N scenes, row 0 on top, and what backward needs.
 
-    Images are read-only views of the renderer's memory, which they keep alive: copy what you want
-    to change, or to keep for long while the frame may go.
+    Images are read-only views of the renderer's memory, which they keep alive. Copy them to modify
+    them or to keep them longer than the frame.
     """
 
     __slots__ = ("_frame", "_scenes", "_single", "_outputs", "_views", "background")
@@ -108,7 +108,7 @@ class Frame(Pictured):
 
     @property
     def scenes(self) -> tuple[Scene, ...]:
-        """What was rendered."""
+        """The rendered scene or scenes."""
         return self._scenes
 
     @property
@@ -144,9 +144,9 @@ class Frame(Pictured):
 
 
 class Gradients:
-    """dL/d(scene): for each name that was asked for, an array of the shape of the scene's own, or
+    """dL/d(scene): for each requested name, an array of the shape of the scene's own, or
     for camera, surfaces and lights a Camera, Surface and Light of such arrays; for textures a list.
-    What images share got the sum over images.
+    Shared arrays receive the sum over images.
     """
 
     __slots__ = ("_arrays",)
@@ -158,12 +158,12 @@ class Gradients:
         if name not in DIFFERENTIABLE:
             raise AttributeError(f"Gradients have no {name!r}")
         if name not in self._arrays:
-            raise AttributeError(f"{name} was not asked for: wrt={tuple(self._arrays)!r}")
+            raise AttributeError(f"{name} was not requested: wrt={tuple(self._arrays)!r}")
         value = self._arrays[name]
         return RECORDS[name].of_numbers(value) if name in RECORDS else value
 
     def __iter__(self) -> Iterator[str]:
-        """The names that were asked for."""
+        """The requested names."""
         return iter(self._arrays)
 
     def __dir__(self) -> list[str]:
@@ -177,11 +177,11 @@ class Renderer:
     """Renders scenes, and their gradients.
 
     Owns threads, which start with the first call, and memory, which is reused: keep a renderer. The
-    same input gives the same bits for any number of threads. Calls from several Python threads wait
-    for each other; renderers do not. After a fork a renderer goes on in both processes.
+    same input gives the same bits for any number of threads. Calls of one renderer from several
+    Python threads run one at a time. After a fork a renderer works in both processes.
 
     threads: 1 to 1024; 1: only the caller's; 0: as many as TILEGRAD_THREADS in the environment
-        says, or one for each core. Fewer, with a RuntimeWarning, where the system refuses some.
+        says, or one for each core. Fewer, with a RuntimeWarning, if the system refuses some.
     """
 
     __slots__ = ("_renderer", "__weakref__")
@@ -191,7 +191,7 @@ class Renderer:
 
     @property
     def threads(self) -> int:
-        """How many threads were asked for; 0: one for each core."""
+        """The requested number of threads; 0: one for each core."""
         return self._renderer.threads
 
     def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: Optional[int] = None,
@@ -204,8 +204,8 @@ class Renderer:
 
         width, height: pixels, 1 to 16384, of all images; None: what the cameras are for
             (`Camera.size`), or 64 where they do not say.
-        outputs: which images are wanted, of "color", "alpha", "attributes", "depth", "normals",
-            "uv", "barycentrics"; what is not wanted is not computed. face_ids are always there.
+        outputs: the images to compute, of "color", "alpha", "attributes", "depth", "normals",
+            "uv", "barycentrics"; others are not computed. face_ids are always computed.
         delta: > 0, how soft silhouettes are: alpha = 1 - prod over faces (1 - exp(-d^2 / delta))
             with d the distance to the face in NDC, in which the image spans [-1, 1] in each axis.
         max_alpha_error: [0, 1], of alpha, absolute: larger is faster, 0 drops nothing.
@@ -241,8 +241,8 @@ class Renderer:
 
         color, alpha, attributes, depth, normals, uv: dL/d(image), in the image's shape and dtype;
             None is zero. The image must have been rendered. depth: background pixels are not read.
-        wrt: which gradients are wanted: names of the Scene's arguments that are real numbers
-            ("positions", "camera", "colors", ...); what is not wanted is not computed. Default:
+        wrt: the gradients to compute: names of the Scene's arguments that are real numbers
+            ("positions", "camera", "colors", ...); others are not computed. Default:
             those of `out`, or positions.
         out: what an earlier backward of such scenes returned, to be overwritten.
         accumulate: add to `out` instead.

@@ -97,7 +97,7 @@ class Texture:
 
     texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image, 0 to 1; row 0 on top;
         (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
-    wrap: "repeat", "clamp" (the border goes on) or "mirror"; "repeat clamp" and the like: one way
+    wrap: "repeat", "clamp" (the border extends) or "mirror"; "repeat clamp" and the like: one way
         along u, another along v.
     filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid).
     """
@@ -135,8 +135,8 @@ class Scene:
     lighting: "none" (colours as they are), "lambert", "phong" or "spherical_harmonics".
     normals: "smooth" (of vertices, from positions), "flat" (of faces), or an array (V, 3) of any
         length.
-    two_sided: whether normals of faces that are seen from behind are turned.
-    clamp: whether colours are cut to [0, 1]; what is beyond has no gradient.
+    two_sided: whether to flip normals of faces seen from behind.
+    clamp: whether to clamp colours to [0, 1]; clamped values have no gradient.
     lights: Light or a list of them, for Lambert and Phong lighting.
     light_directions: (V, 3), one light of intensity 1 for each vertex, instead of `lights`.
     sh: (9,), orthonormal real spherical harmonics 1, -y, z, -x, xy, -yz, 3z^2-1, -xz, x^2-y^2.
@@ -287,7 +287,7 @@ class Scene:
         None leaves per_corner, too."""
         unknown = sorted(set(changes) - set(self._arguments))
         if unknown:
-            raise TypeError(f"Scene.replace: no argument is called {unknown[0]!r}")
+            raise TypeError(f"Scene.replace: no argument {unknown[0]!r}")
         return Scene(**changed(self._arguments, changes))
 
     def __reduce__(self) -> tuple:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Built-in shapes, to try things on."""
+"""Built-in shapes for examples and tests."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many threads work."""
+"""The number of threads."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ class Call:
 
     def gradients(self, frame: Frame, wanted: Sequence[bool],
                   cotangents: dict[str, Any]) -> list[Optional[torch.Tensor]]:
-        """dL/d(tensor) in the order of the tensors; None for those that are not wanted."""
+        """dL/d(tensor) in the order of the tensors; None if not requested."""
         names = tuple(dict.fromkeys(place.name for place, want in zip(self.places, wanted) if want))
         found = self._engine().backward(frame, wrt=names, **cotangents)
         return [self._gradient(found[place.scene], place) if want else None

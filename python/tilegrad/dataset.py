@@ -29,7 +29,7 @@ _SPLITS = ("train", "validation", "test")
 
 @dataclasses.dataclass(frozen=True)
 class ModelInfo:
-    """What is known of a model beside its images. source_faces: triangles of its original."""
+    """Metadata of a model. source_faces: triangles of its original."""
 
     id: str
     name: str
@@ -48,7 +48,7 @@ def _counting(function: str, argument: str, value: int) -> int:
 
 
 class Truth:
-    """What evaluation compares with. occupancy: (32, 32, 32) bool as [x, y, z]; points: (2500, 3)
+    """The ground truth of a model. occupancy: (32, 32, 32) bool as [x, y, z]; points: (2500, 3)
     float32 on the surface, largest half-extent 0.45; mesh: with colours, at most 5,000 faces. The
     last two are empty and None where the source has no meshes."""
 

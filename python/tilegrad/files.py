@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files: everything that tilegrad reads and writes, in one place.
+"""Everything that tilegrad reads and writes.
 
     from tilegrad import files
 

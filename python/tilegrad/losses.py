@@ -35,8 +35,8 @@ class PairLoss(NamedTuple):
 
 
 def edge_length(positions: Any, faces: Any) -> Any:
-    """How unequal edges are: n sum l^2 / (sum l)^2 - 1, 0 where all are equal; the size of the mesh
-    does not matter. positions: (V, 3). faces: (F, 3) whole numbers."""
+    """Inequality of edge lengths: n sum l^2 / (sum l)^2 - 1, 0 where all are equal; independent of the
+    mesh's size. positions: (V, 3). faces: (F, 3) whole numbers."""
     return _of_mesh("edge_length", positions, faces)
 
 
@@ -144,7 +144,7 @@ def _on_tape(compute: Callable[..., tuple], *inputs: Any) -> Any:
         def forward(context, *values):
             context.save_for_backward(*values)
             if any(value.device.type != "cpu" for value in values):
-                raise TypeError("tilegrad.losses: tensors must be of the CPU")
+                raise TypeError("tilegrad.losses: tensors must be on the CPU")
             value, *gradients = compute(*(np.ascontiguousarray(v.detach().numpy())
                                           for v in values))
             context.gradients = [torch.from_numpy(gradient) for gradient in gradients]

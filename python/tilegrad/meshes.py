@@ -24,7 +24,7 @@ def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
     """Reads a mesh: glTF and GLB with materials and textures, OBJ with MTL, PLY, OFF, STL, AC3D,
     3DS, Collada, FBX and others (`mesh_endings`). All parts are merged, polygons split.
 
-    max_bytes: the most that it may take in memory with all files that it names; None: what the
+    max_bytes: memory limit of the file and all files that it references; None: what the
     environment's TILEGRAD_READ_LIMIT says, or else 4 GiB.
     OSError, ValueError: name the file, the place in it and what to do. A missing texture is a
     warning of the mesh.

@@ -21,9 +21,9 @@ from tilegrad._mesh import Mesh, mesh_of_dict
 
 
 class Predictor:
-    """A trained network. Does what `tilegrad predict` does, to the bit.
+    """A trained network. Gives the same results as `tilegrad predict`, bit for bit.
 
-    Calls from several Python threads wait for each other. Can be pickled (as its path); in a forked
+    Calls from several Python threads run one at a time. Can be pickled (as its path); in a forked
     process it is loaded again at the first call, with one thread.
 
     path: a run folder, whose newest whole checkpoint is taken, or one checkpoint.
@@ -67,7 +67,7 @@ class Predictor:
 
         image: (H, W, 4), an object cut out by its alpha; or any picture with a mask. uint8, or real
             numbers from 0 to 1. mask: (H, W), white is the object.
-        keep_framing: only resize: the picture is framed like a training image already. Otherwise
+        keep_framing: only resize: the picture is already framed like the training images. Otherwise
             the object is moved to the middle and scaled as training images show theirs.
         ValueError: no alpha and no mask, nothing or everything opaque, sizes that differ.
         """
@@ -79,8 +79,8 @@ class Predictor:
         """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
         half-extent is 0.45, its middle the origin.
 
-        refine: steps of gradient descent that move the prediction onto the picture, 0 to 100,000; 0
-            is the network alone, with the faces of the template."""
+        refine: gradient-descent steps that refine the prediction on the picture, 0 to 100,000;
+            0: the network's output, with the faces of the template."""
         if not 0 <= refine <= 100_000:
             raise ValueError(f"predict: refine is {refine}, must be in 0..100000")
         pixels, cutout = self._pixels(image, mask)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits and trainings from Python: `tilegrad.fit`, `tilegrad.train`. They do what the commands of that
-name do, to the bit, and leave the same folders."""
+"""Fits and trainings from Python: `tilegrad.fit`, `tilegrad.train`. They match the commands of that
+name bit for bit and write the same folders."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Callback = Callable[[Progress], Optional[bool]]  # True stops; everything is sav
 
 @dataclasses.dataclass(frozen=True)
 class FitResult:
-    """What `fit` has made. training, held_out: {"views", "psnr" (dB), "silhouette_iou"} or None;
+    """The result of `fit`. training, held_out: {"views", "psnr" (dB), "silhouette_iou"} or None;
     voxel_iou: at 32 voxels a side where a truth was given. finished: False if a callback stopped
-    it: mesh is None then, and resume=True goes on. folder: of the run, or None if it was not kept.
+    it: mesh is then None, and resume=True continues. folder: of the run; None if temporary.
     """
 
     mesh: Optional[Mesh]
@@ -52,8 +52,8 @@ class FitResult:
 
 @dataclasses.dataclass(frozen=True)
 class TrainResult:
-    """What `train` has made: its folder, and how far it came. finished: False if a callback or
-    max_minutes stopped it; resume=True goes on."""
+    """The result of `train`: its folder and progress. finished: False if a callback or
+    max_minutes stopped it; resume=True continues."""
 
     folder: pathlib.Path
     finished: bool
@@ -74,38 +74,39 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
         threads: int = 0, **options: Any) -> FitResult:
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
-    images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or before a plain background;
+    images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or on a plain background;
         uint8, or real numbers 0 to 1. Or a folder, as of the command: with transforms.json, of
         COLMAP, of pictures alone, or a dataset with `model` "CLASS/ID".
     cameras: a Camera of N views, in pixels of the images. None: the folder's, or if it has none,
-        cameras are found in the images, which see `fov` degrees along their longer side.
+        cameras are estimated from the images, whose longer side spans `fov` degrees.
     masks: (N, H, W), white is the object.
-    background: where masks come from: "mask", alpha and masks; "plain", plain backgrounds; "auto",
-        the former if there are any; "none": every pixel shows the object.
-    up: "y", "z" or "x", the axis of the cameras' world that points up: the mesh is turned to have y
-        up, as glTF. "": of a folder what its cameras make plain, else y.
-    find_cameras: looks for the cameras in the images, though there are some.
-    hold_out: every hold_out-th image is not fitted but judged by; 0: none.
-    start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
+    background: source of the masks: "mask", alpha and masks; "plain", plain backgrounds; "auto",
+        "mask" if available, else "plain"; "none", the object fills the image.
+    up: "y", "z" or "x", the up axis of the camera coordinates; the mesh is rotated to y up, as in
+        glTF. "": for a folder detected from its cameras, else y.
+    find_cameras: estimates the cameras even if some are given.
+    hold_out: every hold_out-th image is held out for evaluation; 0: none.
+    start: the initial mesh; truth: the ground truth to score against; what `as_mesh` takes.
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
         and texture, or the colours that `start` has. lighting: as of `Scene`.
-    material: "unlit"; "lambert" and "phong" learn the light beside the colours.
+    material: "unlit"; "lambert" and "phong" fit a light as well as the colours.
     quality: "fast", "normal" or "best": 300, 1000 or 3000 steps, unless `steps` says how many.
-    out: the run's folder; None: one that goes away. resume: goes on in it; with more steps in a
-        finished fit, too.
-    callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
-        the fit and goes on. One with an attribute `stages` that is true is told of everything that
-        takes time, reading and preparing included. None: on a terminal and in a notebook a line
-        says where the fit is.
+    out: the run's folder; None: a temporary one. resume: continues the fit in it; more steps
+        extend a finished fit.
+    callback: called with each logged step (see `Progress`); returns True to stop. Its exceptions
+        end the fit and propagate. If its attribute `stages` is true, it is also called during
+        reading, preparation and other stages. None: a progress line on a terminal and in a
+        notebook.
     options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
-    Warns of masks and cameras that are in doubt.
-    ValueError, OSError: say what does not fit. KeyboardInterrupt: Ctrl-C; everything is saved.
+    Warns about doubtful masks and cameras.
+    ValueError, OSError: name the faulty argument or file. KeyboardInterrupt: Ctrl-C; all is
+        saved.
     """
     views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
              "find_cameras": bool(find_cameras), "fov": _degrees("fov", fov),
              **_texts(background=background, up=up), **_pictures(images, cameras, masks, model)}
     if quality and "steps" in options:
-        raise ValueError("fit: quality and steps both say how many steps; give one of them")
+        raise ValueError("fit: quality and steps both set the number of steps; give one of them")
     request = {"options": _words(options), "start": _mesh_dict(start), "truth": _mesh_dict(truth),
                "optimize": [_arrays.as_text("fit", "optimize", name) for name in optimize],
                **_texts(lighting=lighting, material=material, quality=quality),
@@ -120,7 +121,7 @@ def train(config: Path = "quick", *, data: Path, out: Path,
           set: Optional[Mapping[str, Any]] = None,  # pylint: disable=redefined-builtin
           resume: bool = False, max_minutes: float = 0, callback: Optional[Callback] = None,
           threads: int = 0) -> TrainResult:
-    """Trains what a configuration names on a dataset.
+    """Trains the network of a configuration on a dataset.
 
     config: a name (`config_names`) or a TOML file. data: a dataset's folder. out: the run's.
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
@@ -136,7 +137,7 @@ def train(config: Path = "quick", *, data: Path, out: Path,
 
 
 def config_names() -> list[str]:
-    """The configurations that `train` knows by name."""
+    """Names of the built-in configurations."""
     return _tools.config_names()
 
 

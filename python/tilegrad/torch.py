@@ -31,8 +31,8 @@ _CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
 
 
 class Images(NamedTuple):
-    """What a render gives, as `tilegrad.Frame` has it; None for what was not asked for. Their
-    memory is the renderer's: a change in place before backward is an error that torch finds."""
+    """What a render gives, as `tilegrad.Frame` has it; None if not requested. Their
+    memory is the renderer's; torch reports an in-place change before backward as an error."""
 
     color: Optional[torch.Tensor] = None
     alpha: Optional[torch.Tensor] = None
@@ -54,7 +54,7 @@ def render(positions: Union[torch.Tensor, Sequence[torch.Tensor]], faces: Array,
         converted. faces: (F, 3) whole numbers.
     camera: a Camera, or a tensor ([N,] 17) of `camera`. Images of another size than a Camera is
         for are an error; the numbers in a tensor are for an image of width and height.
-    width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always there.
+    width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always computed.
     threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_THREADS says, or as many as torch uses:
         one in a worker of a DataLoader.
     surface_textures: the texture of each surface, -1: none, where `surfaces` is a tensor.

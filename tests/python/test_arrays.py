@@ -106,11 +106,11 @@ class Refused(unittest.TestCase):
         positions[1:] = 1
         for dtype in (np.float32, np.float64):
             self.expect(TypeError, "render: positions is a masked array, and 3 of its numbers are "
-                        "masked; put numbers there first, by filled()", positions, dtype)
+                        "masked; fill them first, with filled()", positions, dtype)
         row = np.ma.masked_array([0.0, 1.0, 2.0], mask=[False, True, False])
         for rows in ([row, row], (row.filled(0), row, [1.0, np.ma.masked, 2.0])):
             self.expect(TypeError, "render: positions holds masked arrays, and 2 of its numbers "
-                        "are masked; put numbers there first, by filled()", rows, np.float32)
+                        "are masked; fill them first, with filled()", rows, np.float32)
         endless = []
         endless.append(endless)
         with self.assertRaisesRegex(TypeError, "^render: positions is not an array of numbers"):

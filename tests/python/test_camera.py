@@ -186,8 +186,8 @@ class Errors(unittest.TestCase):
         self.expect(ValueError, "^Camera.orbit: .*distance", lambda: Camera.orbit(0, 0, 0, **SIZE))
         self.expect(ValueError, "^Camera.to_kaolin: ",
                     lambda: EXPECTED.replace(cx=3).to_kaolin(**SIZE))
-        self.expect(TypeError, "^Camera.replace: no part is called 'focal'",
+        self.expect(TypeError, "^Camera.replace: no part 'focal'",
                     lambda: EXPECTED.replace(focal=3))
-        self.expect(TypeError, "^Camera: a single one has no length", lambda: len(EXPECTED))
+        self.expect(TypeError, "^Camera: a single record has no length", lambda: len(EXPECTED))
         self.expect(TypeError, "^Camera.look_at: width must be int",
                     lambda: Camera.look_at((0, 0, 1), width=3.5, height=2))

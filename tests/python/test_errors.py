@@ -58,8 +58,8 @@ class Errors(unittest.TestCase):
              "'attributes'", {"per_corner": "uv"}),
             (ValueError, "Scene: textures[0] has shape (5, 3), expected (Ht, Wt, 3) or "
              "(N, Ht, Wt, 3)", {"textures": np.zeros((5, 3), np.float32)}),
-            (TypeError, "Scene.replace: no argument is called 'colour'", {"colour": 1}),
-            (ValueError, "Scene: lights is an empty sequence; None stands for none",
+            (TypeError, "Scene.replace: no argument 'colour'", {"colour": 1}),
+            (ValueError, "Scene: lights is an empty sequence; give None instead",
              {"lights": []}),
             (ValueError, "Scene: lights has records of leading axes () and (2,): they must be "
              "alike", {"lights": [Light(), Light(intensity=[1, 2])]}),

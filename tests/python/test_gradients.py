@@ -89,7 +89,7 @@ class Gradients(unittest.TestCase):
         frame = renderer.render(patch(), **IMAGE)
         got = renderer.backward(frame, alpha=np.ones_like(frame.alpha))
         self.assertEqual(list(got), ["positions"])
-        with self.assertRaisesRegex(AttributeError, "colors was not asked for"):
+        with self.assertRaisesRegex(AttributeError, "colors was not requested"):
             got.colors
         self.assertEqual(renderer.backward(frame, alpha=frame.alpha, wrt="uvs").uvs.shape,
                          (18, 3, 2))

@@ -217,7 +217,7 @@ class SurfaceMeshes(unittest.TestCase):
         self.assertEqual((len(both), tuple(both.face_uvs.shape)), (2, (2, 2, 3, 2)))
         self.assertTrue(torch.equal(both.face_uvs[1], alone["face_uvs"] / 2))
         self.assertIsNone(both.materials)
-        with self.assertRaisesRegex(ValueError, "2 meshes are not one"):
+        with self.assertRaisesRegex(ValueError, "2 meshes cannot become one"):
             both.set_batching(both.Batching.NONE)
         self.assertTrue(torch.equal(mesh.set_batching(mesh.Batching.NONE).face_uvs,
                                     alone["face_uvs"]))
@@ -241,7 +241,7 @@ class SurfaceMeshes(unittest.TestCase):
             getattr(self.mesh(), "no_such")
         with self.assertRaisesRegex(AttributeError, "no member 'no_such'"):
             self.mesh().no_such = 1
-        self.assertRaisesRegex(TypeError, "no member is called 'no_such'", self.mesh, no_such=1)
+        self.assertRaisesRegex(TypeError, "no member 'no_such'", self.mesh, no_such=1)
 
 
 class TriangleMeshes(FileTest):

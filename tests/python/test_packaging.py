@@ -123,7 +123,7 @@ for line in ("import tilegrad.files", "from tilegrad import files", "import tile
         print(error)
 """
         said = self.run_python("-c", code, PYTHONPATH=str(folder)).splitlines()
-        self.assertEqual(said, ["this build of tilegrad is the renderer alone "
+        self.assertEqual(said, ["this build of tilegrad has the renderer only "
                                 "(TILEGRAD_PROGRAM=OFF)"] * 3)
 
     def test_the_command(self):

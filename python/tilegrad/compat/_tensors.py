@@ -52,7 +52,7 @@ def check_up(function: str, up: torch.Tensor, backward: torch.Tensor) -> None:
     lost = (across <= 1e-6 * up.detach().norm(dim=-1)).nonzero()
     if len(lost):
         raise ValueError(f"{function}: camera {int(lost[0])}: up is 0 or along the view, or the "
-                         "camera is where it looks; give another up")
+                         "camera coincides with its target; give another up")
 
 
 def to_numpy(tensor: torch.Tensor) -> np.ndarray:

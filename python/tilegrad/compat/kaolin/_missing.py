@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a module answers when asked for a name that it lacks."""
+"""The error of a module for a name that it lacks."""
 
 from __future__ import annotations
 

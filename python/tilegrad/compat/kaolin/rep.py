@@ -57,7 +57,7 @@ class SurfaceMesh:
                        vertex_normals=vertex_normals, **others)
         for name, value in members.items():
             if name not in _STORED:
-                raise TypeError(f"SurfaceMesh: no member is called {name!r}")
+                raise TypeError(f"SurfaceMesh: no member {name!r}")
             setattr(self, name, value)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -103,7 +103,7 @@ class SurfaceMesh:
         if batching == self.batching:
             return self
         if batching == self.Batching.NONE and len(self) != 1:
-            raise ValueError(f"SurfaceMesh.set_batching: {len(self)} meshes are not one")
+            raise ValueError(f"SurfaceMesh.set_batching: {len(self)} meshes cannot become one")
         self._apply((lambda v: v[0]) if batching == self.Batching.NONE else
                     (lambda v: v[None] if isinstance(v, torch.Tensor) else [v]))
         return self

@@ -57,7 +57,7 @@ def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: t
     """`color` with smooth silhouettes; through them the gradient of what is seen flows to pos.
 
     color: [N, H, W, C]. rast: [N, H, W, 4] of `rasterize`; pos and tri are what it was given.
-    topology_hash: of tri, so that it need not be made again. pos_gradient_boost: factor of the
+    topology_hash: of tri, to reuse it. pos_gradient_boost: factor of the
     gradient of pos.
 
     Vertices that triangles share must be the same index, or every edge is a silhouette. Returns

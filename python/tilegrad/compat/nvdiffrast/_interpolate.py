@@ -52,9 +52,9 @@ def interpolate(attr: torch.Tensor, rast: torch.Tensor, tri: torch.Tensor,
 
     attr: [N, V, A], [1, V, A] for all images, or [V, A] (range mode). rast: [N, H, W, 4] of
     `rasterize`, rast_db its second result. tri: [F, 3] int32. diff_attrs: the attributes whose
-    derivatives by X and Y are wanted, a list of numbers or 'all'; needs rast_db.
+    derivatives by X and Y are computed, a list of numbers or 'all'; needs rast_db.
 
-    Returns [N, H, W, A], zeros where nothing is seen, and [N, H, W, 2 D]: (dA/dX, dA/dY) of each
+    Returns [N, H, W, A], zeros at background pixels, and [N, H, W, 2 D]: (dA/dX, dA/dY) of each
     of the D attributes of diff_attrs, D = 0 without it. Gradients flow to attr, to u and v of rast,
     and to rast_db.
 

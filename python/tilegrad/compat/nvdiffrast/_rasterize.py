@@ -27,8 +27,8 @@ def get_log_level() -> int:
 
 
 def set_log_level(level: int) -> None:
-    """0 information, 1 warning, 2 error, 3 fatal. From 2 on, the warnings of this module are left
-    out."""
+    """0 information, 1 warning, 2 error, 3 fatal. From 2 on, this module does not
+    warn."""
     global _log_level
     if level not in (0, 1, 2, 3):
         raise ValueError(f"set_log_level: level is {level!r}, expected 0, 1, 2 or 3")
@@ -36,7 +36,7 @@ def set_log_level(level: int) -> None:
 
 
 class RasterizeCpuContext:
-    """Memory for `rasterize`, which a context reuses. One may serve several threads.
+    """Scratch memory for `rasterize`. Threads may share one context.
 
     device: None, or the CPU by any of torch's names.
     """
@@ -49,27 +49,27 @@ class RasterizeCpuContext:
 
 
 class _RenamedContext(RasterizeCpuContext):
-    """Code that asks for a context on the GPU gets one on the CPU, and is told so once."""
+    """Code that requests a GPU context gets a CPU context and one warning."""
 
     def __init__(self, device: Any = None) -> None:
         name = type(self).__name__
         if name not in _warned and _log_level <= _WARNING:
             _warned.add(name)
-            warnings.warn(f"{name} of tilegrad.compat.nvdiffrast renders on the CPU; tensors must "
-                          f"be there too. RasterizeCpuContext is its own name.", stacklevel=3)
+            warnings.warn(f"{name} of tilegrad.compat.nvdiffrast renders on the CPU and takes "
+                          f"CPU tensors; it is an alias of RasterizeCpuContext.", stacklevel=3)
         super().__init__(None)
 
 
 class RasterizeCudaContext(_RenamedContext):
-    """RasterizeCpuContext by the name that code for nvdiffrast uses; `device` is not looked at."""
+    """RasterizeCpuContext by nvdiffrast's name; `device` is ignored."""
 
     def __init__(self, device: Any = None) -> None:
         super().__init__(device)
 
 
 class RasterizeGLContext(_RenamedContext):
-    """RasterizeCpuContext by the name that older code for nvdiffrast uses. Its other arguments
-    chose how OpenGL works and are not looked at."""
+    """RasterizeCpuContext by nvdiffrast's older name. The other arguments chose how OpenGL works
+    and are ignored."""
 
     def __init__(self, output_db: bool = True, mode: str = "automatic", device: Any = None) -> None:
         super().__init__(device)
@@ -124,7 +124,7 @@ def rasterize(glctx: RasterizeCpuContext, pos: torch.Tensor, tri: torch.Tensor,
     flow to pos.
 
     Returns two images [N, height, width, 4], the bottom row first: (u, v, z/w, triangle id + 1),
-    zeros where nothing is seen, and (du/dX, du/dY, dv/dX, dv/dY) per pixel. u and v are the weights
+    zeros at background pixels, and (du/dX, du/dY, dv/dX, dv/dY) per pixel. u and v are the weights
     of the first and the second vertex. Gradients flow from u, v and the second image to x, y and w
     of pos.
 

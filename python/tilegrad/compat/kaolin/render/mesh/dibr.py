@@ -27,8 +27,8 @@ _exact_kaolin = False
 
 
 def use_exact_kaolin(on: bool = True) -> None:
-    """What exact_kaolin=None, the default, means from now on in the whole program: at first False.
-    For code that cannot be given the argument."""
+    """Sets what exact_kaolin=None, the default, means in the whole program; initially False. For
+    code that does not pass the argument."""
     global _exact_kaolin
     _exact_kaolin = bool(on)
 
@@ -66,7 +66,7 @@ def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.T
     face_vertices_image: [B,F,3,2] NDC. All faces take part.
     selected_face_idx: [B,H,W] integers, as `rasterize` returns them; -1 is background.
     sigmainv: > 0; larger is sharper.
-    boxlen, knum: ignored, which is said once, unless exact_kaolin is True: then Kaolin's
+    boxlen, knum: ignored, with one warning, unless exact_kaolin is True: then Kaolin's
         truncation is reproduced, with multiplier in its eps. None: as use_exact_kaolin says.
     max_alpha_error: how far the mask may be from the formula over all faces, in [0, 1]; None is
         1e-6 for float32 (plus rounding) and 1e-12 for float64. 0 leaves nothing out.
@@ -159,7 +159,7 @@ def _say_once_what_is_ignored() -> None:
     global _warned
     if not _warned:
         _warned = True
-        warnings.warn("tilegrad.compat.kaolin: boxlen and knum are ignored: the soft mask takes in "
+        warnings.warn("tilegrad.compat.kaolin: boxlen and knum are ignored: the soft mask covers "
                       "all faces, within max_alpha_error. exact_kaolin=True, or "
                       "use_exact_kaolin() for the whole program, gives Kaolin's truncated mask.",
                       UserWarning, stacklevel=5)
