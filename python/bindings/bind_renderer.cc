@@ -47,7 +47,7 @@ std::vector<const char*> ImageNames() {
   return out;
 }
 
-// Whether each of ImageNames is wanted.
+// Which of ImageNames are requested.
 Outputs OutputsOf(const std::vector<bool>& wanted) {
   Outputs out;
   std::size_t i = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fits and trainings, which call Python back as they go on.
+// Fits and training runs with callbacks into Python.
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 

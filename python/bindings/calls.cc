@@ -19,7 +19,7 @@ struct Block {
   void* data;
 };
 
-// Blocks that nobody uses, in the order they came back. Guarded by the GIL; never freed at the end
+// Free blocks, in the order they came back. Guarded by the GIL; never freed at the end
 // of the process, where arrays may outlive anything.
 std::vector<Block>* const kept = new std::vector<Block>;
 std::size_t kept_bytes = 0;
@@ -66,7 +66,7 @@ struct Pool {
   std::map<int, std::unique_ptr<Workers>> workers;
 };
 
-// Never ended: at the end of the process nobody waits for threads. A child of a fork has a pool of
+// Never ended: at exit, threads are not joined. A child of a fork has a pool of
 // its own, since the parent's may have been locked at that moment.
 Pool* the_pool = new Pool;
 [[maybe_unused]] const int renewed_in_children =

@@ -14,7 +14,7 @@
 namespace tilegrad::python {
 
 // A Python function that is told of progress, and may stop the work: by returning True, by an
-// exception, by Ctrl-C. Work runs on a thread of its own, without the GIL; the function is called
+// exception, by Ctrl-C. Work runs on a separate thread, without the GIL; the function is called
 // on the thread that called Run, which looks for Ctrl-C ten times a second, whatever the work does.
 class Listener {
  public:
@@ -36,7 +36,7 @@ class Listener {
   }
   const StopFlag& stop() const { return stop_; }
 
-  // After the work: what the function raised goes on; that it wanted to stop is no error.
+  // After the work: propagates the function's exception; its request to stop is no error.
   void Settle(const Status& status) const;
 
  private:
@@ -53,7 +53,7 @@ class Listener {
   std::mutex mutex_;
   std::condition_variable changed_;
   const Progress* news_ = nullptr;  // that the thread of the work waits with, until it is heard
-  bool apart_ = false;              // the work has a thread of its own
+  bool apart_ = false;              // the work has a separate thread
   bool done_ = false;
 };
 

@@ -48,8 +48,8 @@ class GradientRecord {
   std::vector<LightT<T>> lights_;
 };
 
-// Frames that nobody looks at any more, for the next render: the memory of images is not returned
-// to the system and asked for again, page by page. Used with the GIL held.
+// Unused frames for the next render, so that the memory of images is not returned to the system and
+// requested again, page by page. Used with the GIL held.
 template <class T>
 class FramePool {
  public:
@@ -64,7 +64,7 @@ class FramePool {
   }
 
  private:
-  static constexpr std::size_t kMost = 2;  // one that a loop overwrites, one that it looks at
+  static constexpr std::size_t kMost = 2;  // one that a loop overwrites, one that it reads
   std::vector<FrameT<T>> spare_;
 };
 

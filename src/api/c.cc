@@ -119,7 +119,7 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
   r->views.clear();
   for (std::size_t n = 0; n < count; ++n) {
     Status status = api::ReadEntry("d_scene", d_scenes, n, &r->wanted[n]);
-    if (status.ok()) status = api::CheckWanted(r->wanted[n], frame->views[n]);
+    if (status.ok()) status = api::CheckRequested(r->wanted[n], frame->views[n]);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
     r->gradients[n].Set(r->wanted[n], frame->views[n]);
     r->views.push_back(r->gradients[n].gradients);

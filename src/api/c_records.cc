@@ -117,7 +117,7 @@ Status CheckCounts(const tilegrad_scene& scene) {
   return {};
 }
 
-Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
+Status CheckRequested(const tilegrad_scene_gradients& wanted, const Scene& scene) {
   const char* missing = nullptr;
   const auto check = [&](const char* name, const void* array, const void* given) {
     if (missing == nullptr && array != nullptr && given == nullptr) missing = name;

@@ -58,7 +58,7 @@ Status CheckCount(const char* name, std::size_t count);
 // An array that is NULL has no entries: a count says otherwise where a pointer was forgotten.
 Status CheckCounts(const tilegrad_scene& scene);
 // A gradient of an array that the scene does not have would be left as it is.
-Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene);
+Status CheckRequested(const tilegrad_scene_gradients& wanted, const Scene& scene);
 
 // A scene, and the lists that it looks at.
 struct CScene {

@@ -52,7 +52,7 @@ LeftTemporaries& OutputGuard::LeftIn(const Path& folder) const {
 Status OutputGuard::Check(const Path& file) const {
   TILEGRAD_TRY(CheckNotRead({&file, 1}));
   const auto info = Stat(file);
-  // Writing to a folder is an error of its own.
+  // Writing to a folder is a separate error.
   if (info && S_ISREG(info->st_mode) && !force_) {
     return InvalidArgument("{}: exists; --force replaces it, or choose another name",
                            file.string());

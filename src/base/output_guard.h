@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nothing of the user's is overwritten: a file that is there is replaced only by --force, and one
-// that is read here not even by that. Folders of our own (a run, a dataset) know their files by
-// name, so commands that work there ask this only about what they read.
+// Protects the user's files: an existing file is replaced only with --force, an input of the
+// command never. Run and dataset folders know their files by name, so commands that write there
+// check only their inputs.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,19 @@ namespace tilegrad {
 
 class OutputGuard {
  public:
-  // With `force`, files that are there are replaced; inputs never.
+  // With `force`, existing files are replaced; inputs never.
   explicit OutputGuard(bool force = false) : force_(force) {}
 
   bool force() const { return force_; }
 
   // What is read, and may therefore not be written: a file, or a folder with the files in it. Under
-  // any name: links of both kinds, other spellings. What is not there is ignored.
+  // any name: links of both kinds, other spellings. Missing paths are ignored.
   void AddInput(const Path& path);
   void AddInputs(std::span<const Path> paths);
 
-  // Whether `file` may be written: it is not there, it is a device or a pipe, or `force`; and
-  // nobody reads it here. kInvalidArgument names it and what to do. What killed calls left
-  // half-written of it is removed.
+  // Whether `file` may be written: it does not exist, is a device or a pipe, or `force`; and it is
+  // not an input. kInvalidArgument names it and what to do. Partial files of killed calls are
+  // removed.
   Status Check(const Path& file) const;
   Status CheckAll(std::span<const Path> files) const;
   // The second half of that alone, of our own files.
@@ -43,7 +43,7 @@ class OutputGuard {
 
   bool force_;
   std::set<Id> inputs_;
-  mutable std::map<Path, LeftTemporaries> left_;  // in folders that were looked at
+  mutable std::map<Path, LeftTemporaries> left_;  // in folders checked so far
 };
 
 // Checks `file`, and writes it by `write()`, which returns a Status.

@@ -64,7 +64,7 @@ class TbbThreads {
   }
 
  private:
-  // Whether there are `most`, and some to spare for whoever comes between; else how many there are
+  // Whether there are `most`, and spare ones for other processes; else how many there are
   // of those needed.
   void Try(int most, int needed) {
     constexpr int kSpare = 8;   // others in the process may start some before oneTBB does
@@ -140,7 +140,7 @@ void NoteRefusal() {
   refusal.compare_exchange_strong(none, Refusal::kFresh);
 }
 
-// The fallback loop that the calling thread takes part in.
+// The fallback loop, in which the calling thread works too.
 struct OwnLoop {
   const Workers* workers = nullptr;
   std::size_t worker = 0;
@@ -311,7 +311,7 @@ void KeepToCores(std::span<const int> cores) {
 
 namespace {
 
-thread_local volatile int t_exceptions = 0;  // volatile: a compiler leaves out what nobody reads
+thread_local volatile int t_exceptions = 0;  // volatile: a compiler removes unread variables
 
 }  // namespace
 

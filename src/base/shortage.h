@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the system refuses for lack of resources: file handles, memory, processes. It says nothing
-// of the file that was to be read, which must be called neither damaged nor missing.
+// Refusals of the system for lack of resources: file handles, memory, processes. They say nothing
+// about the file being read, which must be reported neither as damaged nor as missing.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ bool IsShortage(int error);
 void NoteShortage(int error);
 
 // Readers put substitutes in place of what they cannot get (a texture, a material library), and
-// libraries call all that fails corrupt. Whoever calls them watches whether the process was refused
-// something meanwhile; in another thread, too, which then only means that both try again.
+// libraries call all that fails corrupt. Their callers watch for a refusal in the meantime; one
+// in another thread only makes both try again.
 class ShortageWatch {
  public:
   ShortageWatch();

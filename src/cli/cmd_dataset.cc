@@ -189,7 +189,7 @@ void PrintJson(const train::BuildSummary& summary, const Path& folder) {
 }
 
 Opened Open(const DatasetOptions& options, const Path& folder, const Ranks& ranks) {
-  // It goes on with a dataset that is there, unless it is to be made anew.
+  // Resumes an existing dataset, unless --force starts over.
   if (!ranks.follows() && !PathExists(train::DatasetInfoPath(folder)))
     TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
   TILEGRAD_TRY(CheckEffects(options));
@@ -217,9 +217,9 @@ Status Make(const DatasetOptions& options) {
   TILEGRAD_TRY(ranks.Join());
   auto source = Open(options, folder, ranks);
   const Status ready = ranks.Agree(source.status());
-  if (!ready.ok()) return ranks.Told(ready);
+  if (!ready.ok()) return ranks.Reportable(ready);
   train::BuildOptions build = options.build;
-  build.crew = ranks.crew();
+  build.group = ranks.group();
   build.anew = options.force;
   for (const std::string& name : options.classes) build.classes.push_back(train::SynsetName(name));
   const Workers workers(ranks.Workers(options.workers));
@@ -227,7 +227,7 @@ Status Make(const DatasetOptions& options) {
   auto made = train::BuildDataset(**source, build, folder, workers,
                                   ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
   line.Finish();
-  if (!made.ok() || ranks.follows()) return ranks.Told(made.status());
+  if (!made.ok() || ranks.follows()) return ranks.Reportable(made.status());
   const train::BuildSummary summary = std::move(*made);
   const double seconds = SecondsSince(start);
   PrintTable(summary);

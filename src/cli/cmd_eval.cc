@@ -94,14 +94,14 @@ Result<std::vector<train::Trait>> TraitsOf(const EvalOptions& options, const Sub
 
 Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
   Status ready = Prepare(options, workers, out);
-  if (!ranks.crew()) return ready;
+  if (!ranks.group()) return ready;
   std::vector<train::Trait> traits;
   if (ready.ok()) {
     auto all = TraitsOf(options, *out, workers);
     ready = all.status();
     if (all.ok()) traits = std::move(*all);
   }
-  return ranks.crew()->Agree(ready, traits);
+  return ranks.group()->Agree(ready, traits);
 }
 
 Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
@@ -126,7 +126,7 @@ Status RunEvaluation(const EvalOptions& options) {
   const Workers workers(ranks.Workers(options.on.workers));
   Subject subject;
   const Status ready = Meet(options, workers, ranks, &subject);
-  if (!ready.ok()) return ranks.Told(ready);
+  if (!ready.ok()) return ranks.Reportable(ready);
   const train::TaskEvaluation job{subject.run,
                                   subject.data,
                                   *subject.predictor,

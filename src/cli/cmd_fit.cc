@@ -231,7 +231,7 @@ void TurnLight(UpAxis up, FitConfig* config) {
   d = {turned.x, turned.y, turned.z};
 }
 
-// Before anything is read or made: a folder that was misspelt would get a fit of its own.
+// Before any work: a misspelt folder would otherwise start a new fit.
 Status CheckResume(const FitOptions& options) {
   if (!options.resume) return {};
   TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(options.out));
@@ -285,8 +285,7 @@ Status KeepGiven(const FitOptions& options) {
   return WriteGiven(Path(options.out) / train::kFitSettings, options.given);
 }
 
-// Nobody else works in the folder from now on. --force takes away what an earlier fit left there;
-// --resume finds there what this one was given.
+// Locks the folder. --force removes an earlier fit; --resume reads the options of that fit.
 Result<FolderLock> ClaimFolder(const FitOptions& options, const OutputGuard& guard) {
   TILEGRAD_ASSIGN(FolderLock lock, FolderLock::Take(options.out));
   TILEGRAD_TRY(CheckFolder(options, guard));
@@ -346,12 +345,12 @@ Status RunFitting(const FitOptions& options) {
                      "tilegrad fit --resume --out " + options.out);
 }
 
-// ---- Going on with what an earlier call was given.
+// ---- Resuming with the options of an earlier call.
 
-// Options that are no part of the fit, and those that a fit may go on with otherwise.
-const std::set<std::string> kOfTheCall = {"--out",  "--force",   "--resume",  "--doctor",
-                                          "--live", "--threads", "--workers", "--read-limit",
-                                          "--json", "--quiet"};
+// Options that are not part of the fit, and those that may change on resuming.
+const std::set<std::string> kCallOptions = {"--out",  "--force",   "--resume",  "--doctor",
+                                            "--live", "--threads", "--workers", "--read-limit",
+                                            "--json", "--quiet"};
 const std::set<std::string> kMayDiffer = {"--steps", "--quality", "--timelapse",
                                           "--checkpoint-every", "--truth"};
 
@@ -366,7 +365,7 @@ Status TakeFromFit(const Path& fit, Command* command, CommandList* list) {
     found->second = FindFromRun(found->second, fit).value_or(found->second).string();
   }
   before.may_differ = kMayDiffer;
-  before.may_differ.insert(kOfTheCall.begin(), kOfTheCall.end());
+  before.may_differ.insert(kCallOptions.begin(), kCallOptions.end());
   before.instead = {"--steps", "--quality"};
   return ContinueWith(before, command, list);
 }
@@ -374,7 +373,7 @@ Status TakeFromFit(const Path& fit, Command* command, CommandList* list) {
 Status StartOrGoOn(FitOptions* options, Command* command, CommandList* list) {
   if (options->resume) TILEGRAD_TRY(TakeFromFit(options->out, command, list));
   options->given = GivenOf(*command);
-  for (const std::string& name : kOfTheCall) options->given.erase(name);
+  for (const std::string& name : kCallOptions) options->given.erase(name);
   TILEGRAD_TRY(CheckResume(*options));
   if (options->input.empty())
     return InvalidArgument("fit: input is required; see tilegrad fit --help");

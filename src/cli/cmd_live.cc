@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad live: a page about a run that goes on, is over, or was killed.
+// tilegrad live: live view of a running, finished or interrupted run.
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <thread>

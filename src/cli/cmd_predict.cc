@@ -39,7 +39,7 @@
 namespace tilegrad::cli {
 namespace {
 
-// What predict does with the light that a network of textures and light says.
+// How predict uses the light of a network of textures and light.
 
 // `mesh` from where its picture was taken, once around under a light as far from the camera's axis
 // as the predicted one, from where that is: an animated WebP that loops.
@@ -63,13 +63,13 @@ std::array<float, 3> Turned(const std::array<float, 3>& d, double angle) {
           static_cast<float>(std::cos(tilt))};
 }
 
-// Whether its network says a light.
+// Whether its network predicts a light.
 bool PredictsLight(const train::Predictor& predictor) {
   const auto* const model = predictor.model().textured();
   return model != nullptr && train::LightingOf(model->config().light) != Lighting::kNone;
 }
 
-// Of one picture, [4][size][size] planar bytes; nothing where the network says no light, or no
+// Of one picture, [4][size][size] planar bytes; nothing if the network predicts no light, or no
 // camera that it is in the axes of.
 Result<std::optional<train::PredictedObject>> PredictLit(const train::Predictor& predictor,
                                                          std::span<const std::uint8_t> picture) {
@@ -274,7 +274,7 @@ Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutou
   return {};
 }
 
-// With the light, where the network says one.
+// With the light, if the network predicts one.
 Status SaveResult(const train::Predictor& predictor, std::span<const std::uint8_t> picture,
                   const Path& glb, Mesh* mesh) {
   TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));

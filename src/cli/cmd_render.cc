@@ -32,7 +32,7 @@ constexpr std::array<float, 9> kSky = {2.5f, -0.6f, 0.4f, 0, 0, 0, 0, 0, 0};
 constexpr std::array<float, 9> kSkyOfZ = {2.5f, 0.4f, 0.6f, 0, 0, 0, 0, 0, 0};
 constexpr std::array<float, 9> kSkyOfX = {2.5f, 0, 0.4f, -0.6f, 0, 0, 0, 0, 0};
 
-// What was asked for.
+// The command line.
 struct RenderSettings {
   std::vector<std::string> meshes;
   ViewSettings view;

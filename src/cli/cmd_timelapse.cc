@@ -61,7 +61,7 @@ Result<std::vector<Mesh>> LoadMeshes(const std::vector<Path>& files) {
   return meshes;
 }
 
-// Forming takes the first two thirds of the time; then the last mesh goes on turning.
+// Forming takes the first two thirds of the time; then the last mesh keeps turning.
 Result<std::vector<ImageU8>> DrawFrames(const TimelapseOptions& options,
                                         const std::vector<Mesh>& meshes, const Workers& workers) {
   const train::CameraRule rule;

@@ -95,7 +95,7 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
 }
 
 // Says where sample sheets are, as soon as there is one.
-train::PictureSink TellOfSheets(ProgressLine* line, std::int64_t every) {
+train::PictureSink AnnounceSheets(ProgressLine* line, std::int64_t every) {
   return [line, every, told = false](const Path& file) mutable {
     if (std::exchange(told, true)) return;
     line->Finish();
@@ -112,17 +112,17 @@ Status RunTraining(const TrainOptions& given) {
   if (ready.ok() && !ranks.follows())
     ready = CheckRunFolder(options.out, job.existing, OutputGuard(options.force));
   ready = ranks.Agree(ready);
-  if (!ready.ok()) return ranks.Told(ready);
-  job.crew = ranks.crew();
+  if (!ready.ok()) return ranks.Reportable(ready);
+  job.group = ranks.group();
   const Workers workers(ranks.Workers(options.workers));
   if (ranks.follows())
-    return ranks.Told(train::Train(job, workers, nullptr, StopOnSignals()).status());
+    return ranks.Reportable(train::Train(job, workers, nullptr, StopOnSignals()).status());
   Live live;
   if (options.live)
     job.begun = [&] { return live.Start({options.out, options.data, job.config.schedule.steps}); };
   ProgressLine line;
   job.warn = line.Warnings();
-  job.drawn = TellOfSheets(&line, job.config.schedule.sample_every);
+  job.drawn = AnnounceSheets(&line, job.config.schedule.sample_every);
   auto outcome = train::Train(job, workers, live.Sink(line.Sink()), StopOnSignals());
   line.Finish();
   live.Finish(outcome.status());

@@ -36,7 +36,7 @@ bool IsRate(const std::string& word) {
 struct List {
   std::string_view option;
   bool (*is_value)(const std::string& word);
-  std::size_t count;  // words that are wanted; 0: as many as there are
+  std::size_t count;  // expected words; 0: any number
 };
 constexpr std::array kLists = {
     List{"--up", IsNumber, 3},      List{"--errors", IsNumber, 0},
@@ -113,9 +113,9 @@ struct Apply {
   void operator()(const WordCheck& check) const { option->check(check.fault, check.description); }
 };
 
-// Where files may follow, an option takes no word more than it needs. CLI11 would go on with the
-// words behind it: of `--eye 0 0 4 --size 64 mesh.obj` with `--eye` last, the mesh would be a
-// fourth number. Lists then want commas (JoinLists gives them) or their option again.
+// Where files may follow, an option takes no word more than it needs. CLI11 would also take the
+// following words: of `--eye 0 0 4 --size 64 mesh.obj` with `--eye` last, the mesh would be a
+// fourth number. Lists then need commas (JoinLists adds them) or their option again.
 void AddOptions(const std::vector<Option>& options, CLI::App* app) {
   const auto is_word = [](const Option& option) { return !option.names.starts_with('-'); };
   const bool has_files = std::any_of(options.begin(), options.end(), is_word);
@@ -130,7 +130,7 @@ void AddOptions(const std::vector<Option>& options, CLI::App* app) {
   }
 }
 
-// Of the words that nobody takes, the first: what follows an unknown option is its value.
+// The first unrecognised word: what follows an unknown option is its value.
 std::string ExplainExtra(const CLI::App& command) {
   const std::string word = command.remaining().front();
   if (!word.starts_with('-')) return fmt::format("unexpected argument \"{}\"", word);

@@ -61,7 +61,7 @@ GivenOptions GivenOf(const Command& command);
 Status WriteGiven(const Path& file, const GivenOptions& given);
 Result<GivenOptions> ReadGiven(const Path& file);
 
-// What a call goes on with.
+// The options that a resumed call inherits.
 struct Continuation {
   GivenOptions then;
   std::set<std::string> may_differ;  // options

@@ -59,7 +59,7 @@ std::string_view FirstColumns(std::string_view text, std::size_t columns) {
   std::size_t used = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto byte = static_cast<unsigned char>(text[i]);
-    if ((byte & 0xC0) == 0x80) continue;  // goes on a character
+    if ((byte & 0xC0) == 0x80) continue;  // continues a character
     used += byte >= kFirstWide ? 2 : 1;
     if (used > columns) return text.substr(0, i);
   }
@@ -87,9 +87,11 @@ std::string TextOf(const Progress& p, std::uint64_t first, double seconds) {
 
 }  // namespace
 
-Speech SpeechNow() { return g_json ? Speech::kJson : g_quiet ? Speech::kQuiet : Speech::kFull; }
+Verbosity CurrentVerbosity() {
+  return g_json ? Verbosity::kJson : g_quiet ? Verbosity::kQuiet : Verbosity::kFull;
+}
 
-void AddSpeechOptions(Command* command) {
+void AddVerbosityOptions(Command* command) {
   command->Add("--quiet", &g_quiet, "print warnings and errors only, no progress");
   command->Add("--json", &g_json,
                "print one JSON object on standard output at the end, for programs");
@@ -106,7 +108,9 @@ void OpenStandardStreams() {
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
 }
 
-bool OutputIsTerminal() { return SpeechNow() == Speech::kFull && ::isatty(STDOUT_FILENO) == 1; }
+bool OutputIsTerminal() {
+  return CurrentVerbosity() == Verbosity::kFull && ::isatty(STDOUT_FILENO) == 1;
+}
 
 void PrintThreadNotice() {
   if (const char* notice = TakeThreadNotice()) PrintNote("tilegrad: warning: {}\n", notice);

@@ -19,27 +19,27 @@ namespace tilegrad::cli {
 
 struct Command;
 
-// What is said beside files, exit codes and errors.
-enum class Speech {
+// What the program prints beside errors.
+enum class Verbosity {
   kFull,
   kQuiet,  // --quiet: warnings and errors alone
   kJson,   // --json: at the end one JSON object on stdout, instead of sentences
 };
-Speech SpeechNow();
-// --quiet and --json, which every command has that prints what it has done.
-void AddSpeechOptions(Command* command);
+Verbosity CurrentVerbosity();
+// --quiet and --json, for every command that prints results.
+void AddVerbosityOptions(Command* command);
 
 // What a command has done, for programs: printed under --json, else nothing.
 void PrintResult(const nlohmann::ordered_json& result);
 
-// Ends the line of progress that is being drawn: what is printed next begins a line of its own.
+// Ends the current progress line, so that output starts on a new line.
 void EndProgressLine();
 
-// As fmt::print to stdout, unless speech is less than full. Names of files and models, and all else
+// As fmt::print to stdout, unless --quiet or --json. Names of files and models, and all else
 // that strangers wrote, may hold what a terminal would obey: it is shown instead (EscapeControls).
 template <class... Args>
 void Print(fmt::format_string<Args...> format, Args&&... args) {
-  if (SpeechNow() != Speech::kFull) return;
+  if (CurrentVerbosity() != Verbosity::kFull) return;
   EndProgressLine();
   fmt::print("{}", EscapeControls(fmt::format(format, std::forward<Args>(args)...)));
 }
@@ -56,10 +56,10 @@ void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
 // The same of what is no warning: under --quiet nothing.
 template <class... Args>
 void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
-  if (SpeechNow() != Speech::kQuiet) PrintNote(format, std::forward<Args>(args)...);
+  if (CurrentVerbosity() != Verbosity::kQuiet) PrintNote(format, std::forward<Args>(args)...);
 }
 
-// Whether somebody reads stdout as it comes.
+// Whether stdout is read interactively.
 bool OutputIsTerminal();
 
 // Says, once, that the system has refused threads.
@@ -69,8 +69,8 @@ void PrintThreadNotice();
 // opened would get their numbers, and the progress line would be written into a checkpoint.
 void OpenStandardStreams();
 
-// Makes writing to a pipe that nobody reads any more, and beyond the limit of a file's size, an
-// error like others instead of a signal that ends the process.
+// Makes writing to a closed pipe, or beyond the limit of a file's size, an ordinary error instead
+// of a signal that ends the process.
 void WritesFailWithoutSignals();
 
 // Draws "stage  12/820  1%  0:31 left  note" on stderr. On a terminal at once, rewritten in place
@@ -98,8 +98,8 @@ class ProgressLine {
   bool terminal_;
   bool drawn_ = false;  // something of this stage is on the screen
   Progress last_;
-  std::uint64_t first_done_ = 0;  // done at the start of the stage: what a resumed run did earlier
-                                  // says nothing of its speed
+  std::uint64_t first_done_ = 0;  // done at the start of the stage: earlier steps of a resumed run
+                                  // do not count for its speed
   Clock::time_point stage_start_, last_draw_;
 };
 
@@ -107,8 +107,8 @@ class ProgressLine {
 std::string FormatDuration(double seconds);
 
 // A flag that SIGINT, SIGTERM and SIGHUP (the terminal is gone) set; installed at the first call,
-// and looked at by the readers of files. A second signal kills as usual. Those that whoever started
-// us ignores (nohup, a shell's background) stay ignored.
+// and checked by the readers of files. A second signal kills as usual. Signals ignored by the
+// parent (nohup, a shell's background) stay ignored.
 const StopFlag& StopOnSignals();
 // The last one that did; SIGINT if none has.
 int StopSignal();

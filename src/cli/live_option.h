@@ -27,7 +27,7 @@ class Live {
 
 // LivePage::Finish; what is wrong with the page is a warning.
 void EndPage(const Status& outcome, train::LivePage* page);
-// Says where the page is, and opens it where somebody sits before a desktop.
+// Prints the page's address, and opens it on a desktop.
 void ShowPage(const train::LivePage& page);
 
 }  // namespace tilegrad::cli

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program `tilegrad`. Exit codes: 0 done, 1 the work failed, 2 the command line or
 // configuration is wrong, 3 an input file is missing or broken, 130 stopped by Ctrl-C and 143 by
-// SIGTERM (state saved), 141 where nobody reads what is printed.
+// SIGTERM (state saved), 141 if stdout is a closed pipe.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -93,7 +93,7 @@ void AddCommands(CommandList* list) {
   }
   for (Command& reader : *list) AddReadLimitOption(&reader);
   AddSelftest(list);
-  for (Command& worker : *list) AddSpeechOptions(&worker);
+  for (Command& worker : *list) AddVerbosityOptions(&worker);
   for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(list);
 }
 

@@ -9,25 +9,25 @@ namespace tilegrad::cli {
 Status Ranks::Join() {
   if (train::LaunchedRanks() == 1) return {};
   TILEGRAD_ASSIGN(transport_, train::ConnectRanks());
-  if (transport_->size() > 1) crew_.emplace(*transport_);
+  if (transport_->size() > 1) group_.emplace(*transport_);
   return {};
 }
 
 Ranks::~Ranks() {
-  if (crew_ && !crew_->broken()) crew_->Disband();
+  if (group_ && !group_->broken()) group_->Shutdown();
 }
 
 void Ranks::EndIfBroken(const Status& status) {
-  if (status.ok() || !crew_ || !crew_->broken()) return;
+  if (status.ok() || !group_ || !group_->broken()) return;
   PrintNote("tilegrad: {}\n", status.message());
   std::fflush(nullptr);
   transport_->Abort(ExitCode(status.code()));
 }
 
 void Ranks::EndIfFailed(const Status& status) {
-  if (status.ok() || !crew_) return;
-  if (!crew_->leads()) crew_->RaiseAlarm(status);
-  crew_->Break();
+  if (status.ok() || !group_) return;
+  if (!group_->leads()) group_->ReportError(status);
+  group_->Break();
   EndIfBroken(status);
 }
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "tilegrad/status.h"
-#include "train/ranks/crew.h"
 #include "train/ranks/launch.h"
+#include "train/ranks/process_group.h"
 
 namespace tilegrad::cli {
 
@@ -20,24 +20,24 @@ class Ranks {
   // Joins them; alone without mpirun.
   Status Join();
 
-  train::Crew* crew() { return crew_ ? &*crew_ : nullptr; }  // null: alone
-  // Whether rank 0 speaks for this process.
-  bool follows() const { return crew_ && !crew_->leads(); }
-  // Crew::Agree on how all fared so far; alone `own`.
-  Status Agree(const Status& own) { return crew_ ? crew_->Agree(own, {}) : own; }
-  // `status`, but that all agreed to end, which a follower leaves to rank 0 to say.
-  Status Told(const Status& status) const {
+  train::ProcessGroup* group() { return group_ ? &*group_ : nullptr; }  // null: alone
+  // Whether rank 0 reports for this process.
+  bool follows() const { return group_ && !group_->leads(); }
+  // ProcessGroup::Agree on the status of all; alone `own`.
+  Status Agree(const Status& own) { return group_ ? group_->Agree(own, {}) : own; }
+  // `status`; but if all agreed to end, a follower leaves the report to rank 0.
+  Status Reportable(const Status& status) const {
     return follows() && status.code() == StatusCode::kCancelled ? Status() : status;
   }
   // After an error that leaves the others waiting: the message, then the end of all.
   void EndIfBroken(const Status& status);
-  // The same of work that each rank does by itself: `status` of its own.
+  // The same after work that each rank does by itself, with its own `status`.
   void EndIfFailed(const Status& status);
-  int Workers(int asked) const { return crew_ ? train::PlaceRank(asked) : asked; }
+  int Workers(int asked) const { return group_ ? train::PlaceRank(asked) : asked; }
 
  private:
   std::unique_ptr<train::Transport> transport_;
-  std::optional<train::Crew> crew_;
+  std::optional<train::ProcessGroup> group_;
 };
 
 }  // namespace tilegrad::cli

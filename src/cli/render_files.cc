@@ -56,7 +56,7 @@ std::vector<float> ShownColor(const Picture& picture, ColorSpace space,
   return out;
 }
 
-// A colour of its own for each face; black where there is none.
+// A distinct colour for each face; black at background pixels.
 std::array<float, 3> FaceColor(std::int32_t id) {
   if (id < 0) return {0, 0, 0};
   const std::uint64_t bits = Mix64(static_cast<std::uint64_t>(id));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to cli: what `tilegrad render` was asked for, and its parts: which cameras, which files.
+// Internal to cli: the command line of `tilegrad render`, and its parts: cameras, files.
 #pragma once
 
 #include <array>

@@ -28,17 +28,17 @@ void AddReadLimitOption(Command* command);
 // --force, for base/output_guard.h.
 void AddForceOption(Command* command, bool* force);
 
-// What --resume and --force mean for a run that is there.
+// The meaning of --resume and --force for an existing run.
 train::ExistingRun ExistingOf(bool resume, bool force);
-// Whether a run may begin or go on in the folder: it holds one, and `existing` allows that, or it
-// holds nothing.
+// Whether a run may start or resume in the folder: the folder is empty, or `existing` allows its
+// run.
 Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const OutputGuard& guard);
-// Whether the folder holds a training or a fit.
+// Whether the folder holds a training run or a fit.
 Status CheckIsRun(const Path& folder);
 // `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
 // note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);
-// Of work that was stopped also the command that goes on with it.
+// Adds the command that resumes it to a stopped run's message.
 Status WithCommand(const Status& status, const std::string& command);
 // With a note on the terminal of each newer checkpoint that could not be read.
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);

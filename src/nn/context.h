@@ -41,7 +41,7 @@ class Context {
   Tensor From(const Shape& shape, std::span<const float> values) const;
   Tensor From(const Shape& shape, std::span<const double> values) const;
   Tensor Indices(std::span<const std::int32_t> values) const;  // [n] of kI32
-  Tensor Copy(const Tensor& tensor) const;                     // storage of its own
+  Tensor Copy(const Tensor& tensor) const;                     // with its own storage
 
   MemoryPool& memory() const { return *pool_; }
   // For the small objects of a step (memory.h).

@@ -18,7 +18,7 @@ struct Block {
 };
 
 struct MemoryPool::State {
-  // Small tensors have an arena of their own, so that they do not fragment that of large ones.
+  // Small tensors use a separate arena, so that they do not fragment that of large ones.
   AddressArena& ArenaOf(std::size_t bytes) {
     constexpr std::size_t kLarge = std::size_t{256} << 10;
     return bytes < kLarge ? small : large;

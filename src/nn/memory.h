@@ -67,7 +67,7 @@ class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
 
 // Memory of the small objects that every training step creates and drops: graph nodes, lists of
 // Vars. It returns to a pool, so that a step like the one before allocates nothing from the heap.
-// Tensors have a pool of their own: MemoryPool.
+// Tensors use a separate pool: MemoryPool.
 
 // Keeps its pool alive. Made without one it allocates on the heap. Not thread-safe: as a Context.
 template <class T>

@@ -254,12 +254,12 @@ struct BatchStatistics {
 Var BatchNormEval(const Var& x, const Var& gamma, const Var& beta,
                   const BatchStatistics& statistics, const BatchNormOptions& options = {});
 
-// ops/sample_pictures.cc: pictures looked up at places that a network says: CMR's texture flow
+// ops/sample_pictures.cc: pictures sampled at predicted positions: CMR's texture flow
 // (Kanazawa et al., ECCV 2018, section 2.2).
 
 // pictures [B, C, H, W], which get no gradient; flow [B, 2, h, w]: x and y in [-1, 1] across the
-// picture, x right, y down. Returns [B, C, h, w], bilinear between pixel centres; beyond the edges
-// the edge goes on, without a gradient that leads back.
+// picture, x right, y down. Returns [B, C, h, w], bilinear between pixel centres; clamped at
+// the edges, where it has no gradient to flow.
 Var SamplePictures(const Tensor& pictures, const Var& flow);
 
 // Colours that are read from the picture instead of being remembered: each vertex is told where to

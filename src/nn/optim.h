@@ -21,8 +21,8 @@ namespace tilegrad::nn {
 
 class Adam;
 
-// Who takes part in a step that several processes share out: each moves some of the numbers and
-// gets the others from elsewhere.
+// Distributes an optimiser's step over processes: each updates some of the parameters and receives
+// the others.
 class UpdateShare {
  public:
   struct Piece {
@@ -30,10 +30,10 @@ class UpdateShare {
   };
   virtual ~UpdateShare() = default;
   virtual void Begin(const Adam& adam) = 0;
-  virtual std::size_t pieces() const = 0;  // that are to be moved here
+  virtual std::size_t pieces() const = 0;  // to update in this process
   virtual Piece piece(std::size_t k) const = 0;
   virtual void Updated(std::size_t k) = 0;  // its numbers are final; called by several threads
-  virtual Status Finish() = 0;              // returns when all numbers are there
+  virtual Status Finish() = 0;              // returns when all numbers have arrived
 };
 
 // A symmetric linear map of a parameter's numbers: one that spreads them over neighbours, say.

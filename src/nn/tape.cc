@@ -135,8 +135,8 @@ bool WantsNode(const Context& context, std::span<const Var> inputs) {
 
 namespace {
 
-// The adjoints of an external operation's inputs. Where a graph of them is wanted they are marked,
-// so that asking for a second derivative is an error rather than a silent zero.
+// The adjoints of an external operation's inputs. If a graph of them is recorded, they are
+// marked, so that a second derivative is an error rather than a silent zero.
 Vars ExternalBackward(const ExternalOp& op, Context& context, std::span<const Var> d_outputs) {
   std::vector<Tensor> tensors;
   for (const Var& d : d_outputs) tensors.push_back(d.value());

@@ -27,7 +27,7 @@ struct Node : std::enable_shared_from_this<Node> {
   InlineVector<Edge, 3> edges;  // one for each input; none: a leaf
   int slots = 1;                // outputs
   Rule rule;
-  Tensor saved;  // the output, where the rule wants it
+  Tensor saved;  // the output, if the rule needs it
   bool released = false;
   std::shared_ptr<Node> next_doomed;  // list of nodes to destroy, without recursion
 };

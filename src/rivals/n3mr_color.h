@@ -111,7 +111,7 @@ void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes);
 // Fills the planes in rows of the drawing.
 template <class T>
 void N3mrShade(const N3mrColorJob<T>& job, RowRange rows, N3mrPlanesT<T>* planes);
-// After all rows: the images that are asked for.
+// After all rows: the requested images.
 template <class T>
 void N3mrReducePlanes(const N3mrColorJob<T>& job, const N3mrPlanesT<T>& planes,
                       const N3mrImages<T>& out);

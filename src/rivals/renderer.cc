@@ -58,7 +58,7 @@ namespace {
 
 constexpr std::size_t kRowsAtOnce = 64, kFacesAtOnce = 256;
 
-// Calls task(begin, end) for ranges of [0, n), shared with workers that have no image of their own.
+// Calls task(begin, end) for ranges of [0, n), shared with workers that have no image.
 template <class Task>
 void ForRanges(const Workers::Part& part, std::size_t n, std::size_t grain, const Task& task) {
   part.For((n + grain - 1) / grain,

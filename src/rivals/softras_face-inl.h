@@ -18,7 +18,7 @@ namespace tilegrad::rivals {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Most faces are narrower than eight pixels: wider vectors would compute what nobody needs.
+// Most faces are narrower than eight pixels: wider vectors would waste lanes.
 using SoftTag = hn::CappedTag<float, 8>;
 using SoftVec = hn::Vec<SoftTag>;
 using SoftMask = hn::Mask<SoftTag>;

@@ -17,18 +17,18 @@ namespace {
 constexpr std::int64_t kEnd = -1;     // the order after the last step
 constexpr std::int64_t kGather = -2;  // the order to bring moments to rank 0
 
-// Of an update that says nothing of the step's loss; one that is not finite would be an error.
+// The loss of an update that does not compute it.
 constexpr double kNoLoss = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kBeforeTerms = 3;  // numbers: loss, images, stream seconds
 
 // An update by portions of the batch, on one process or many ranks: the same bits.
 class PortionedUpdate {
  public:
-  // `crew`: of all ranks, or null. InvalidArgument where the task or the number of ranks do not
+  // `group`: of all ranks, or null. InvalidArgument where the task or the number of ranks do not
   // allow so many portions.
   static Result<std::unique_ptr<PortionedUpdate>> Make(nn::Context& context, Task& task,
-                                                       std::int64_t portions, Crew* crew) {
-    Transport* const ranks = crew ? &crew->ranks() : nullptr;
+                                                       std::int64_t portions, ProcessGroup* group) {
+    Transport* const ranks = group ? &group->ranks() : nullptr;
     if (ranks && ranks->size() > portions) {
       return InvalidArgument(
           "{} ranks cannot share {} of a batch: set schedule.portions to a power of two that is "
@@ -40,7 +40,7 @@ class PortionedUpdate {
     const GradientSums::Shape shape{.portions = portions, .ranks = ranks};
     auto sums = std::make_unique<GradientSums>(context, shape, std::move(statistics));
     return std::unique_ptr<PortionedUpdate>(
-        new PortionedUpdate(task, crew, shape, std::move(sums)));
+        new PortionedUpdate(task, group, shape, std::move(sums)));
   }
 
   // Task::Backward of this rank's portions, the means of all, Task::Update. `values` are those of
@@ -63,10 +63,10 @@ class PortionedUpdate {
   void GatherMoments() { sums_->share()->GatherMoments(); }
 
  private:
-  PortionedUpdate(Task& task, Crew* crew, const GradientSums::Shape& shape,
+  PortionedUpdate(Task& task, ProcessGroup* group, const GradientSums::Shape& shape,
                   std::unique_ptr<GradientSums> sums)
       : task_(task),
-        crew_(crew),
+        group_(group),
         portions_(shape.portions),
         sums_(std::move(sums)),
         value_sums_(shape.portions, shape.ranks) {}
@@ -75,7 +75,7 @@ class PortionedUpdate {
     WeightShare* const share = sums_->share();
     at.share = share;
     const Status status = task_.Update(at, sums_->means());
-    TILEGRAD_TRY(alarm_);
+    TILEGRAD_TRY(group_error_);
     TILEGRAD_TRY(status);
     if (!share) return {};
     if (!share->finished()) return InternalError("Task::Update gave no share to its optimizer");
@@ -105,13 +105,13 @@ class PortionedUpdate {
 
   Status Finish(StepValues* values) {
     const auto all_is_well = [this] {
-      if (crew_ && crew_->leads()) alarm_ = crew_->Alarm();
-      return alarm_.ok();
+      if (group_ && group_->leads()) group_error_ = group_->ReportedError();
+      return group_error_.ok();
     };
-    if (!sums_->Finish(all_is_well)) return alarm_;
+    if (!sums_->Finish(all_is_well)) return group_error_;
     const std::span<const double> numbers = value_sums_.Finish(all_is_well);
-    TILEGRAD_TRY(alarm_);
-    if (crew_) {
+    TILEGRAD_TRY(group_error_);
+    if (group_) {
       values->wait_seconds += sums_->seconds_waited();
       values->summed_numbers += static_cast<double>(sums_->numbers());
     }
@@ -132,11 +132,11 @@ class PortionedUpdate {
   }
 
   Task& task_;
-  Crew* crew_;
+  ProcessGroup* group_;
   std::int64_t portions_;
   std::unique_ptr<GradientSums> sums_;
   ValueSums value_sums_;
-  Status alarm_;                 // of another rank, in the middle of an update
+  Status group_error_;           // of another rank, in the middle of an update
   StepValues portion_;           // of the last portion
   std::vector<double> numbers_;  // of it: loss, images, stream seconds, terms
 };
@@ -164,14 +164,14 @@ class Training : public RunWork {
     if (first_step > 0 && before.ok()) header_.labels = before->labels;
     TILEGRAD_TRY(WriteHeader(job_.run, header_));
     if (job_.begun) TILEGRAD_TRY(job_.begun());
-    if (job_.crew) ShareState(first_step);
+    if (job_.group) ShareState(first_step);
     return {};
   }
 
   Status Step(std::int64_t step, StepValues* values) override {
-    if (job_.crew) job_.crew->Order(step);
+    if (job_.group) job_.group->Order(step);
     Status status = Updates(step, values);
-    if (!status.ok() && job_.crew) job_.crew->Break();
+    if (!status.ok() && job_.group) job_.group->Break();
     return status.ok() ? NoteLabels(values->terms) : status;
   }
 
@@ -179,9 +179,9 @@ class Training : public RunWork {
   Status Start(nn::Context& context, const ProgressSink& progress, const StopFlag& stop) {
     TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
     TILEGRAD_TRY(context.TakeStatus());
-    if (!job_.crew && config_.schedule.portions == 1) return {};
+    if (!job_.group && config_.schedule.portions == 1) return {};
     TILEGRAD_ASSIGN(portioned_,
-                    PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.crew));
+                    PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.group));
     return {};
   }
 
@@ -191,29 +191,29 @@ class Training : public RunWork {
 
   // What a rank that does not lead does instead of a run.
   RunOutcome Follow(nn::Context& context) {
-    const std::int64_t first_step = job_.crew->AwaitOrder();
+    const std::int64_t first_step = job_.group->AwaitOrder();
     if (first_step == kEnd) return {};
     if (const Status taken = TakeState(context, first_step); !taken.ok())
-      job_.crew->RaiseAlarm(taken);
+      job_.group->ReportError(taken);
     RunOutcome outcome{first_step, first_step};
     StepValues values;
-    for (std::int64_t step = job_.crew->AwaitOrder(); step != kEnd;
-         step = job_.crew->AwaitOrder()) {
+    for (std::int64_t step = job_.group->AwaitOrder(); step != kEnd;
+         step = job_.group->AwaitOrder()) {
       if (step == kGather) {
         portioned_->GatherMoments();
         continue;
       }
       values.Clear();
       const Status done = Updates(step, &values);
-      if (!done.ok()) job_.crew->RaiseAlarm(done.Within(fmt::format("step {}", step)));
+      if (!done.ok()) job_.group->ReportError(done.Within(fmt::format("step {}", step)));
       outcome.last_step = step + 1;
     }
     return outcome;
   }
 
   std::vector<nn::NamedTensor> State() override {
-    if (job_.crew && portioned_->HasMoments()) {
-      job_.crew->Order(kGather);
+    if (job_.group && portioned_->HasMoments()) {
+      job_.group->Order(kGather);
       portioned_->GatherMoments();
     }
     return task_.State();
@@ -251,14 +251,14 @@ class Training : public RunWork {
     return header_.labels.size() == known ? Status() : WriteHeader(job_.run, header_);
   }
   void ShareState(std::int64_t first_step) {
-    job_.crew->Order(first_step);
+    job_.group->Order(first_step);
     std::vector<nn::NamedTensor> state = task_.State();
-    job_.crew->Share(&state);
+    job_.group->Share(&state);
   }
   Status TakeState(nn::Context& context, std::int64_t first_step) {
     std::vector<nn::NamedTensor> state = task_.State();
     for (nn::NamedTensor& t : state) t.value = context.Copy(t.value);
-    job_.crew->Share(&state);
+    job_.group->Share(&state);
     return task_.LoadState(state, first_step);
   }
 
@@ -274,8 +274,8 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
                      Training* training, const std::function<Status()>& start) {
   TILEGRAD_ASSIGN(const std::string settings,
                   training->ResultSettings(plan.settings, "configuration"));
-  const Status ready = job.crew->leads() ? CheckExistingRun(plan, *training) : Status();
-  TILEGRAD_TRY(job.crew->Agree(ready, CommonTraits(settings)));
+  const Status ready = job.group->leads() ? CheckExistingRun(plan, *training) : Status();
+  TILEGRAD_TRY(job.group->Agree(ready, CommonTraits(settings)));
   Status started = start();
   Trait data{"dataset", "",
              fmt::format("{}, and runs that the configuration names, must hold the same files "
@@ -286,7 +286,7 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
     started = fingerprint.status();
     if (started.ok()) data.value = *fingerprint;
   }
-  return job.crew->Agree(started, {data});
+  return job.group->Agree(started, {data});
 }
 
 class TrainingRehearsal : public Rehearsal {
@@ -333,13 +333,13 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
                .warn = job.warn,
                .drawn = job.drawn};
   nn::Context context(workers);
-  // A task of its own: that of the job stays as it is, for the next call.
+  // A separate task: that of the job stays unchanged for the next call.
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(plan.settings, "configuration"));
   Training training(job, &config);
   const auto start = [&] { return training.Start(context, progress, stop); };
-  if (job.crew) {
+  if (job.group) {
     TILEGRAD_TRY(StartTogether(plan, job, workers, &training, start));
-    if (!job.crew->leads()) return training.Follow(context);
+    if (!job.group->leads()) return training.Follow(context);
   } else {
     TILEGRAD_TRY(CheckExistingRun(plan, training));
     TILEGRAD_TRY(start());
@@ -347,7 +347,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   plan.image_size = config.task->image_size();
   plan.half_extent = config.task->half_extent();
   auto outcome = ExecuteRun(plan, &training, context, progress, stop);
-  if (job.crew && !job.crew->broken()) job.crew->Order(kEnd);
+  if (job.group && !job.group->broken()) job.group->Order(kEnd);
   return outcome;
 }
 

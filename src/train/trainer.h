@@ -11,7 +11,7 @@
 
 #include "base/parallel.h"
 #include "train/config.h"
-#include "train/ranks/crew.h"
+#include "train/ranks/process_group.h"
 #include "train/run/run.h"
 
 namespace tilegrad::train {
@@ -28,7 +28,7 @@ struct TrainJob {
   double max_minutes = 0;
   // The ranks that train together, each with this job and a dataset of the same contents; null:
   // this process alone. Only rank 0 looks at `run`.
-  Crew* crew = nullptr;
+  ProcessGroup* group = nullptr;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
   PictureSink drawn = nullptr;
   std::function<Status()> begun = nullptr;  // once the run has its folder

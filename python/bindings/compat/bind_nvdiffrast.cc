@@ -55,7 +55,7 @@ std::span<const T> ImageOf(const OptionalArray& image, const char* function, con
                            {like.shape(0), like.shape(1), like.shape(2), channels});
 }
 
-// The engine's rasterizer for any thread: who finds it at work takes one of his own.
+// The engine's rasterizer for any thread: a thread that finds it in use takes a new one.
 class NvdiffrastRasterizer {
  public:
   py::tuple Rasterize(const py::array& pos, const py::array& tri, const OptionalArray& ranges,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of batch_norm.h. Two layouts: where a channel has pixels, lanes run along them and
 // one channel is a task (its statistics, then its values, which are still in the cache); where it
-// has one, each lane is a channel of its own.
+// has one, each lane is one channel.
 #if defined(TILEGRAD_NN_BATCH_NORM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_BATCH_NORM_INL_H_
 #undef TILEGRAD_NN_BATCH_NORM_INL_H_

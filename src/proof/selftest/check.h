@@ -25,7 +25,7 @@ using Numbers = std::variant<std::span<float>, std::span<double>, std::span<std:
 struct CheckContext {
   const Workers& workers;
   std::vector<std::string> targets;  // SIMD targets to check, names as RunnableTargets has them
-  // Is shown each result before a check looks at it, and may alter it: so tests see that the check
+  // Receives each result before its check and may alter it: so tests see that the check
   // then fails. The program has none.
   std::function<void(std::string_view what, const Numbers& numbers)> tamper = {};
 

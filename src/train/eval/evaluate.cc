@@ -36,7 +36,7 @@ class Evaluator {
         workers_(workers),
         progress_(progress),
         stop_(stop),
-        share_(job.crew) {}
+        share_(job.group) {}
 
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);

@@ -36,7 +36,8 @@ struct EvaluationJob {
   int retrieval_models = 1000;
   VoxelJob voxels{};      // with the half-extent of predictions
   std::string predictor;  // Predictor::description, for the heading
-  Crew* crew = nullptr;   // of ranks that score models together; only on rank 0 are scores whole
+  ProcessGroup* group =
+      nullptr;  // of ranks that score models together; only on rank 0 are scores whole
 };
 
 // One score for each model and view, mean over the views, then over the models of a shape

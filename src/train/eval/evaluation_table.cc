@@ -37,7 +37,7 @@ bool HasAny(const Evaluation& evaluation, std::optional<double> Score::*measure)
                      [&](const EvaluationRow& row) { return (row.mean.*measure).has_value(); });
 }
 
-// Those that have columns of their own, of means over classes.
+// Measures with their own columns, of means over classes.
 std::vector<const ScoreMeasure*> ColumnsOf(const Evaluation& evaluation) {
   std::vector<const ScoreMeasure*> out;
   for (const ScoreMeasure& measure : kMeasures) {

@@ -16,7 +16,7 @@ struct ScoreMeasure {
   const char* heading;
   double factor;  // of the number that people read
   int digits;     // of it, behind the point
-  bool column;    // of its own in tables; else it stands in the cells of classes
+  bool column;    // has its own column in tables; else it stands in the cells of classes
   bool less_is_better;
 
   std::optional<double> Of(const Score& score) const {

@@ -35,7 +35,7 @@ KeypointPlace Middle(const std::vector<KeypointPlace>& points) {
   return sum;  // in the plane of symmetry
 }
 
-// Scale, shift and quaternion of what the last layer says. Its bias is an upright camera.
+// Scale, shift and quaternion from the last layer's output. Its bias is an upright camera.
 nn::Var CamerasOf(const nn::Var& raw) {
   return nn::Concat({kStartScale * nn::Exp(nn::Tanh(nn::Slice(raw, 1, 0, 1))),
                      nn::Slice(raw, 1, 1, 3), UnitRows(nn::Slice(raw, 1, 3, 7))},

@@ -28,9 +28,9 @@ struct PhotographNetworkConfig {
   bool symmetric_texture = true;   // the map is its mirror image at x = 0
   SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
   double output_deviation = 1e-4;  // the head of movements starts as N(0, this^2)
-  // Cameras that its head says for each picture, which start evenly around the object, with a logit
-  // each. One picture of a car often leaves its front and its rear to choose from; a single camera
-  // then learns the mean of both.
+  // Camera hypotheses per picture, initially spread evenly around the object, with a logit each.
+  // One picture of a car often does not distinguish front from rear; a single camera then learns
+  // the mean of both.
   std::int64_t azimuths = 1;
 };
 

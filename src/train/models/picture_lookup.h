@@ -19,7 +19,7 @@ inline constexpr std::int64_t kPoseNumbers = 10;
 using Pose = std::array<double, kPoseNumbers>;
 // `size`: pixels a side of the image.
 Pose PoseOf(const Camera& camera, int size);
-// The camera of numbers that a network said; its rotation is orthonormal.
+// The camera of predicted numbers; its rotation is orthonormal.
 Camera CameraOf(const Pose& pose, int size);
 
 class PictureLookup {

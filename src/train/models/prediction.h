@@ -22,8 +22,8 @@ struct Prediction {
   nn::Var sh{};          // [B, 9]; harmonics
   nn::Var pose{};        // [B, 10] Pose of the picture's camera (picture_lookup.h)
   nn::Var cameras{};     // [B, 7] (ops/weak_cameras.h), quaternions unit
-  // Of a network that says N cameras for each picture: all of them, of which `cameras` are the
-  // likeliest, and what speaks for each.
+  // Of a network that predicts N cameras per picture: all of them (`cameras` holds the likeliest),
+  // and their logits.
   nn::Var camera_choices{};  // [B N, 7]
   nn::Var choice_logits{};   // [B, N]
   nn::Var keypoints{};       // [B, K, 3]

@@ -26,8 +26,7 @@ std::int64_t LightNumbers(Lighting lighting) {
   }
 }
 
-// What the head says of an image that it knows nothing about: light from the camera, or from
-// everywhere.
+// The head's initial prediction: light from the camera, or from everywhere.
 void SetStartLight(Lighting lighting, nn::Tensor& bias) {
   nn::WithFloatType(bias.dtype(), [&]<class T>(T) {
     const std::span<T> b = bias.span<T>();

@@ -27,10 +27,10 @@ struct TextureNetworkConfig {
   std::int64_t hidden = 512;       // width of the head of vertices
   std::int64_t light_width = 128;  // of the six layers of the head of light
   SphereConfig sphere = {};
-  bool normalize = true;           // shapes are brought to the truth's size and place, else learned
+  bool normalize = true;           // shapes get the truth's size and place, else they are learned
   bool symmetric_texture = false;  // the texture is its mirror image at x = 0
-  // Texels are looked up in the picture where the shape and the camera that the network says have
-  // them, beside what the decoder says of them (picture_lookup.h).
+  // Texels are looked up in the picture through the predicted shape and camera, in addition to the
+  // decoder's texels (picture_lookup.h).
   bool lookup = false;
   bool cubes = false;  // in evaluation textures are as N3MR's cubes show them (face_cubes.h)
   std::int64_t lookup_width = 16;   // channels of the decoder and of the layers behind it, then
@@ -38,7 +38,7 @@ struct TextureNetworkConfig {
   double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)
 };
 
-// What light the network says, and in which range.
+// The light that the network predicts, and its range.
 struct LightHeadShape {
   Lighting lighting = Lighting::kLambert;
   double shininess_low = 3, shininess_high = 30;

@@ -46,7 +46,7 @@ class TexturePainter {
 };
 
 // Colours of what a picture does not show, or shows in the dark: most of an object is of a few
-// paints, and what is lit tells the colour of each.
+// paints, and its lit parts give the colour of each.
 //
 // Each texel is of some paint, in shares `kinds` [M, K, h, w] that sum to 1 over K. The colour of a
 // paint is the mean of what `seen` (PictureLookup::Look, [M, 12, h, w]) shows of it without the

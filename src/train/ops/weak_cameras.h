@@ -20,7 +20,7 @@ nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras);
 nn::Var PinholeCameras(const nn::Var& cameras, int size);
 
 // World units; objects are about 2 large, so depth changes their image by at most a thousandth. 32
-// bits still tell depths of 1e-4 apart.
+// bits still resolve depths of 1e-4.
 inline constexpr double kPinholeDistance = 1000;
 
 // The same of one camera, in pixels of such an image.

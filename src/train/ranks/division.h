@@ -11,9 +11,9 @@
 
 namespace tilegrad::train {
 
-// The one order in which what portions give is summed: a binary tree over them, whoever holds the
-// leaves. A rank owns portions that lie side by side; it sums the complete subtrees among them, and
-// the rest of the tree is summed from those.
+// The one order in which the results of portions are summed: a binary tree over them, independent
+// of which rank holds which leaf. A rank owns portions that lie side by side; it sums the complete
+// subtrees among them, and the rest of the tree is summed from those.
 
 // Leaves [first, first + count) of the tree: count is a power of two that divides first.
 struct Subtree {

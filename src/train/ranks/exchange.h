@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of all ranks: bucket by bucket, while the backward pass goes on. Of each bucket every rank
+// Sums of all ranks: bucket by bucket, during the backward pass. Of each bucket every rank
 // gets a piece of all subtrees' sums, folds them in the order of the tree, and later sends what it
 // made of the total to all others. So each rank sends and receives 2 (R - 1) / R of the numbers
 // where each has one subtree, and no sum depends on what arrives first.
@@ -20,7 +20,7 @@ namespace tilegrad::train {
 
 class Exchange {
  public:
-  // `ranks` outlives it. A thread of its own moves the messages; it sleeps while there are none.
+  // `ranks` outlives it. A separate thread moves the messages; it sleeps while there are none.
   Exchange(Transport& ranks, std::vector<Subtree> subtrees);
   ~Exchange();
   Exchange(const Exchange&) = delete;
@@ -39,8 +39,8 @@ class Exchange {
   // Sends this rank's piece of a bucket in `total`, whatever it holds by now, and receives the
   // others. Each bucket once, after Wait; from any thread.
   void Spread(std::size_t bucket);
-  // Until this rank's pieces of the totals of all buckets are there; false if `meanwhile` says
-  // false first, which ends the exchange for good.
+  // Waits for this rank's pieces of the totals of all buckets; false if `meanwhile` returns false
+  // first, which ends the exchange for good.
   bool Wait(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 1); }
   // The same for what Spread brings.
   bool WaitForSpread(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 2); }

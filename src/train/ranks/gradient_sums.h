@@ -38,10 +38,10 @@ class GradientSums : public nn::GradientListener {
   void BeginPortion(std::size_t i);  // of portions(): the statistics are as the update found them
   void Begin(std::span<const nn::Var> parameters) override;
   void Ready(std::size_t i, const nn::Gradient& gradient) override;
-  // Adds the statistics, and `gradients` if nobody told of them.
+  // Adds the statistics, and `gradients` if Ready did not receive them.
   void EndPortion(std::span<const nn::Gradient> gradients);
   // Waits for the other ranks; then means() are those of all portions, and so are the statistics.
-  // False if `meanwhile`, called now and then, says false first.
+  // False if `meanwhile`, called periodically, returns false first.
   bool Finish(const std::function<bool()>& meanwhile);
   // Null, or what an optimiser's step has to be given after each Finish. Then the means are those
   // of its pieces alone, and the statistics come when it has finished.
@@ -77,7 +77,7 @@ class GradientSums : public nn::GradientListener {
   BucketLayout layout_;
   bool laid_out_ = false, told_ = false;             // in this update; in this portion
   std::vector<std::size_t> sizes_, ready_;           // of parameters; ready parts of each bucket
-  std::vector<AlignedVector<float>> levels_, sums_;  // of subtrees in the making; of own_
+  std::vector<AlignedVector<float>> levels_, sums_;  // of incomplete subtrees; of own_
   AlignedVector<float> total_, before_, after_;      // of all; statistics
   nn::StepVector<nn::Gradient> means_;
   std::size_t at_ = 0;  // which of portions_
@@ -105,7 +105,7 @@ class ValueSums {
   Transport* ranks_;  // null: this is the only one
   std::vector<Subtree> subtrees_, scratch_;
   std::vector<std::size_t> own_;                    // of subtrees_
-  std::vector<std::vector<double>> rows_, levels_;  // of subtrees_; of the one in the making
+  std::vector<std::vector<double>> rows_, levels_;  // of subtrees_; of the incomplete one
   std::size_t subtree_ = 0;                         // in own_: where the next portion belongs
   std::int64_t leaf_ = 0;                           // which of its leaves
 };

@@ -77,7 +77,7 @@ int LaunchedRanks() {
 
 Result<std::unique_ptr<Transport>> ConnectRanks() {
   TILEGRAD_ASSIGN(const Path plugin, FindPlugin());
-  // Global: Open MPI loads plugins of its own, which look for its symbols.
+  // Global: Open MPI loads its own plugins, which need its symbols.
   void* library = ::dlopen(plugin.c_str(), RTLD_NOW | RTLD_GLOBAL);
   void* connect = library ? ::dlsym(library, kConnectRanksName) : nullptr;
   if (connect == nullptr) return IoError("{}: {}", plugin.string(), ::dlerror());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that knows MPI: a plugin of its own, libtilegrad_mpi.so, so that neither the
+// The only file that knows MPI: a separate plugin, libtilegrad_mpi.so, so that neither the
 // program nor the Python module needs MPI to start.
 // Without the C++ bindings of MPI 2, which would need another library.
 #define OMPI_SKIP_MPICXX 1

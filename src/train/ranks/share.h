@@ -7,26 +7,26 @@
 #include <vector>
 
 #include "base/error.h"
-#include "train/ranks/crew.h"
 #include "train/ranks/messages.h"
+#include "train/ranks/process_group.h"
 
 namespace tilegrad::train {
 
 class Share {
  public:
-  // Blocks of so many items go to one rank after the other. `crew`: or null, then all are its own.
-  explicit Share(Crew* crew, std::size_t block = 1) : crew_(crew), block_(block) {}
+  // Blocks of so many items go to one rank after the other. `group`: or null, then all are its own.
+  explicit Share(ProcessGroup* group, std::size_t block = 1) : group_(group), block_(block) {}
 
-  bool Has(std::size_t item) const { return !crew_ || OwnerOf(item) == crew_->ranks().rank(); }
+  bool Has(std::size_t item) const { return !group_ || OwnerOf(item) == group_->ranks().rank(); }
 
   // results: `width` of each item, as many on every rank. On rank 0 those of others come to their
   // places; an error of another rank is an error here.
   template <class T>
   Status Gather(std::vector<T>* results, std::size_t width = 1) const {
     static_assert(std::is_trivially_copyable_v<T>);
-    if (!crew_) return {};
-    Transport& ranks = crew_->ranks();
-    if (!crew_->leads()) {
+    if (!group_) return {};
+    Transport& ranks = group_->ranks();
+    if (!group_->leads()) {
       SendAndWait(ranks, {0, MessageKind::kBytes}, std::as_bytes(std::span(*results)));
       return {};
     }
@@ -42,16 +42,16 @@ class Share {
 
  private:
   int OwnerOf(std::size_t item) const {
-    return static_cast<int>(item / block_ % static_cast<std::size_t>(crew_->ranks().size()));
+    return static_cast<int>(item / block_ % static_cast<std::size_t>(group_->ranks().size()));
   }
   Status Receive(int peer, std::span<std::byte> data) const {
-    Status alarm;
-    ReceiveAndWait(crew_->ranks(), {peer, MessageKind::kBytes}, data,
-                   [&] { return (alarm = crew_->Alarm()).ok(); });
-    return alarm;
+    Status error;
+    ReceiveAndWait(group_->ranks(), {peer, MessageKind::kBytes}, data,
+                   [&] { return (error = group_->ReportedError()).ok(); });
+    return error;
   }
 
-  Crew* crew_;
+  ProcessGroup* group_;
   std::size_t block_;
 };
 

@@ -12,7 +12,7 @@ namespace tilegrad::train {
 
 // What a message is about. Messages of one kind, number and pair of ranks arrive in the order they
 // were sent in.
-enum class MessageKind : std::uint8_t { kControl, kAlarm, kBytes, kValues, kPart, kTotal };
+enum class MessageKind : std::uint8_t { kControl, kError, kBytes, kValues, kPart, kTotal };
 
 struct Address {
   int peer = 0;

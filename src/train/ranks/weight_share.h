@@ -25,9 +25,9 @@ class WeightShare : public nn::UpdateShare {
     const BucketLayout* layout = nullptr;
     float* numbers = nullptr;         // of the layout; this rank's pieces hold sums, then weights
     std::function<bool()> meanwhile;  // of Exchange::Wait
-    std::function<void()> arrived;    // called when the numbers of all ranks are there
+    std::function<void()> arrived;    // called when the numbers of all ranks have arrived
   };
-  // Before an optimiser's step, when the sums are there.
+  // Before an optimiser's step, when the sums are complete.
   void Prepare(Job job);
   // What this rank moves, in the numbering of the layout: use(piece, where it lies in `numbers`).
   template <class Use>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A page about a run or a fit while it goes on, or afterwards: RUN/live.html, which a browser opens
-// from the disk. Once a second it loads the scripts in RUN/live again, since a page from a disk may
-// load scripts but not ask for files. What they hold is read from the run's own files and from
-// nothing else, so that it is the same for a run that was killed.
+// The live page of a running, finished or interrupted run: RUN/live.html, opened from the disk.
+// Once a second it reloads the scripts in RUN/live, since a page from a disk may load scripts but
+// not fetch files. The scripts are made from the run's own files only, so a killed run shows the
+// same.
 //
 // Pictures are samples/step_N.png or timelapse/N.png; meshes timelapse/N.glb and mesh.glb, or else
 // what the newest checkpoint predicts for the first example of a report.
@@ -23,9 +23,9 @@
 namespace tilegrad::train {
 
 struct LiveSource {
-  Path run;                // folder of a run or a fit, which may have done no step yet
+  Path run;                // folder of a run or a fit, possibly without a step
   Path data = {};          // dataset of a run, for what it predicts; empty: no meshes
-  std::int64_t steps = 0;  // of the whole work; 0: as config.toml says, if there is one
+  std::int64_t steps = 0;  // of the whole run; 0: those of config.toml, if present
   TermLabels labels = {};  // of its log, where there is no run.json
 };
 
@@ -34,17 +34,17 @@ class LivePage {
   explicit LivePage(LiveSource source);
   const Path& file() const { return file_; }  // absolute
 
-  // Writes the page and its first data, in place of those that are there.
+  // Writes the page and its first data, replacing existing ones.
   Status Start();
 
-  // What is going on: writes the data anew, at once where a stage begins, else once a second, or up
-  // to every five seconds where it would take more than a twentieth of the time.
+  // Updates the data: at once at the start of a stage, else once a second, or up to every five
+  // seconds if updating would take more than a twentieth of the time.
   void Tell(const Progress& progress);
   // Writes the data for the last time, with how the work ended. Returns the first problem since
-  // Start: what could not be written, or not be shown.
+  // Start.
   Status Finish(const Status& outcome);
 
-  // Whether somebody keeps the page of a run that goes on up to date.
+  // Whether a process keeps the page of a running run up to date.
   static bool IsKept(const Path& run);
 
  private:

@@ -27,7 +27,7 @@ std::string Comparison(const Evaluation& evaluation) {
   return fmt::format(", {}: {}.", verdict, baselines);
 }
 
-// Whether the methods draw one shape under lights of their own: then pictures tell them apart.
+// Whether the methods differ in light only, so that images compare them.
 bool IsOfLight(const Evaluation& evaluation) {
   return evaluation.rows.back().mean.lit_l1.has_value();
 }

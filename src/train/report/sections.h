@@ -14,7 +14,7 @@
 
 namespace tilegrad::train {
 
-// What a run's folder says about it.
+// The contents of a run's folder.
 struct RunFacts {
   Path folder;
   RunHeader header;
@@ -23,7 +23,7 @@ struct RunFacts {
   std::vector<LogEntry> log;
 };
 
-// Everything that a report tells about, gathered from the run and its task.
+// The contents of a report, gathered from the run and its task.
 struct ReportFacts {
   RunFacts run;
   std::string data;       // the dataset's folder, as it was given

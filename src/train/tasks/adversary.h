@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Section 5.3: what sharpens textures beside equation 14. A critic that learns to tell rendered
-// pictures from true ones (equation 15), features of the critic, and features of a network trained
-// beforehand (equation 16).
+// Section 5.3: what sharpens textures beside equation 14. A critic that learns to distinguish
+// rendered from true pictures (equation 15), features of the critic, and features of a network
+// trained beforehand (equation 16).
 #pragma once
 
 #include <memory>

@@ -23,7 +23,7 @@ struct LossConfig : RegularizerWeights {
 
 struct RenderConfig {
   // "dibr", "softras" or "n3mr". The rivals draw alpha alone, and there is no colour loss, unless
-  // RivalConfig says otherwise; the next three numbers mean nothing to them. Pictures and scores
+  // RivalConfig enables one; they ignore the next three numbers. Pictures and scores
   // are always drawn by "dibr".
   std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The examples of a report in one picture, for who looks at no page.
+// The examples of a report in one image.
 #pragma once
 
 #include "base/parallel.h"

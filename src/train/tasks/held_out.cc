@@ -52,9 +52,9 @@ std::pair<ShownPicture, ShownPicture> Captions(const std::string& name, const st
           {{}, "predicted", name + ": predicted" + view}};
 }
 
-class Exhibitor {
+class ShowcaseBuilder {
  public:
-  Exhibitor(const Dataset& dataset, const Predictor& predictor, const Workers& workers)
+  ShowcaseBuilder(const Dataset& dataset, const Predictor& predictor, const Workers& workers)
       : dataset_(dataset), info_(dataset.info()), predictor_(predictor), workers_(workers) {}
 
   Result<Example> Show(int model) const {
@@ -97,7 +97,7 @@ class Exhibitor {
   const Workers& workers_;
 };
 
-// N images to N meshes, each changed as the job wants it.
+// N images to N meshes, each changed as the job requests.
 Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
                                            std::span<const std::uint8_t> images,
                                            const Workers& workers) {
@@ -187,11 +187,11 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
       "The network saw none of these in training. From the first picture alone it predicted one "
       "mesh, here from three sides beside the truth. The models are spread over the classes in the "
       "dataset's order, not picked by hand.";
-  const Exhibitor exhibitor(dataset, request.predictor, workers);
+  const ShowcaseBuilder builder(dataset, request.predictor, workers);
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int model : chosen) {
     if (stop) return Cancelled("stopped while predicting; nothing was written");
-    TILEGRAD_ASSIGN(Example example, exhibitor.Show(model));
+    TILEGRAD_ASSIGN(Example example, builder.Show(model));
     out.examples.push_back(std::move(example));
     if (progress) progress({"predicting", out.examples.size(), chosen.size(), ""});
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task of one network, which a critic may watch (tasks/adversary.h): in each step the network is
-// updated first, then the critic, on the same pictures. Such a task says what its loss is; steps,
-// state, header and the log's progress are here.
+// A task of one network, optionally with a critic (tasks/adversary.h): in each step the network is
+// updated first, then the critic, on the same pictures. Such a task defines its loss; steps, state,
+// header and the log's progress are here.
 #pragma once
 
 #include "train/tasks/adversary.h"

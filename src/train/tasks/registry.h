@@ -13,7 +13,7 @@ inline constexpr const char* kDefaultTask = "single_image";  // of configuration
 
 using TaskFactory = std::unique_ptr<Task> (*)();
 
-// For tasks of a program's own, before anything is trained; those of tilegrad are there already.
+// For additional tasks of a program, before any training; tilegrad's own are registered already.
 void RegisterTask(const std::string& kind, TaskFactory make);
 
 // With the defaults of its fields. InvalidArgument lists the kinds there are.

@@ -29,7 +29,7 @@
 
 namespace tilegrad::train {
 
-class Crew;
+class ProcessGroup;
 class Predictor;
 class ClassifierModel;
 class GeneratorModel;
@@ -98,8 +98,8 @@ struct TaskEvaluation {
   Split split = Split::kTest;  // which models are scored
   int views_per_model = 24;
   PredictionChange change{};  // none: predictions are scored as they are
-  // Of fitting what is predicted to all views of each scored model, for a row that says how good
-  // predictions can be; 0: none. An error where a task has no such row.
+  // Steps that fit a prediction to all views of each scored model, for an upper-bound row; 0: none.
+  // An error where a task has no such row.
   int oracle_steps = 0;
   Crew* crew = nullptr;  // of ranks that score models together; only on rank 0 are scores whole
   // By whose rule voxels of an IoU are made; none: that of the dataset's.
@@ -161,7 +161,7 @@ class Task {
   virtual RunHeader Header() = 0;  // without name, dataset folder and machine
   // What it learns from, train/data/fingerprint.h: ranks compare them. After Start.
   virtual Result<std::string> Fingerprint(const Path& data, const Workers& workers) const;
-  // Files of its own in the run's folder; an error if a run cannot continue with what is there now.
+  // Files of its own in the run's folder; an error if a run cannot continue with the present files.
   virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
 
   virtual int Updates(std::int64_t /*step*/) const { return 1; }

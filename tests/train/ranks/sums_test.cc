@@ -10,10 +10,10 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "thread_ranks.h"
-#include "train/ranks/crew.h"
 #include "train/ranks/gradient_sums.h"
 #include "train/ranks/launch.h"
 #include "train/ranks/messages.h"
+#include "train/ranks/process_group.h"
 #include "train/ranks/share.h"
 #include "train/ranks/weight_share.h"
 
@@ -228,13 +228,13 @@ TEST(Messages, BroadcastReachesAllAndTextsComeInOrder) {
   }
 }
 
-TEST(Crew, TheLeaderHearsOfAnErrorElsewhere) {
+TEST(ProcessGroup, TheLeaderHearsOfAnErrorElsewhere) {
   OnRanks(3, [](Transport& ranks) {
-    Crew crew(ranks);
-    if (ranks.rank() == 2) crew.TellLeader({StatusCode::kInternal, "the loss is nan"});
-    if (!crew.leads()) return;
+    ProcessGroup group(ranks);
+    if (ranks.rank() == 2) group.TellLeader({StatusCode::kInternal, "the loss is nan"});
+    if (!group.leads()) return;
     Status heard;
-    while ((heard = crew.Alarm()).ok()) std::this_thread::yield();
+    while ((heard = group.ReportedError()).ok()) std::this_thread::yield();
     EXPECT_EQ(heard.message(), "rank 2: the loss is nan");
   });
 }
@@ -242,8 +242,8 @@ TEST(Crew, TheLeaderHearsOfAnErrorElsewhere) {
 TEST(Share, RankZeroGetsWhatAllMade) {
   for (const std::size_t block : {1, 3}) {
     OnRanks(3, [&](Transport& ranks) {
-      Crew crew(ranks);
-      const Share share(&crew, block);
+      ProcessGroup group(ranks);
+      const Share share(&group, block);
       constexpr std::size_t kItems = 11, kWidth = 2;
       std::vector<int> results(kItems * kWidth, -1);
       for (std::size_t i = 0; i < kItems; ++i) {
@@ -253,8 +253,8 @@ TEST(Share, RankZeroGetsWhatAllMade) {
       }
       EXPECT_EQ(std::count(results.begin(), results.end(), -1) == 0, false);
       EXPECT_TRUE(share.Gather(&results, kWidth).ok());
-      crew.Disband();
-      if (!crew.leads()) return;
+      group.Shutdown();
+      if (!group.leads()) return;
       for (std::size_t i = 0; i < results.size(); ++i)
         EXPECT_EQ(results[i], static_cast<int>(10 * (i / kWidth) + i % kWidth));
     });
@@ -263,24 +263,25 @@ TEST(Share, RankZeroGetsWhatAllMade) {
 
 TEST(Share, RankZeroHearsOfAnErrorInsteadOfResults) {
   OnRanks(2, [](Transport& ranks) {
-    Crew crew(ranks);
-    if (!crew.leads()) return crew.TellLeader({StatusCode::kInternal, "a broken file"});
+    ProcessGroup group(ranks);
+    if (!group.leads()) return group.TellLeader({StatusCode::kInternal, "a broken file"});
     std::vector<int> results(4);
-    EXPECT_EQ(Share(&crew).Gather(&results).message(), "rank 1: a broken file");
+    EXPECT_EQ(Share(&group).Gather(&results).message(), "rank 1: a broken file");
   });
 }
 
-TEST(Crew, RefusesByNameAndTheLeaderSpeaksForAll) {
+TEST(ProcessGroup, RefusesByNameAndTheLeaderSpeaksForAll) {
   OnRanks(3, [](Transport& ranks) {
-    Crew crew(ranks);
-    EXPECT_TRUE(crew.Agree({}, {{"dataset", "a", "look"}}).ok());
-    const Status other = crew.Agree({}, {{"dataset", ranks.rank() == 2 ? "b" : "a", "look there"}});
+    ProcessGroup group(ranks);
+    EXPECT_TRUE(group.Agree({}, {{"dataset", "a", "look"}}).ok());
+    const Status other =
+        group.Agree({}, {{"dataset", ranks.rank() == 2 ? "b" : "a", "look there"}});
     EXPECT_FALSE(other.ok());
-    const Status failed = crew.Agree(
+    const Status failed = group.Agree(
         ranks.rank() == 1 ? Status(StatusCode::kNotFound, "no such file") : Status(), {});
     EXPECT_FALSE(failed.ok());
-    crew.Disband();
-    if (!crew.leads()) {
+    group.Shutdown();
+    if (!group.leads()) {
       EXPECT_EQ(other.code(), StatusCode::kCancelled);
       return;
     }

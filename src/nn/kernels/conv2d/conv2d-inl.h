@@ -205,7 +205,7 @@ void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* 
 constexpr std::size_t kWeightTaps = 400;     // rows of one work item, about
 constexpr std::size_t kWeightColumns = 128;  // output channels of one work item
 constexpr std::size_t kWeightPixels = 256;   // steps of k in one pass, about
-constexpr std::size_t kWeightItems = 16;     // work items wanted, where the batch allows
+constexpr std::size_t kWeightItems = 16;     // target number of work items, if the batch allows
 
 struct WeightGradPlan {
   WeightGradPlan(const Conv2dShape& shape, const float* x_data, const float* d_y_data)

@@ -108,9 +108,9 @@ class Builder {
 
   Result<BuildSummary> Run() {
     if (chosen_.empty()) return NotFound("the source \"{}\" holds no models", source_.name());
-    Crew* const crew = options_.crew;
-    TILEGRAD_TRY(crew ? MakeTogether(*crew) : Prepare());
-    if (crew && !crew->leads()) return std::move(summary_);
+    ProcessGroup* const group = options_.group;
+    TILEGRAD_TRY(group ? MakeTogether(*group) : Prepare());
+    if (group && !group->leads()) return std::move(summary_);
     // What other ranks made is there as if an earlier run had made it.
     TILEGRAD_TRY(MakeShare({0, 1}));
     return Finish();
@@ -140,23 +140,23 @@ class Builder {
         missing = true;
     }));
     if (missing) TILEGRAD_TRY(MakeMissing(share));
-    if (!options_.crew || share.of > 1) summary_.reused = reused;
+    if (!options_.group || share.of > 1) summary_.reused = reused;
     return {};
   }
 
-  Status MakeTogether(Crew& crew) {
-    const auto rank = static_cast<std::size_t>(crew.ranks().rank()),
-               ranks = static_cast<std::size_t>(crew.ranks().size());
+  Status MakeTogether(ProcessGroup& group) {
+    const auto rank = static_cast<std::size_t>(group.ranks().rank()),
+               ranks = static_cast<std::size_t>(group.ranks().size());
     Hash models;
     for (const std::size_t i : chosen_) models.Add(source_.entries()[i].id);
-    const Status ready = crew.leads() ? Prepare() : Status();
-    TILEGRAD_TRY(crew.Agree(ready, {{"recipe", info_.recipe, "give all the same options"},
-                                    {"list of models", models.Text(),
-                                     "the source must hold the same files everywhere"}}));
+    const Status ready = group.leads() ? Prepare() : Status();
+    TILEGRAD_TRY(group.Agree(ready, {{"recipe", info_.recipe, "give all the same options"},
+                                     {"list of models", models.Text(),
+                                      "the source must hold the same files everywhere"}}));
     const Status made = MakeShare({rank, ranks});
-    TILEGRAD_TRY(crew.Agree(made, {}));
+    TILEGRAD_TRY(group.Agree(made, {}));
     int reused = 0;
-    for (const std::string& count : GatherTexts(crew.ranks(), std::to_string(summary_.reused)))
+    for (const std::string& count : GatherTexts(group.ranks(), std::to_string(summary_.reused)))
       reused += std::stoi(count);
     summary_.reused = reused;
     return {};

@@ -13,7 +13,7 @@
 #include "train/data/dataset_files.h"
 #include "train/data/sources/model_source.h"
 #include "train/data/split.h"
-#include "train/ranks/crew.h"
+#include "train/ranks/process_group.h"
 
 namespace tilegrad::train {
 
@@ -31,7 +31,7 @@ struct BuildOptions {
   bool allow_broken = false;  // any share of a published set may be unusable (broken_members.h)
   // Ranks that make the dataset together, in one folder that all of them see; null: this process
   // alone.
-  Crew* crew = nullptr;
+  ProcessGroup* group = nullptr;
 };
 
 // What was left out of a model that is used all the same.

@@ -55,7 +55,7 @@ class Examiner {
         workers_(workers),
         progress_(progress),
         stop_(stop),
-        share_(job.crew),
+        share_(job.group),
         views_(SpreadViews(dataset.info().views,
                            std::clamp(job.views_per_model, 1, dataset.info().views))) {}
 
@@ -161,7 +161,7 @@ class Examiner {
   Evaluation out_;
 };
 
-Result<Example> Exhibit(const Dataset& dataset, int model, ClassifierModel& classifier) {
+Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& classifier) {
   const DatasetInfo& info = dataset.info();
   Example out = NamedExample(dataset, model);
   TILEGRAD_ASSIGN(const auto all, dataset.LoadImages(model));
@@ -211,7 +211,7 @@ Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel&
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int m : chosen) {
     if (stop) return Cancelled("stopped while classifying; nothing was written");
-    TILEGRAD_ASSIGN(Example example, Exhibit(dataset, m, model));
+    TILEGRAD_ASSIGN(Example example, ExampleOf(dataset, m, model));
     out.examples.push_back(std::move(example));
     if (progress) progress({"classifying", out.examples.size(), chosen.size(), ""});
   }

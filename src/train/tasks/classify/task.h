@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `task.kind = "classify"`: the class of an object from one picture of it. What it learns is not
-// wanted for itself: its network compares pictures in a perceptual loss (perceptual_network.h).
+// `task.kind = "classify"`: the class of an object from one picture of it. Its
+// purpose is a network for a perceptual loss (perceptual_network.h).
 #pragma once
 
 #include <memory>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at the generator while it learns: how far what it makes is from true pictures as a set, and
-// whether it still makes different things.
+// Monitors the generator during training: the distance of its samples from true pictures as a set,
+// and their diversity.
 #pragma once
 
 #include "train/metrics/feature_rows.h"

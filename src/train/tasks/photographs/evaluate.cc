@@ -80,7 +80,7 @@ class PhotographJudge {
         set_(set),
         model_(*job.predictor.model().photographs()),
         pictures_(static_cast<int>(model_.config().size)),
-        share_(job.crew, Model::kImagesAtOnce),
+        share_(job.group, Model::kImagesAtOnce),
         tallies_(kMethods) {
     const nn::NoGrad off(model_.context());
     const nn::Var mean = model_.network().MeanShape();

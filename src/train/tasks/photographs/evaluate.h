@@ -15,8 +15,8 @@ namespace tilegrad::train {
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
                                        const ProgressSink& progress, const StopFlag& stop);
 
-// Which photographs a run was trained on, in its folder: written by a new run, compared by one that
-// goes on.
+// Which photographs a run was trained on, in its folder: written by a new run, compared by a
+// resumed one.
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new);
 // InvalidArgument if some of that split were trained on.
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split);

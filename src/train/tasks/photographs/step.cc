@@ -92,8 +92,8 @@ nn::Var PhotographStep::CameraLoss(const nn::Var& cameras, const PhotographBatch
   return rest + (1.0 - nn::Mean(agree));
 }
 
-// Of several cameras that are said, the one that starts nearest to the true one is to be it, and to
-// be the likeliest.
+// Of several camera hypotheses, the one that starts nearest to the true camera is trained towards
+// it, and to be the likeliest.
 void PhotographStep::AddCamera(const Prediction& predicted, const PhotographBatch& batch,
                                LossSum* sum) const {
   nn::Var cameras = predicted.cameras;

@@ -32,7 +32,7 @@ struct BatchReader {
   }
 };
 
-// A batch in the making.
+// A batch under construction.
 struct Gathering {
   const ImageStore& store;
   std::size_t views;

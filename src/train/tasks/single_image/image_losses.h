@@ -25,7 +25,7 @@ class ImageLosses {
                 StepValues* values);
 
   SceneRenderer& renderer() { return renderer_; }
-  // By our renderer, whoever trains.
+  // By our renderer, whichever renderer trains.
   RenderedImages DrawOurs(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
  private:

@@ -109,7 +109,7 @@ Status SingleImageTask::CheckDataset() const {
   return {};
 }
 
-// A run of an earlier version gets them when it goes on.
+// A run of an earlier version gets them when it is resumed.
 Status SingleImageTask::KeepPictures(const Path& run, std::int64_t first_step) const {
   if (first_step > 0) {
     const auto kept = TrainingPictures::Read(run);

@@ -41,7 +41,7 @@ ConfigFields FieldsOf(TexturedImageConfig* config);
 Status CheckConfig(const TexturedImageConfig& config);
 // Whether N3MR's renderer trains, with texture cubes of which the network's maps are samples.
 bool IsN3mr(const TexturedImageConfig& config);
-TextureNetworkConfig NetworkOf(const TexturedImageConfig& config);  // as the rule wants it
+TextureNetworkConfig NetworkOf(const TexturedImageConfig& config);  // as the rule requires
 LightHeadShape LightHeadOf(const LightConfig& config);
 
 }  // namespace tilegrad::train

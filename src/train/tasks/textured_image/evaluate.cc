@@ -95,8 +95,8 @@ class Judge {
     return AngleBetween(direction, DirectionOf(at.truth.views[at.index].light, lighting_));
   }
 
-  // What is left to the network's light: that of a search in the same picture, which knows more or
-  // less of the object. `texture`: the predicted one, as it is seen.
+  // An upper bound for the network's light: a search in the same picture, given parts of the true
+  // object. `texture`: the predicted one, as it is seen.
   Status Search(const View& at, std::span<const float> texture, MethodScores* scores) {
     const auto& [object, truth, v] = at;
     TILEGRAD_ASSIGN(const auto normals,
@@ -139,7 +139,7 @@ class TexturedEvaluator {
         dataset_(dataset),
         workers_(workers),
         model_(*job.predictor.model().textured()),
-        share_(job.crew) {
+        share_(job.group) {
     for (int w = 0; w < workers.count(); ++w)
       judges_.push_back(std::make_unique<Judge>(config, dataset.info().image_size));
   }

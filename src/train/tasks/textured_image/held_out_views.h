@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Views of the models that scores and reports are about: from fixed seeds, undeformed, each under a
-// light of its own.
+// separate light.
 #pragma once
 
 #include <optional>

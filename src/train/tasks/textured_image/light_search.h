@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The light of a picture, given what is thought of the object in it: the direction that explains
-// the picture best, by trying many. The error of colours says little about a light that is far from
-// the right one (what it does not reach is black, and stays so when it moves a little), so a
-// network that follows its gradient learns lights slowly; the direction found here is a target for
-// it. Light from a direction is compared by Lambert's law (highlights of Phong surfaces are left
-// over), light of a sky and a direction as SkyAndLight has it.
+// The best-fitting light of a picture, given an estimate of the object: a search over many
+// directions. The colour error of a light that is far from the right one has little gradient
+// (unlit surfaces stay black when it moves a little), so a network that follows the gradient
+// learns lights slowly; the direction found here is a target for it. Light from a direction is
+// compared by Lambert's law (highlights of Phong surfaces are left over), light of a sky and a
+// direction as SkyAndLight has it.
 #pragma once
 
 #include <array>

@@ -44,7 +44,7 @@ nn::Tensor LightTargets::Find(const Prediction& objects, const TexturedBatch& ba
   const SceneVars scenes{.positions = nn::Constant(context_, objects.positions.value()),
                          .textures = nn::Constant(context_, objects.textures.value())};
   if (!RenderScenes(renderer_, scenes, std::move(job)).colors.valid()) return {};
-  const nn::Tensor said = SaidOf(objects).value();
+  const nn::Tensor said = PredictedLights(objects).value();
   nn::Tensor out = context_.Empty(said.shape(), said.dtype());
   nn::WithFloatType(out.dtype(), [&]<class T>(T) {
     const ImagesT<T>& drawn = FrameOf(renderer_, T{}).images();

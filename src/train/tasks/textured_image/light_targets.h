@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the network should have said of the lights of a batch, found by trying (LightSearch). Of
-// each input the object is drawn without light as its other view says that it looks; the light that
-// makes this most like the input is the target. With the texture of the same view the network would
-// learn to repeat itself: that one was looked up under the light that it said.
+// Targets for the lights that the network predicts for a batch, found by search (LightSearch). The
+// object is drawn unlit with the texture predicted from its other view; the target is the light
+// that makes this most like the input. The texture of the same view depends on the predicted light,
+// so the network would learn to repeat itself.
 #pragma once
 
 #include "train/models/texture_network.h"
@@ -12,8 +12,8 @@
 
 namespace tilegrad::train {
 
-// What `objects` says of light that LightTargets has targets for: directions or harmonics.
-inline const nn::Var& SaidOf(const Prediction& objects) {
+// The predicted lights that LightTargets has targets for: directions or harmonics.
+inline const nn::Var& PredictedLights(const Prediction& objects) {
   return objects.sh.valid() ? objects.sh : objects.directions;
 }
 
@@ -22,9 +22,8 @@ class LightTargets {
   LightTargets(nn::Context& context, const LightConfig& config);
 
   // In the axes of the inputs' cameras, without gradient: [M, 3] unit directions, of harmonics
-  // [M, 9]; what `objects` says itself of inputs in which too little is seen. `job` draws the
-  // batch; its shading is replaced. An empty tensor where drawing failed, which the context's
-  // status then says.
+  // [M, 9]; the prediction itself for inputs that show too little. `job` draws the batch; its
+  // shading is replaced. An empty tensor if drawing failed: the context's status has the error.
   nn::Tensor Find(const Prediction& objects, const TexturedBatch& batch, RenderJob job);
 
  private:

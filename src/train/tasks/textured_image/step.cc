@@ -126,8 +126,8 @@ double TexturedStep::ShareOfRun(std::int64_t step) const {
   return static_cast<double>(step) / static_cast<double>(config_.schedule.steps);
 }
 
-// The truth is over black, so cover times colour is what a prediction without an outline of its own
-// would look like.
+// The truth is over black, so cover times colour is what a prediction with the true outline would
+// look like.
 nn::Var TexturedStep::Covered(const nn::Var& colors, const TexturedBatch& batch) const {
   if (!config_.color.masked) return colors;
   const nn::Shape& shape = batch.truth_alpha.shape();
@@ -178,7 +178,8 @@ nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) 
 nn::Var TexturedStep::LightLoss(const Prediction& objects, const TexturedBatch& batch) {
   nn::Tensor targets = light_targets_.Find(objects, batch, JobAt(batch, config_.schedule.steps));
   if (targets.empty()) return nn::Invalid({&objects.positions});
-  return nn::Mean(nn::Square(SaidOf(objects) - nn::Constant(context_, std::move(targets))));
+  return nn::Mean(
+      nn::Square(PredictedLights(objects) - nn::Constant(context_, std::move(targets))));
 }
 
 // Degrees, mean over the inputs.

@@ -2,9 +2,9 @@
 // One training step of section 5.2: images -> network -> renderer under the predicted lights ->
 // losses of equation 14 -> gradients -> Adam.
 //
-// One picture does not tell a dark paint from a dim light. So each object is seen in two views
-// under two lights, and the texture that is predicted from one has to explain the other under the
-// light that is predicted from that other one.
+// One picture cannot separate dark paint from dim light. So each object is seen in two views under
+// two lights, and the texture predicted from one view must explain the other view under the light
+// predicted from that view.
 #pragma once
 
 #include "train/ops/render_op.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/ranks/crew.h"
+#include "train/ranks/process_group.h"
 
 #include <chrono>
 #include <cstdlib>
@@ -63,18 +63,18 @@ Status CheckReport(std::size_t rank, const std::string& report, const std::strin
 
 }  // namespace
 
-Crew::Crew(Transport& ranks) : ranks_(ranks) {
+ProcessGroup::ProcessGroup(Transport& ranks) : ranks_(ranks) {
   if (!leads()) return;
   const auto followers = static_cast<std::size_t>(ranks.size() - 1);
-  alarms_.resize(followers);
-  rung_.resize(followers);
+  errors_.resize(followers);
+  reported_.resize(followers);
   for (std::size_t i = 0; i < followers; ++i) {
-    tickets_.push_back(ranks.Receive({static_cast<int>(i) + 1, MessageKind::kAlarm},
-                                     std::as_writable_bytes(std::span(alarms_[i]))));
+    tickets_.push_back(ranks.Receive({static_cast<int>(i) + 1, MessageKind::kError},
+                                     std::as_writable_bytes(std::span(errors_[i]))));
   }
 }
 
-Status Crew::Agree(const Status& own, const std::vector<Trait>& traits) {
+Status ProcessGroup::Agree(const Status& own, const std::vector<Trait>& traits) {
   const auto reports = GatherTexts(ranks_, Report(ranks_, own, traits));
   Status verdict;
   for (std::size_t rank = 0; rank < reports.size() && verdict.ok(); ++rank)
@@ -85,46 +85,46 @@ Status Crew::Agree(const Status& own, const std::vector<Trait>& traits) {
   return Cancelled("rank 0 says why");
 }
 
-void Crew::Share(std::vector<nn::NamedTensor>* tensors) {
+void ProcessGroup::Share(std::vector<nn::NamedTensor>* tensors) {
   for (nn::NamedTensor& t : *tensors) Broadcast(ranks_, {t.value.raw(), t.value.bytes()});
 }
 
-void Crew::Order(std::int64_t order) {
+void ProcessGroup::Order(std::int64_t order) {
   for (int peer = 1; peer < ranks_.size(); ++peer)
     SendValue(ranks_, {peer, MessageKind::kControl}, order);
 }
 
-std::int64_t Crew::AwaitOrder() {
+std::int64_t ProcessGroup::AwaitOrder() {
   return ReceiveValue<std::int64_t>(ranks_, {0, MessageKind::kControl});
 }
 
-void Crew::TellLeader(const Status& status) {
-  AlarmText text{};
+void ProcessGroup::TellLeader(const Status& status) {
+  ErrorText text{};
   status.message().copy(text.data(), text.size() - 1);
-  SendAndWait(ranks_, {0, MessageKind::kAlarm}, std::as_bytes(std::span(text)));
+  SendAndWait(ranks_, {0, MessageKind::kError}, std::as_bytes(std::span(text)));
 }
 
-void Crew::RaiseAlarm(const Status& status) {
+void ProcessGroup::ReportError(const Status& status) {
   TellLeader(status);
   std::this_thread::sleep_for(kPatience);
   ranks_.Abort(1);
   std::abort();  // g++ does not see that a virtual function does not return
 }
 
-Status Crew::Alarm() {
-  for (std::size_t i = 0; i < alarms_.size(); ++i) {
-    if (rung_[i]) continue;
-    rung_[i] = ranks_.Done(tickets_[i]);
-    if (rung_[i] && alarms_[i][0] != 0)
-      return InternalError("rank {}: {}", i + 1, std::string(alarms_[i].data()));
+Status ProcessGroup::ReportedError() {
+  for (std::size_t i = 0; i < errors_.size(); ++i) {
+    if (reported_[i]) continue;
+    reported_[i] = ranks_.Done(tickets_[i]);
+    if (reported_[i] && errors_[i][0] != 0)
+      return InternalError("rank {}: {}", i + 1, std::string(errors_[i].data()));
   }
   return {};
 }
 
-void Crew::Disband() {
+void ProcessGroup::Shutdown() {
   if (!leads()) return TellLeader({});
   for (std::size_t i = 0; i < tickets_.size(); ++i) {
-    if (!rung_[i]) Await(ranks_, tickets_[i]);
+    if (!reported_[i]) Await(ranks_, tickets_[i]);
   }
 }
 

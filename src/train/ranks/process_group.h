@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ranks of one run as a crew: rank 0 leads, it alone writes files and says when a step is
-// taken; the others follow. What goes wrong anywhere is said once, by rank 0.
+// The ranks of one run: rank 0 leads, writes all files and starts each step; the others follow. An
+// error on any rank is reported once, by rank 0.
 #pragma once
 
 #include <array>
@@ -14,21 +14,21 @@
 
 namespace tilegrad::train {
 
-// What must be equal on all ranks: name ("build", ...), value, and what to do where it is not.
+// A property that must be equal on all ranks: name ("build", ...), value, and advice if it is not.
 struct Trait {
   std::string name, value, advice;
 };
 
-class Crew {
+class ProcessGroup {
  public:
-  explicit Crew(Transport& ranks);
+  explicit ProcessGroup(Transport& ranks);
 
   Transport& ranks() { return ranks_; }
   bool leads() const { return ranks_.rank() == 0; }
 
-  // Every rank calls it, with how it fared so far. Where one failed, or its traits are not those of
+  // Every rank calls it with its status so far. If one failed, or its traits differ from those of
   // rank 0, the leader gets an error that names rank and host, and the others kCancelled: the
-  // leader speaks for them.
+  // leader reports for them.
   Status Agree(const Status& own, const std::vector<Trait>& traits);
 
   // The leader's tensors to all; every rank calls it with tensors of the same names and shapes.
@@ -38,27 +38,27 @@ class Crew {
   void Order(std::int64_t order);
   std::int64_t AwaitOrder();
 
-  // Follower: tells the leader of an error in the middle of a step.
+  // Follower: sends an error in the middle of a step to the leader.
   void TellLeader(const Status& status);
   // The same, then waits for the end of all ranks.
-  [[noreturn]] void RaiseAlarm(const Status& status);
-  // Leader: whether somebody did; the error names the rank.
-  Status Alarm();
-  // Leader: a step failed, so that followers wait for what will not come. Whoever has said why ends
-  // all ranks by Transport::Abort.
+  [[noreturn]] void ReportError(const Status& status);
+  // Leader: the error that a follower sent, if any; it names the rank.
+  Status ReportedError();
+  // Leader: a step failed, so followers wait in vain. After reporting it, end all ranks by
+  // Transport::Abort.
   void Break() { broken_ = true; }
   bool broken() const { return broken_; }
 
   // Every rank calls it at the end, unless it is broken.
-  void Disband();
+  void Shutdown();
 
  private:
-  using AlarmText = std::array<char, 1024>;  // empty: all is well
+  using ErrorText = std::array<char, 1024>;  // empty: no error
   Transport& ranks_;
   bool broken_ = false;
-  std::vector<AlarmText> alarms_;  // leader: of each follower
+  std::vector<ErrorText> errors_;  // leader: of each follower
   std::vector<Transport::Ticket> tickets_;
-  std::vector<bool> rung_;
+  std::vector<bool> reported_;
 };
 
 // The traits that every task has: this program's file, the instruction set, the configuration.
