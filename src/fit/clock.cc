@@ -33,35 +33,35 @@ const nn::Tensor* Find(std::span<const nn::NamedTensor> state, const char* name)
 FitClock::FitClock(const FitConfig& config)
     : steps_(config.steps),
       gain_(config.stop_gain),
-      earliest_(EarliestHurry(config)),
+      earliest_(EarliestStopTime(config)),
       end_(config.steps) {}
 
 double FitClock::At(std::int64_t step) const {
-  const std::int64_t hurried = hurried_at_ < 0 ? 0 : std::max<std::int64_t>(0, step - hurried_at_);
-  const std::int64_t time = step + hurried * (kHurry - 1);
+  const std::int64_t fast = stop_started_ < 0 ? 0 : std::max<std::int64_t>(0, step - stop_started_);
+  const std::int64_t time = step + fast * (kSpeedup - 1);
   return std::min(1.0, static_cast<double>(time) / static_cast<double>(steps_));
 }
 
-bool FitClock::MayHurry(std::int64_t step) const {
-  return gain_ > 0 && hurried_at_ < 0 && At(step) >= earliest_;
+bool FitClock::MayStopEarly(std::int64_t step) const {
+  return gain_ > 0 && stop_started_ < 0 && At(step) >= earliest_;
 }
 
-void FitClock::Hurry(std::int64_t step) {
-  hurried_at_ = step;
-  end_ = step + (steps_ - step + kHurry - 1) / kHurry;
+void FitClock::StopEarly(std::int64_t step) {
+  stop_started_ = step;
+  end_ = step + (steps_ - step + kSpeedup - 1) / kSpeedup;
 }
 
 void FitClock::Note(std::int64_t step, double loss) {
-  if (!MayHurry(step)) return;
+  if (!MayStopEarly(step)) return;
   sum_ += loss;
   if (++counted_ < kWindow) return;
-  if (before_ >= 0 && sum_ > (1 - gain_) * before_) Hurry(step + 1);
+  if (before_ >= 0 && sum_ > (1 - gain_) * before_) StopEarly(step + 1);
   before_ = std::exchange(sum_, 0);
   counted_ = 0;
 }
 
 std::vector<nn::NamedTensor> FitClock::State(nn::Context& context) const {
-  const std::array counts = {steps_, hurried_at_, extended_at_, counted_};
+  const std::array counts = {steps_, stop_started_, extended_at_, counted_};
   return {Tensor(context, kCounts, nn::DType::kI64, counts),
           Tensor(context, kSums, nn::DType::kF64, std::array{sum_, before_})};
 }
@@ -88,7 +88,7 @@ Status FitClock::LoadState(std::span<const nn::NamedTensor> state, std::int64_t 
     extended_at_ = steps;
     return {};
   }
-  if (c[1] >= 0) Hurry(c[1]);
+  if (c[1] >= 0) StopEarly(c[1]);
   counted_ = c[3];
   sum_ = s[0];
   before_ = s[1];

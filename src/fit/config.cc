@@ -135,7 +135,7 @@ std::string DescribeConfig(const FitConfig& config) {
   line("filter", NameIn(kFilters, c.filter));
   line("vertex_colors", c.vertex_colors);
   line("max_alpha_error", c.max_alpha_error);
-  // Fits from before these parameters go on.
+  // Fits older than these parameters can be resumed.
   line("rates", fmt::format("{}", fmt::join(std::span(c.rates.of).first(kFirstRates), ",")));
   for (const Parameter p : {Parameter::kExposure, Parameter::kFocal}) {
     if (c.parameters[p]) line(fmt::format("rate_{}", NameOf(p)).c_str(), c.rates[p]);
@@ -144,7 +144,7 @@ std::string DescribeConfig(const FitConfig& config) {
   return out;
 }
 
-FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
+FitConfig ResolveDefaults(FitConfig config, bool from_hull, ImageSize size) {
   if (config.levels == 0) config.levels = from_hull ? 1 : kSphereLevels;
   if (config.delta_start == 0)
     config.delta_start = from_hull ? DeltaOf(kHullPixels, size) : kWideDelta;
@@ -153,7 +153,7 @@ FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
   return config;
 }
 
-double EarliestHurry(const FitConfig& config) {
+double EarliestStopTime(const FitConfig& config) {
   double time = std::max(config.cameras_rest, config.texture_rest);
   if (config.levels > 1) time = std::max(time, 1 - kFullShare);
   return time;

@@ -81,12 +81,11 @@ Result<std::int64_t> StepsOfQuality(std::string_view quality);
 // do the same.
 std::string DescribeConfig(const FitConfig& config);
 
-// What is 0 for "as it suits the start" gets its value. Later functions want that.
-FitConfig Settled(FitConfig config, bool from_hull, ImageSize size);
+// Replaces each 0 that stands for "chosen for the initial shape". Later functions need that.
+FitConfig ResolveDefaults(FitConfig config, bool from_hull, ImageSize size);
 
-// The time of the run until which its loss says nothing about its end: resolutions are coarse,
-// cameras rest.
-double EarliestHurry(const FitConfig& config);
+// The time before which the loss must not stop the fit: resolutions are coarse, cameras frozen.
+double EarliestStopTime(const FitConfig& config);
 
 // The state of the schedules at a time of the run.
 struct FitSchedule {

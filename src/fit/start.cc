@@ -249,7 +249,8 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
   TILEGRAD_ASSIGN(start.scene, job.start.has_value()
                                    ? MeshScene(job)
                                    : TemplateScene(job, workers, watch, &from_hull, &start.note));
-  start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
+  start.config =
+      ResolveDefaults(job.config, from_hull, {job.input.images.width, job.input.images.height});
   SetCameras(job, &start.scene);
   SetLight(start.config, &start.scene);
   const bool blank = !job.start.has_value() || !HasColors(*job.start);
