@@ -30,7 +30,7 @@ struct FrameImagesT {
 };
 using FrameImages = FrameImagesT<float>;
 
-// Room for the images that are wanted of so many scenes, and for no others.
+// Allocates the requested images of so many scenes, and no others.
 template <class T>
 void SizeFrame(std::size_t images, int channels, const RenderOptions& options,
                const Outputs& outputs, FrameImagesT<T>* frame) {

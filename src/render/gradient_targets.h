@@ -18,7 +18,7 @@ namespace tilegrad {
 template <class T>
 class GradientTargets {
  public:
-  // An array that is wanted of a scene.
+  // A requested gradient array of a scene.
   struct Target {
     std::span<T> out;
     const char* name;  // d_scene.<name>
@@ -30,19 +30,18 @@ class GradientTargets {
     std::span<T> own = {};               // after SplitArrays
   };
 
-  // Lists what is wanted, until the next call. Errors: two arrays that have memory in common and
-  // are not the same array for the same thing: one would be written beyond its end, or hold a part
-  // of a sum.
+  // Lists the requested arrays, until the next call. Errors: two arrays that overlap without being
+  // the same array for the same gradient, since one would be overrun or hold a partial sum.
   Status Begin(std::span<const SceneT<T>> scenes, std::span<const SceneGradientsT<T>> wanted);
 
-  // What is wanted of each scene, with a camera, surfaces and lights of its own, all 0, in place of
-  // the caller's.
+  // The requests of each scene, with zeroed records of camera, surfaces and lights in place of the
+  // caller's.
   std::span<const SceneGradientsT<T>> scenes() const { return scenes_; }
   // The caller's arrays, each once, with what it holds the sum of: in the order of scenes.
   std::span<const std::span<const Target>> arrays() const { return arrays_; }
 
-  // For a renderer that does not add up: gives each scene arrays of its own, all 0, and sums them
-  // into the caller's.
+  // For a renderer that does not accumulate: gives each scene separate, zeroed arrays, and sums
+  // them into the caller's.
   void SplitArrays();
   void JoinArrays() const;
   // Adds the scenes' own records to the caller's, which are cleared first unless told.

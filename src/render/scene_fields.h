@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields of a scene and of its images, each named once: whoever has to visit all of them does
-// so here, and learns of a new one by itself.
+// The fields of a scene and of its images, each named once: code that visits all of them uses
+// these lists and so covers new fields.
 #pragma once
 
 #include <algorithm>

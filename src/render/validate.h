@@ -18,8 +18,8 @@ namespace tilegrad {
 
 // What the scenes are made of. Options are in their ranges; scenes agree, and every enumerator,
 // size, index and number of theirs is sound: scenes are looked through side by side. Lights have a
-// direction: without one they would be darkness that pulls nothing, so that an optimiser would stay
-// there. Errors name the scene, the array, the index and what was expected.
+// direction: a light without one is dark and has no gradient, so an optimiser could not leave that
+// state. Errors name the scene, the array, the index and what was expected.
 template <class T>
 Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes, const RenderOptions& options,
                                   const Workers& workers);

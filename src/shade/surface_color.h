@@ -11,7 +11,7 @@ namespace tilegrad::shade {
 
 inline constexpr int kMaxTextureSide = 512;  // texels; larger textures are halved until they fit
 
-// How the material's texture goes on outside [0, 1].
+// How the material's texture extends outside [0, 1].
 Wrap WrapOf(const Material& material);
 
 // Keeps a reference to the mesh.

@@ -43,8 +43,8 @@ std::vector<float> AlphaTexels(const ImageU8& image) {
   return out;
 }
 
-// Formats without modes have an alpha of materials alone; 0 is more often a mistake than glass that
-// nobody sees.
+// Formats without modes have an alpha of materials alone; 0 is more often a mistake than
+// invisible glass.
 SurfaceCover CoverOf(const Material& material, bool blend) {
   const float alpha = material.base_color.a;
   if (material.alpha_mode == AlphaMode::kMask)

@@ -23,11 +23,11 @@ struct PictureRequest {
                           // that is covered
   FaceCulling culling = FaceCulling::kNone;
   // What the scene's surfaces let through; null: nothing. A soft alpha knows no holes: with it, all
-  // is opaque. The exact images show the nearest face that is there.
+  // is opaque. The exact images show the nearest face that is not cut out.
   const SceneCover* cover = nullptr;
 };
 
-// Planar as a Frame; what was not asked for is empty.
+// Planar as a Frame; empty if not requested.
 struct Picture {
   int width = 0, height = 0;
   std::vector<float> color;    // [3,H,W] in the scene's colour space, clamped to [0, 1], the mean

@@ -31,7 +31,7 @@ class Pipeline {
   Pipeline& operator=(Pipeline&&) noexcept;
 
   // Where interpolated attributes go: an image of the frame, as large as they are; to a stage,
-  // which writes images of its own; or, both null, nowhere.
+  // which writes its own images; or, both null, nowhere.
   struct Attributes {
     AlignedVector<float>* image = nullptr;
     PixelStage* stage = nullptr;

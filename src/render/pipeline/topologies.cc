@@ -10,7 +10,7 @@ namespace {
 
 std::size_t VerticesOf(const PipelineScene& scene) { return scene.mesh->positions.size() / 3; }
 
-// The very same array: its numbers need not be looked at.
+// The very same array: its numbers need no check.
 bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
   return a.mesh->faces.data() == b.mesh->faces.data() &&
          a.mesh->faces.size() == b.mesh->faces.size() && VerticesOf(a) == VerticesOf(b);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Last stage of the way back through shading: what the pipeline has pulled on a scene's streams and
-// what bands have summed, to gradients of the scene. Sums are made in the order of scenes and
-// bands.
+// Last stage of the backward pass of shading: turns the cotangents of a scene's streams and the
+// sums of bands into gradients of the scene. Sums are formed in the order of scenes and bands.
 #pragma once
 
 #include <cstddef>

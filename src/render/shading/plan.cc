@@ -51,7 +51,7 @@ void TurnNormals(const SceneParts& parts, ShadeSteps* steps) {
   steps->turn = steps->normal && parts.shading.two_sided;
 }
 
-// Whether somebody wants a gradient that normals hand on.
+// Whether a requested gradient flows through normals.
 bool WantsNormals(const BackwardPlan& plan) {
   const bool given = plan.parts.shading.normals == Normals::kGiven;
   return plan.geometry || (plan.wishes[given ? Varying::kNormal : Varying::kPosition]);
@@ -98,7 +98,7 @@ ShadeSteps RecomputedSteps(const BackwardPlan& plan) {
   ShadeSteps steps;
   if (plan.to_colors || PullsOnTexture(plan) || PullsOnFactors(plan)) {
     steps = ColorSteps(parts);
-    // The highlight is a sum of its own: colours and textures do not need its value.
+    // The highlight is a separate sum: colours and textures do not need its value.
     steps.highlight = steps.highlight && (parts.shading.clamp || PullsOnFactors(plan));
   }
   if (plan.wishes.d_normals && WantsNormals(plan)) steps.normal = true;

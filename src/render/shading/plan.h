@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Only what is needed is computed. The plan is made once for a batch, from what its scenes hold,
-// which images are wanted and which gradients; every stage asks it, and it can be printed.
+// the requested images and gradients; every stage consults it, and it can be printed.
 #pragma once
 
 #include <array>
@@ -53,7 +53,7 @@ struct ShadeSteps {
   bool any() const { return color || texture || normal; }
 };
 
-// `color`: that is the image wanted, or pulled on.
+// `color`: the requested image, or the one with a cotangent.
 struct ForwardPlan {
   SceneParts parts;
   Outputs request;
@@ -80,10 +80,10 @@ struct GradientWishes {
 struct BackwardPlan {
   SceneParts parts;
   GradientWishes wishes;
-  VaryingSet pulled;      // get a cotangent that somebody wants
+  VaryingSet pulled;      // have a requested cotangent
   VaryingSet recomputed;  // are needed for that; may be `pulled` itself
   ShadeSteps steps;       // of the recomputation
-  // What the adjoint of colour goes on to.
+  // The targets of the adjoint of colour.
   bool to_colors = false, to_texture = false, to_uv = false, to_light = false, to_normal = false,
        to_eye = false, to_light_vectors = false, to_surfaces = false;
   bool geometry = false;

@@ -43,7 +43,7 @@ const char* NormalName(Normals kind) {
   return "";
 }
 
-// A stage that runs only if something is wanted of it.
+// A stage that runs only if it is needed.
 StageReport Only(std::string_view name, std::int64_t count, std::string_view unit, double ms,
                  std::string what, std::string_view spared) {
   return {name, count, unit, ms, count > 0 ? std::move(what) : std::string(spared)};

@@ -59,7 +59,7 @@ void ForEachVarying(Run& run, const Visit& visit) {
   visit(Varying::kLightDirection, std::span(run.light_direction));
 }
 
-// Sums over pixels of what they pull on what they have in common.
+// Sums of cotangents over pixels, for what the pixels share.
 struct SurfaceSums {
   shade::ColorFactorsT<double> factors = {};
   double shininess = 0;

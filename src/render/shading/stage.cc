@@ -336,7 +336,7 @@ void ShadeStage::GatherCotangentsOf(const PixelStrip& strip, const PixelRun& run
 }
 
 // depth = -(z . p + t_z), z the third row of the rotation. Background pixels, whose depth is
-// infinite, are not looked at: what a loss pulls on them is often NaN.
+// infinite, are skipped: their cotangent is often NaN.
 void ShadeStage::DepthAdjoint(const PixelStrip& strip, const PixelRun& run, StageWorker* worker,
                               SceneSums* sums) {
   const Camera& camera = scenes_[strip.image].scene->camera;
@@ -379,7 +379,7 @@ void ShadeStage::ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
   }
 }
 
-// Adds what the image of coordinates pulls on them.
+// Adds the cotangent of the image of coordinates.
 void ShadeStage::AddUvCotangents(const PixelStrip& strip, const PixelRun& run,
                                  RunCotangents* d) const {
   for (std::size_t c = 0; c < 2; ++c) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which level of a texture's pyramid a pixel wants: log2 of the texels that one step on the screen
+// The pyramid level of a texture for a pixel: log2 of the texels that one step on the screen
 // crosses, the longer of the steps to the right and down (L. Williams, Pyramidal parametrics,
 // 1983).
 //
