@@ -42,5 +42,5 @@ def _keep_copy(value: Any, copy: np.ndarray) -> None:
     copy.flags.writeable = False  # others may have it, too
     try:
         _copies[key] = (weakref.ref(value, forget), copy)
-    except TypeError:  # nobody is told when it goes
+    except TypeError:  # without a weak reference
         pass

@@ -81,7 +81,7 @@ class ProgressLine:
         try:
             self._stream.write(text)
             self._stream.flush()
-        except (OSError, ValueError):  # nobody reads any more: no reason to end hours of work
+        except (OSError, ValueError):  # a closed stream must not end hours of work
             pass
 
 

@@ -6,7 +6,7 @@
     (images.alpha - target).square().mean().backward()          # positions.grad
 
 float32 tensors are rendered by the engine, float64 ones by the scalar reference in double
-precision, which is for `torch.autograd.gradcheck`. Tensors are of the CPU. Any tensor of a scene
+precision, which is for `torch.autograd.gradcheck`. Tensors are on the CPU. Any tensor of a scene
 may ask for a gradient; what does not is not computed. The first derivative only.
 """
 
@@ -147,7 +147,7 @@ class _Render(torch.autograd.Function):
         ctx.mark_non_differentiable(face_ids, *(image for name, image in zip(frame.outputs, images)
                                                 if name in _CONSTANT))
         ctx.set_materialize_grads(False)
-        # Backward reads all of them: torch sees to it that nobody has changed one.
+        # Backward reads all of them; torch checks that none has changed.
         ctx.save_for_backward(*tensors, *images)
         ctx.call, ctx.frame = call, frame
         return (*images, face_ids)

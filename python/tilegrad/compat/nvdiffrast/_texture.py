@@ -76,7 +76,7 @@ def texture(tex: torch.Tensor, uv: torch.Tensor, uv_da: Optional[torch.Tensor] =
     images. uv: [N, h, w, 2], of a cube map directions [N, h, w, 3]. uv_da: derivatives of uv by X
     and Y, [N, h, w, 4 or 6]. mip_level_bias: [N, h, w], added to the level that follows from
     uv_da, or the level itself without uv_da. mip: the levels below tex, of texture_construct_mip or
-    a list of tensors, which then have gradients of their own; made from tex if not given.
+    a list of tensors, which then have separate gradients; made from tex if not given.
 
     filter_mode: 'nearest', 'linear', 'linear-mipmap-nearest', 'linear-mipmap-linear', or 'auto':
     the last if uv_da or mip_level_bias is given, else 'linear'. boundary_mode: 'wrap', 'clamp',

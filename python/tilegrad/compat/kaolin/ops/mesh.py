@@ -33,7 +33,7 @@ def index_vertices_by_faces(vertices_features: torch.Tensor, faces: torch.Tensor
 
 def unindex_vertices_by_faces(face_vertex_features: torch.Tensor
                               ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Vertices of their own for the corners of faces. face_vertex_features: [...,F,3,C]. Returns
+    """Separate vertices for the corners of faces. face_vertex_features: [...,F,3,C]. Returns
     [...,3F,C] and faces [F,3] int64."""
     faces, corners = face_vertex_features.shape[-3:-1]
     return (face_vertex_features.flatten(-3, -2),

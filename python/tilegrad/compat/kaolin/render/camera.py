@@ -122,7 +122,7 @@ class CameraExtrinsics:
     def from_lookat(cls, eye: _Values, at: _Values, up: _Values,
                     dtype: torch.dtype = torch.float32,
                     device: _Device = None) -> CameraExtrinsics:
-        """eye, at, up: [3] or [C,3]: where the camera is, what it looks at, what is up there.
+        """eye, at, up: [3] or [C,3]: camera position, target, up direction.
         ValueError: an up along the view."""
         eye, at, up = torch.broadcast_tensors(*(
             torch.as_tensor(v, dtype=dtype, device=device).reshape(-1, 3) for v in (eye, at, up)))
