@@ -87,7 +87,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {render + "--force=1", "render: --force takes no value"},
            {render + "--eye 0,0,x", "render: --eye: invalid value 0,0,x"},
            {render + "--supersample 99", "--supersample: 99 is not in 1 to 16"},
-           {"fit f --steps 1 --steps 2", "fit: --steps is given 2 times"},
+           {"fit f --steps 1 --steps 2", "fit: --steps was given 2 times"},
            {"fit f --steps 1 --quality fast", "--steps and --quality exclude each other"},
            {"fit f --quality good", "--quality: good is not one of fast,normal,best"},
            {"", "no command given; see tilegrad --help"}}) {

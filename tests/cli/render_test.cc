@@ -330,7 +330,7 @@ TEST_F(Render, WrongCommandLines) {
   ExpectRefused("--size 0", 2, "--size");
   ExpectRefused("--size 10x", 2, "--size");
   ExpectRefused("--size 16000 --supersample 3", 2, "samples");
-  ExpectRefused("--eye 0 0 0", 2, "coincide");
+  ExpectRefused("--eye 0 0 0", 2, "same point");
   ExpectRefused("--eye 0 0 4 --turntable 3", 2, "");
   ExpectRefused("--target 0 0 4", 2, "");
   ExpectRefused("--fov 180", 2, "--fov");
@@ -356,7 +356,7 @@ TEST_F(Render, OptionsThatWouldDoNothing) {
   ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient has no effect without --shading");
   ExpectRefused("--specular 0.3", 2, "--shading phong");
   ExpectRefused("--shininess 3", 2, "--shading phong");
-  ExpectRefused("--light-at-camera", 2, "it is for --light");
+  ExpectRefused("--light-at-camera", 2, "without --light");
   ExpectRefused("--light 0 0 0 1", 2, "towards the light");
   ExpectRefused("--opencv-centre half", 2, "--cameras");
   ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth has no effect without automatic framing");
