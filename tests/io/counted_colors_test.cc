@@ -170,7 +170,7 @@ TEST_F(CountedColors, OfMaterials) {
   ASSERT_EQ(loaded->warnings.size(), 2u);
   EXPECT_EQ(loaded->warnings[0], "material \"a\": its colour (255, 128, 0) is read as 0 to 255");
   const Json factor = {255, 128, 0, 1};
-  const Mesh mesh = Load(Gltf<float>({{}}, kFloat, false, factor), "(255, 128, 0) is taken as");
+  const Mesh mesh = Load(Gltf<float>({{}}, kFloat, false, factor), "(255, 128, 0) is read as");
   ExpectNear(mesh.materials.at(0).base_color, kOrange);
 }
 
