@@ -134,7 +134,7 @@ Status RunEvaluation(const EvalOptions& options) {
                                   options.views_per_model,
                                   RefineWith(options.refine, *subject.predictor),
                                   options.oracle,
-                                  ranks.crew(),
+                                  ranks.group(),
                                   RuleOf(options.voxels)};
   ProgressLine line;
   auto evaluation = subject.predictor->task().Evaluate(

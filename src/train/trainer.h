@@ -44,9 +44,10 @@ class Rehearsal {
 Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
                                             const ProgressSink& progress, const StopFlag& stop);
 
-// As ExecuteRun. With a crew, every rank calls it and rank 0's result tells; after an error with
-// Crew::broken() the ranks can only be aborted. Two runs have the same configuration if all keys
-// but these are equal: name, schedule.log_every, sample_every, checkpoint_every, keep_checkpoints.
+// As ExecuteRun. With a group, every rank calls it and rank 0's result tells; after an error with
+// ProcessGroup::broken() the ranks can only be aborted. Two runs have the same configuration if all
+// keys but these are equal: name, schedule.log_every, sample_every, checkpoint_every,
+// keep_checkpoints.
 Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const ProgressSink& progress,
                          const StopFlag& stop);
 

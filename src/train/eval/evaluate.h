@@ -13,7 +13,7 @@
 #include "train/data/dataset.h"
 #include "train/eval/evaluation.h"
 #include "train/eval/scores.h"
-#include "train/ranks/crew.h"
+#include "train/ranks/process_group.h"
 
 namespace tilegrad::train {
 

@@ -215,7 +215,7 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
   evaluation.template_mesh = job.predictor.template_mesh();
   evaluation.views_per_model = job.views_per_model;
   evaluation.predictor = job.predictor.description();
-  evaluation.crew = job.crew;
+  evaluation.group = job.group;
   evaluation.voxels = {job.voxels.value_or(OwnVoxelRule(dataset.info().source)),
                        job.predictor.half_extent()};
   return train::Evaluate(evaluation, workers, progress, stop);

@@ -101,7 +101,8 @@ struct TaskEvaluation {
   // Steps that fit a prediction to all views of each scored model, for an upper-bound row; 0: none.
   // An error where a task has no such row.
   int oracle_steps = 0;
-  Crew* crew = nullptr;  // of ranks that score models together; only on rank 0 are scores whole
+  ProcessGroup* group =
+      nullptr;  // of ranks that score models together; only on rank 0 are scores whole
   // By whose rule voxels of an IoU are made; none: that of the dataset's.
   std::optional<VoxelRule> voxels = std::nullopt;
 };

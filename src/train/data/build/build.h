@@ -55,7 +55,7 @@ struct BuildSummary {
 // that was not interrupted; so does any number of workers and ranks. Models that fail are listed in
 // rejected.jsonl and left out. `stop` ends the run between models with kCancelled. Errors: a folder
 // that holds a dataset of another recipe, options out of range, no usable model, too many broken
-// ones of a published set, a full disk. With a crew every rank calls it and rank 0 gets the
+// ones of a published set, a full disk. With a group every rank calls it and rank 0 gets the
 // summary, but for warnings of models that others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers,
