@@ -163,7 +163,7 @@ TEST_F(PhotographsTest, PicturesAreReadWithTheirMasks) {
   PhotographSet set = WriteMiniature(folder_, "cub");
   std::filesystem::remove(set.photographs[1].image);
   const auto missing = PhotoStore::Load(set, {0, 1}, {}, 16, workers_, nullptr, stop_);
-  ExpectMessage(missing.status(), "bar_1.png");
+  ExpectMessage(missing.status(), "bar_1.png", "dataset --source cub leaves out");
   set.photographs[0].mask = {3, 3, std::vector<bool>(9, true)};
   ExpectMessage(PhotoStore::Load(set, {0}, {}, 16, workers_, nullptr, stop_).status(),
                 "60 x 48 pixels", "3 x 3");
