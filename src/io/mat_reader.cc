@@ -69,12 +69,12 @@ bool HasElements(const matvar_t& variable) {
 }
 
 // What the variable will take once its data are read.
-std::size_t BytesOf(const matvar_t& variable) {
+std::size_t BytesOfVariable(const matvar_t& variable) {
   std::size_t bytes = sizeof(MatArray);
   if (!HasElements(variable))
     return bytes + PlacesOf(variable) * Mat_SizeOfClass(variable.class_type);
   for (const matvar_t* element : ElementsOf(variable)) {
-    if (element != nullptr) bytes += BytesOf(*element);
+    if (element != nullptr) bytes += BytesOfVariable(*element);
   }
   return bytes;
 }
@@ -182,7 +182,7 @@ Result<std::unique_ptr<matvar_t, MatVariableEnd>> NextVariable(mat_t* file) {
   std::unique_ptr<matvar_t, MatVariableEnd> variable(Mat_VarReadNextInfo(file));
   if (!variable || !g_complaint.empty()) return variable;
   TILEGRAD_TRY(
-      ReadBudget::Take(BytesOf(*variable), variable->name ? variable->name : "a variable"));
+      ReadBudget::Take(BytesOfVariable(*variable), variable->name ? variable->name : "a variable"));
   if (Mat_VarReadDataAll(file, variable.get()) != 0 && g_complaint.empty())
     g_complaint = "the data cannot be read";
   return variable;

@@ -34,8 +34,8 @@ Status TakePictures(const CollectionJob& job, const Path& images, const MemberWo
   return {};
 }
 
-Result<PhotographSet> Collect(const CollectionJob& job, const Path& folder, const MemberWork& work,
-                              CollectionSummary* summary) {
+Result<PhotographSet> CollectSet(const CollectionJob& job, const Path& folder,
+                                 const MemberWork& work, CollectionSummary* summary) {
   const bool pascal = job.source == "pascal3d";
   const Path images = folder / (pascal ? "Images" : "images");
   std::optional<PhotographSet> set;
@@ -60,7 +60,7 @@ Result<CollectionSummary> CollectPhotographs(const CollectionJob& job, const Pat
   if (!IsFolder(job.input)) return NotFound("{}: no such folder", job.input.string());
   CollectionSummary summary;
   TILEGRAD_ASSIGN(const PhotographSet set,
-                  Collect(job, folder, {workers, progress, stop}, &summary));
+                  CollectSet(job, folder, {workers, progress, stop}, &summary));
   for (const Photograph& photo : set.photographs)
     ++summary.photographs[static_cast<std::size_t>(photo.split)];
   if (set.Select(Split::kTrain).empty())

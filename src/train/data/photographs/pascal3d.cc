@@ -42,7 +42,7 @@ std::string MirrorName(const std::string& name) {
 
 // Names of pictures; what follows a name in its line is not read. Nothing of a file that is
 // missing.
-Status ReadList(const Path& file, Split split, std::map<std::string, Split>* out) {
+Status ReadSplitList(const Path& file, Split split, std::map<std::string, Split>* out) {
   if (!PathExists(file)) return {};
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::istringstream lines(text);
@@ -87,7 +87,7 @@ class Pascal3dReader {
           part == "imagenet"
               ? root_ / "Image_sets" / fmt::format("{}_{}.txt", folder, name)
               : root_ / "PASCAL/VOCdevkit/VOC2012/ImageSets/Main" / fmt::format("{}.txt", name);
-      TILEGRAD_TRY(ReadList(file, split, &splits));
+      TILEGRAD_TRY(ReadSplitList(file, split, &splits));
     }
     TILEGRAD_ASSIGN(const auto files, ListFolder(root_ / "Annotations" / folder));
     for (const Path& path : files) {

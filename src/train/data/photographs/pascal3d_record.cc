@@ -74,7 +74,7 @@ Result<Pascal3dObject> ReadObject(const MatPlace& objects, std::size_t index) {
   return out;
 }
 
-Eigen::Matrix3d Turn(double degrees, const Eigen::Vector3d& axis) {
+Eigen::Matrix3d TurnAbout(double degrees, const Eigen::Vector3d& axis) {
   return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis).toRotationMatrix();
 }
 
@@ -102,10 +102,11 @@ Result<Pascal3dRecord> ReadPascal3dRecord(const io::MatFile& file, const std::st
 // The set's project_3d.m: the camera is at distance * (cos e sin a, -cos e cos a, sin e) and looks
 // at the origin; what it sees is turned by theta about the principal point.
 Camera64 CameraOfViewpoint(const Pascal3dViewpoint& viewpoint) {
-  const Eigen::Matrix3d from_ours = Turn(90, Eigen::Vector3d::UnitX());
-  const Eigen::Matrix3d rotation = Turn(viewpoint.theta, Eigen::Vector3d::UnitZ()) *
-                                   Turn(viewpoint.elevation - 90, Eigen::Vector3d::UnitX()) *
-                                   Turn(-viewpoint.azimuth, Eigen::Vector3d::UnitZ()) * from_ours;
+  const Eigen::Matrix3d from_ours = TurnAbout(90, Eigen::Vector3d::UnitX());
+  const Eigen::Matrix3d rotation = TurnAbout(viewpoint.theta, Eigen::Vector3d::UnitZ()) *
+                                   TurnAbout(viewpoint.elevation - 90, Eigen::Vector3d::UnitX()) *
+                                   TurnAbout(-viewpoint.azimuth, Eigen::Vector3d::UnitZ()) *
+                                   from_ours;
   Camera64 out;
   for (int i = 0; i < 9; ++i) out.rotation[i] = rotation(i / 3, i % 3);
   out.translation[2] = -viewpoint.distance;
