@@ -230,7 +230,9 @@ TEST_F(Mat, RefusesWhatIsNotFinishedOrTooLarge) {
 TEST_F(Mat, DamageWithinAVariableIsAnErrorOrHarmless) {
   const Bytes few = Matrix(6, {3, 3}, "m", Element(9, OneAndAHalf()));
   const auto mat = Read("few.mat", Header() + few);
-  if (mat.ok()) EXPECT_EQ(mat->variables.at(0).second.numbers.size(), 9u);
+  if (mat.ok()) {
+    EXPECT_EQ(mat->variables.at(0).second.numbers.size(), 9u);
+  }
   const Bytes plain = Header() + BirdStruct(), packed = Header() + Packed(BirdStruct());
   for (const Bytes* whole : {&plain, &packed}) {
     for (std::size_t at = 136; at < whole->size(); at += 23) {
