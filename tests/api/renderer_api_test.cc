@@ -421,33 +421,6 @@ TEST(ApiErrors, ChannelsHaveALimit) {
   EXPECT_NE(status.message().find("2147483647 channels"), std::string::npos) << status.message();
 }
 
-template <class T>
-void ExpectDepthOfBackgroundIsNotRead() {
-  const TestScene<T> s(Lighting::kNone);
-  RendererT<T> renderer;
-  FrameT<T> frame;
-  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {.depth = true}, &frame).ok());
-  const ImagesT<T>& images = frame.images();
-  std::vector<T> d_depth(images.depth.size(), std::numeric_limits<T>::quiet_NaN());
-  for (std::size_t i = 0; i < d_depth.size(); ++i) {
-    if (images.face_ids[i] >= 0) d_depth[i] = T(1);
-  }
-  std::vector<T> d_positions(s.positions.size());
-  const SceneGradientsT<T> d_scene{.positions = d_positions};
-  Status status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
-  EXPECT_TRUE(status.ok()) << status.message();
-  for (const T d : d_positions) EXPECT_TRUE(std::isfinite(d));
-  const auto seen = std::find(d_depth.begin(), d_depth.end(), T(1));
-  *seen = std::numeric_limits<T>::infinity();
-  status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
-  EXPECT_EQ(status.message(),
-            "d_frame.depth[" + std::to_string(seen - d_depth.begin()) + "] is inf");
-}
-TEST(ApiBackward, CotangentsOfDepthAreNotReadAtTheBackground) {
-  ExpectDepthOfBackgroundIsNotRead<float>();
-  ExpectDepthOfBackgroundIsNotRead<double>();
-}
-
 TEST(ApiErrors, DoubleRefusesWhatFloatCannotHold) {
   TestScene<double> s(Lighting::kNone);
   s.positions[4] = 1e300;
