@@ -87,7 +87,7 @@ class Names(FolderTest):
                      lambda: files.save_layers(self.folder / "a.exr", {bad: plane}),
                      lambda: files.save_mesh(self.folder / "a.glb", mesh),
                      lambda: files.save_cameras(self.folder / "a.json", [view])):
-            self.assertRaisesRegex(ValueError, r"^save_\w+: .*'a\\ud800' has half of a pair", call)
+            self.assertRaisesRegex(ValueError, r"^save_\w+: .*'a\\ud800' has an unpaired surrogate", call)
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_names_that_no_file_has(self) -> None:
