@@ -76,8 +76,8 @@ train::InputOptions InputOptionsOf(const py::dict& views) {
   const auto background = views["background"].cast<std::string>();
   const auto known = train::BackgroundNamed(background);
   if (!known)
-    throw py::value_error(
-        fmt::format("fit: background is '{}', expected auto, mask, plain or none", background));
+    throw py::value_error(fmt::format(
+        "fit: background is '{}', expected auto, mask, plain, none or views", background));
   return {views["hold_out"].cast<int>(), *known, views["fov"].cast<double>(), UpOf(views), {}};
 }
 

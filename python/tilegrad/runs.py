@@ -80,8 +80,9 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     cameras: a Camera of N views, in pixels of the images. None: the folder's, or if it has none,
         cameras are estimated from the images, whose longer side spans `fov` degrees.
     masks: (N, H, W), white is the object.
-    background: source of the masks: "mask", alpha and masks; "plain", plain backgrounds; "auto",
-        "mask" if available, else "plain"; "none", the object fills the image.
+    background: source of the masks: "mask", alpha and masks; "plain", plain backgrounds; "views",
+        what six or more views with cameras have in common; "auto", the first of these that is
+        available; "none", the object fills the image.
     up: "y", "z" or "x", the up axis of the camera coordinates; the mesh is rotated to y up, as in
         glTF. "": for a folder detected from its cameras, else y.
     find_cameras: estimates the cameras even if some are given.

@@ -124,7 +124,7 @@ class Fit(FolderTest):
     def test_errors(self):
         for call, message in (
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "did you mean steps"),
-                (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "mask, plain or none"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "plain, none or views"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, up="w"), "expected y, z or x"),
                 (lambda: tilegrad.fit(IMAGES, fov=200), "5 to 150 degrees"),
                 (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "cannot be found without masks"),
@@ -182,7 +182,7 @@ class Fit(FolderTest):
             save_image(folder / f"{i}.png", image)
         for images, cameras, last in (
                 (IMAGES, CAMERAS, "preparing"), (folder, None, "reading images"),
-                (IMAGES[..., :3], CAMERAS, "looking for plain backgrounds")):
+                (IMAGES[..., :3], CAMERAS, "finding masks")):
             told = Until(last)
             result = tilegrad.fit(images, cameras, callback=told, **SMALL)
             self.assertEqual((result.finished, result.mesh, result.steps), (False, None, 0))
