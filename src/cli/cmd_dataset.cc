@@ -110,24 +110,23 @@ Status CheckEffects(const DatasetOptions& options) {
   if (!options.masks.empty()) return InvalidArgument("--masks: not for --source {}", name);
   const bool pictures = HoldsPictures(name), listed = !options.split_lists.empty();
   if (listed && (name == "nmr" || (!pictures && name != "shapenet")))
-    return InvalidArgument("--split-list is for --source shapenet, choy, dvr and dibr, not {}",
-                           name);
+    return InvalidArgument("--split-list needs --source shapenet, choy, dvr or dibr, not {}", name);
   if (options.build.allow_broken && !pictures && name != "shapenet")
     return InvalidArgument("--allow-broken: any model of --source {} may be broken", name);
   if (!options.input.empty() && name == "procedural")
-    return InvalidArgument("--input: --source procedural reads no models; folder does");
+    return InvalidArgument("--input: --source procedural reads no files; use --source folder");
   if (options.build.up != UpAxis::kY && (name == "procedural" || pictures))
     return InvalidArgument("--up: --source {} reads no mesh files", name);
   if (options.build.up != UpAxis::kY && name != "folder" && name != "shapenet" &&
       name != "sweethome3d")
-    return InvalidArgument("--up: --source {} has an up axis of its own", name);
+    return InvalidArgument("--up: --source {} has a fixed up axis", name);
   if (options.shares && ((pictures && name != "dibr") || listed)) {
-    return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
+    return InvalidArgument("--test-share, --validation-share: {} has a fixed split",
                            listed ? "--split-list" : "--source " + name);
   }
   if (options.liveries && !Has(options, "thirteen") && !Has(options, "planes") &&
       !Has(options, "cars"))
-    return InvalidArgument("--liveries: models of --source {} have one set of textures each", name);
+    return InvalidArgument("--liveries: each model of --source {} has one set of textures", name);
   if (pictures && (options.views || (options.size && name == "nmr"))) {
     return InvalidArgument("--source {} holds 24 views{}: leave out --{}", name,
                            name == "nmr" ? " of 64 pixels" : "", options.views ? "views" : "size");
@@ -256,8 +255,8 @@ void AddSourceOptions(Command* command, DatasetOptions* options) {
   command->Add("--source", &options->sources, DatasetSourceHelp(),
                {SplitAtCommas{}, OneOf{DatasetSourceNames()}});
   command->Add("--input", &options->input,
-               "folder of the models; those of packages have a default, procedural needs none");
-  command->Add("--out", &options->out, "folder to fill [datasets/SOURCE]");
+               "folder of the models; package sources have a default, procedural needs none");
+  command->Add("--out", &options->out, "output folder [datasets/SOURCE]");
   command->Add(
       "--split-list", &options->split_lists,
       "published lists of the models to use, with commas between: SYNSET/MODEL "

@@ -18,25 +18,26 @@ train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, co
 void AddPictureOptions(Command* command, FitPictures* o) {
   command->Add(
       "--background", &o->background,
-      "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
-      "(plain), what all views have in common (views), the first if there are any (auto); none: "
-      "every pixel shows the object",
+      "source of the masks: mask (alpha channels or mask files), plain (segmented from a plain "
+      "background), views (what the views of known cameras have in common), auto (the first of "
+      "these that is available), none (the object fills the image)",
       {OneOf{{"auto", "mask", "plain", "none", "views"}}});
   command->Add(
       "--masks", &o->masks,
-      "a folder of masks, NAME.png for each image, instead of the images' own: such as the "
-      "masks/ of an earlier fit, corrected by hand",
+      "folder of masks, NAME.png for each image, that replace the images' own; for example "
+      "the masks/ of an earlier fit, corrected by hand",
       {Excludes{{"--background", "--model"}}});
   command->Add(
       "--find-cameras", &o->find_cameras,
-      "look for the cameras in the images, though the folder has some; these judge the result");
+      "estimate the cameras even if the folder has some; those then serve as ground truth");
   command->Add("--up",
                Choice<std::optional<UpAxis>>(
                    &o->up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
-               "the axis of the cameras' world that points up: everything is turned to have y up, "
-               "as glTF wants it [what the cameras make plain, else y]",
+               "up axis of the camera coordinates; the result is rotated to y up, as glTF requires "
+               "[detected from the cameras, else y]",
                {Excludes{{"--model"}}});
-  command->Add("--fov", &o->fov, "degrees that images without cameras see along their longer side",
+  command->Add("--fov", &o->fov,
+               "field of view of images without cameras along their longer side, degrees",
                {Range{5, 150}});
 }
 
