@@ -12,6 +12,7 @@
 #include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
 #include "train/data/sources/installed.h"
+#include "train/data/sources/split_list.h"
 
 namespace tilegrad::train {
 namespace {
