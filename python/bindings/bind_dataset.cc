@@ -59,7 +59,7 @@ py::array CameraArray(const Dataset& d, const std::vector<Camera>& cameras) {
 
 py::array Cameras(const Dataset& d) { return CameraArray(d, train::CamerasOf(d.info(), {})); }
 
-py::array LoadCameras(const Dataset& d, int model) {
+py::array LoadModelCameras(const Dataset& d, int model) {
   const int checked = CheckedModel(d, model);
   return CameraArray(d, ValueOrThrow(WithoutGil([&] { return d.LoadCameras(checked); })));
 }
@@ -115,7 +115,8 @@ void BindDataset(py::module_& m) {
       .def("load_images", &LoadImages, py::arg("model"), "(views, 4, H, W) uint8.")
       .def("load_all_images", &LoadAllImages, py::arg("models"), py::arg("threads"),
            "(models, views, 4, H, W) uint8.")
-      .def("load_cameras", &LoadCameras, py::arg("model"), "Of its views, (views, 17) float64.")
+      .def("load_cameras", &LoadModelCameras, py::arg("model"),
+           "Of its views, (views, 17) float64.")
       .def("load_truth", &LoadTruth, py::arg("model"), "Occupancy, points, mesh.");
   py::class_<train::BatchOrder>(m, "BatchOrder", "Training batches, one per step.")
       .def(py::init<int, int, std::uint64_t>(), py::arg("models"), py::arg("views"),

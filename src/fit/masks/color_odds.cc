@@ -9,8 +9,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSide = 24;  // bins along each of the three axes
-constexpr std::size_t kBins = std::size_t{kSide} * kSide * kSide;
+constexpr int kColorSide = 24;  // bins along each of the three axes
+constexpr std::size_t kBins = std::size_t{kColorSide} * kColorSide * kColorSide;
 constexpr float kChroma = 1.5f;                  // differences of channels are small: finer bins
 constexpr float kUsual = 1, kLeastUsual = 0.1f;  // densities of what is plainly there, and hardly
 constexpr float kDarkest = 0.3f;                 // what a shadow leaves of light
@@ -18,13 +18,15 @@ constexpr float kFrontOdds = 2;                  // ln: of what stands before th
 constexpr float kShadowOdds = -1.5f;  // ln: of the floor, where it is darker than elsewhere
 constexpr float kFloor = 0.05f;       // of a density, for colours that nobody has seen
 
-int BinAlong(float value) { return std::clamp(static_cast<int>(kSide * value), 0, kSide - 1); }
+int BinAlong(float value) {
+  return std::clamp(static_cast<int>(kColorSide * value), 0, kColorSide - 1);
+}
 
 std::uint16_t BinOf(float r, float g, float b) {
   const int light = BinAlong((r + g + b) / 3);
   const int warm = BinAlong(0.5f + kChroma * 0.5f * (r - b));
   const int green = BinAlong(0.5f + kChroma * 0.25f * (2 * g - r - b));
-  return static_cast<std::uint16_t>((light * kSide + warm) * kSide + green);
+  return static_cast<std::uint16_t>((light * kColorSide + warm) * kColorSide + green);
 }
 
 std::vector<std::uint16_t> BinsOf(const TargetImages& images, std::size_t view) {
@@ -40,15 +42,16 @@ std::vector<std::uint16_t> BinsOf(const TargetImages& images, std::size_t view) 
 void BlurAlong(std::size_t stride, std::vector<float>* bins) {
   const std::vector<float> from = *bins;
   for (std::size_t i = 0; i < kBins; ++i) {
-    const std::size_t at = i / stride % kSide;
+    const std::size_t at = i / stride % kColorSide;
     const float before = at > 0 ? from[i - stride] : from[i];
-    const float after = at + 1 < kSide ? from[i + stride] : from[i];
+    const float after = at + 1 < kColorSide ? from[i + stride] : from[i];
     (*bins)[i] = 0.25f * (before + 2 * from[i] + after);
   }
 }
 
 void MakeDensity(std::vector<float>* bins) {
-  for (const std::size_t stride : {std::size_t{1}, std::size_t{kSide}, std::size_t{kSide} * kSide})
+  for (const std::size_t stride :
+       {std::size_t{1}, std::size_t{kColorSide}, std::size_t{kColorSide} * kColorSide})
     BlurAlong(stride, bins);
   const double sum = std::accumulate(bins->begin(), bins->end(), 0.0);
   const auto scale = static_cast<float>(static_cast<double>(kBins) / std::max(sum, 1e-9));
@@ -56,20 +59,21 @@ void MakeDensity(std::vector<float>* bins) {
 }
 
 std::size_t BinAt(float light, float warm, float green) {
-  return static_cast<std::size_t>(
-      (static_cast<int>(light) * kSide + static_cast<int>(warm)) * kSide + static_cast<int>(green));
+  return static_cast<std::size_t>((static_cast<int>(light) * kColorSide + static_cast<int>(warm)) *
+                                      kColorSide +
+                                  static_cast<int>(green));
 }
 
 // How far each bin, in [0, 1], is that of something outside, but darker.
 std::vector<float> Darker(const std::vector<float>& outside) {
-  constexpr float kFirst = 0.95f, kStep = 0.05f, kGrey = 0.5f * kSide;
+  constexpr float kFirst = 0.95f, kStep = 0.05f, kGrey = 0.5f * kColorSide;
   std::vector<float> out(kBins);
   for (std::size_t i = 0; i < kBins; ++i) {
     const float usual = std::min(outside[i] / kUsual, 1.0f);
     if (usual < kLeastUsual) continue;
-    const float light = static_cast<float>(i / (kSide * kSide)) + 0.5f,
-                warm = static_cast<float>(i / kSide % kSide) + 0.5f - kGrey,
-                green = static_cast<float>(i % kSide) + 0.5f - kGrey;
+    const float light = static_cast<float>(i / (kColorSide * kColorSide)) + 0.5f,
+                warm = static_cast<float>(i / kColorSide % kColorSide) + 0.5f - kGrey,
+                green = static_cast<float>(i % kColorSide) + 0.5f - kGrey;
     for (float s = kFirst; s > kDarkest; s -= kStep) {
       float& to = out[BinAt(s * light, s * warm + kGrey, s * green + kGrey)];
       to = std::max(to, usual);

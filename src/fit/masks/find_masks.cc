@@ -15,7 +15,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSide = 192;  // pixels of the longer side, about, of all rounds but the last
+constexpr int kRoundSide = 192;  // pixels of the longer side, about, of all rounds but the last
 constexpr int kRounds = 10;
 // Share of the views that may see past a cell of the hull.
 constexpr double kFirstTolerance = 0.15, kLastTolerance = 0.06;
@@ -72,7 +72,7 @@ class MaskSearch {
 MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers)
     : full_(input.images),
       workers_(workers),
-      factor_(std::max(1, std::max(full_.width, full_.height) / kSide)),
+      factor_(std::max(1, std::max(full_.width, full_.height) / kRoundSide)),
       images_(Reduce(full_, factor_)),
       odds_(images_, workers),
       inside_(images_.alpha.size()),

@@ -9,10 +9,10 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSearchSide = 40, kSide = 160;  // texels along the square
-constexpr int kHeights = 48, kBetween = 4;    // heights that are tried; then between them
-constexpr float kSame = 0.05f;                // standard deviation of one place's colour over views
-constexpr float kLeastViews = 0.4f;           // share of the views whose images must have a place
+constexpr int kSearchSide = 40, kTexelSide = 160;  // texels along the square
+constexpr int kHeights = 48, kBetween = 4;         // heights that are tried; then between them
+constexpr float kSame = 0.05f;       // standard deviation of one place's colour over views
+constexpr float kLeastViews = 0.4f;  // share of the views whose images must have a place
 constexpr float kNoSupport = 0.25f, kFullSupport = 0.5f;  // of a colour that is believed
 
 float Likeness(glm::vec3 a, glm::vec3 b) {
@@ -20,13 +20,13 @@ float Likeness(glm::vec3 a, glm::vec3 b) {
   return std::exp(-glm::dot(d, d) / (2 * kSame * kSame));
 }
 
-glm::vec3 RowOf(const Camera& c, int i) {
+glm::vec3 AxisOf(const Camera& c, int i) {
   return {c.rotation[3 * i], c.rotation[3 * i + 1], c.rotation[3 * i + 2]};
 }
 
 glm::vec3 EyeOf(const Camera& c) {
   glm::vec3 eye(0);
-  for (int i = 0; i < 3; ++i) eye -= c.translation[i] * RowOf(c, i);
+  for (int i = 0; i < 3; ++i) eye -= c.translation[i] * AxisOf(c, i);
   return eye;
 }
 
@@ -49,8 +49,8 @@ glm::vec3 UpOf(std::span<const Camera> cameras) {
   glm::mat3 sum(0);
   glm::vec3 up(0);
   for (const Camera& c : cameras) {
-    sum += glm::outerProduct(RowOf(c, 0), RowOf(c, 0));
-    up += RowOf(c, 1);
+    sum += glm::outerProduct(AxisOf(c, 0), AxisOf(c, 0));
+    up += AxisOf(c, 1);
   }
   // Power iteration, from the mean of what is up in the images to what is across all their rights.
   const glm::mat3 rest = glm::mat3(static_cast<float>(cameras.size())) - sum;
@@ -67,10 +67,10 @@ Floor::Floor(const TargetImages& images, std::span<const Camera> cameras, const 
   across_ = glm::cross(up_, along_);
   Smooth(workers);
   FindHeight(workers);
-  texels_.resize(std::size_t{kSide} * kSide);
-  workers.For(kSide, [&](std::size_t y, std::size_t) {
-    for (std::size_t i = y * kSide; i < (y + 1) * kSide; ++i)
-      texels_[i] = Seen(PointOf(height_, kSide, i));
+  texels_.resize(std::size_t{kTexelSide} * kTexelSide);
+  workers.For(kTexelSide, [&](std::size_t y, std::size_t) {
+    for (std::size_t i = y * kTexelSide; i < (y + 1) * kTexelSide; ++i)
+      texels_[i] = Seen(PointOf(height_, kTexelSide, i));
   });
 }
 
@@ -123,10 +123,10 @@ glm::vec3 Floor::ColorAt(std::size_t view, std::size_t pixel) const {
 
 bool Floor::Look(std::size_t view, glm::vec3 p, glm::vec3* color) const {
   const Camera& c = cameras_[view];
-  const float depth = -(glm::dot(RowOf(c, 2), p) + c.translation[2]);
+  const float depth = -(glm::dot(AxisOf(c, 2), p) + c.translation[2]);
   if (!(depth > c.near_plane)) return false;
-  const float x = c.cx + c.fx * (glm::dot(RowOf(c, 0), p) + c.translation[0]) / depth;
-  const float y = c.cy - c.fy * (glm::dot(RowOf(c, 1), p) + c.translation[1]) / depth;
+  const float x = c.cx + c.fx * (glm::dot(AxisOf(c, 0), p) + c.translation[0]) / depth;
+  const float y = c.cy - c.fy * (glm::dot(AxisOf(c, 1), p) + c.translation[1]) / depth;
   const bool in = x >= 0 && y >= 0 && x < static_cast<float>(images_.width) &&
                   y < static_cast<float>(images_.height);
   if (!in) return false;
@@ -172,10 +172,10 @@ const Floor::Texel* Floor::TexelAt(glm::vec3 eye, glm::vec3 ray) const {
   const float t = -above / glm::dot(ray, up_);
   if (!(t > 0)) return nullptr;
   const glm::vec3 at = (eye + t * ray - region_.middle) / region_.reach;
-  const float u = 0.5f * kSide * (glm::dot(at, along_) + 1),
-              v = 0.5f * kSide * (glm::dot(at, across_) + 1);
-  if (!(u >= 0 && v >= 0 && u < kSide && v < kSide)) return nullptr;
-  return &texels_[static_cast<std::size_t>(v) * kSide + static_cast<std::size_t>(u)];
+  const float u = 0.5f * kTexelSide * (glm::dot(at, along_) + 1),
+              v = 0.5f * kTexelSide * (glm::dot(at, across_) + 1);
+  if (!(u >= 0 && v >= 0 && u < kTexelSide && v < kTexelSide)) return nullptr;
+  return &texels_[static_cast<std::size_t>(v) * kTexelSide + static_cast<std::size_t>(u)];
 }
 
 std::vector<float> Floor::Agreement(std::size_t view) const {
@@ -186,7 +186,7 @@ std::vector<float> Floor::Agreement(std::size_t view) const {
   for (std::size_t p = 0; p < out.size(); ++p) {
     const float x = (static_cast<float>(p % wide) + 0.5f - c.cx) / c.fx,
                 y = -(static_cast<float>(p / wide) + 0.5f - c.cy) / c.fy;
-    const Texel* texel = TexelAt(eye, x * RowOf(c, 0) + y * RowOf(c, 1) - RowOf(c, 2));
+    const Texel* texel = TexelAt(eye, x * AxisOf(c, 0) + y * AxisOf(c, 1) - AxisOf(c, 2));
     if (texel == nullptr) continue;
     const float belief = (texel->support - kNoSupport) / (kFullSupport - kNoSupport);
     const float like = Likeness(texel->color, ColorAt(view, p));

@@ -56,7 +56,7 @@ Result<double> TraceOfRoot(const std::vector<double>& a, const std::vector<doubl
   return sum;
 }
 
-double SquaredDistance(const std::vector<double>& a, const std::vector<double>& b) {
+double SquaredGap(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
   return sum;
@@ -87,7 +87,7 @@ Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b) {
   TILEGRAD_TRY(CheckPair(a, b, 2, "Frechet distance"));
   const NormalFit p = NormalFitOf(a), q = NormalFitOf(b);
   TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance, a.width));
-  const double distance = SquaredDistance(p.mean, q.mean) + Trace(p.covariance, a.width) +
+  const double distance = SquaredGap(p.mean, q.mean) + Trace(p.covariance, a.width) +
                           Trace(q.covariance, a.width) - 2 * root;
   return std::max(distance, 0.0);
 }

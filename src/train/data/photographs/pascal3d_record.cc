@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/pascal3d_record.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
-#include <numbers>
+#include <glm/gtc/quaternion.hpp>
 
 #include "base/error.h"
 
@@ -74,8 +73,8 @@ Result<Pascal3dObject> ReadObject(const MatPlace& objects, std::size_t index) {
   return out;
 }
 
-Eigen::Matrix3d TurnAbout(double degrees, const Eigen::Vector3d& axis) {
-  return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis).toRotationMatrix();
+glm::dmat3 TurnAbout(double degrees, const glm::dvec3& axis) {
+  return glm::mat3_cast(glm::angleAxis(glm::radians(degrees), axis));
 }
 
 }  // namespace
@@ -102,13 +101,13 @@ Result<Pascal3dRecord> ReadPascal3dRecord(const io::MatFile& file, const std::st
 // The set's project_3d.m: the camera is at distance * (cos e sin a, -cos e cos a, sin e) and looks
 // at the origin; what it sees is turned by theta about the principal point.
 Camera64 CameraOfViewpoint(const Pascal3dViewpoint& viewpoint) {
-  const Eigen::Matrix3d from_ours = TurnAbout(90, Eigen::Vector3d::UnitX());
-  const Eigen::Matrix3d rotation = TurnAbout(viewpoint.theta, Eigen::Vector3d::UnitZ()) *
-                                   TurnAbout(viewpoint.elevation - 90, Eigen::Vector3d::UnitX()) *
-                                   TurnAbout(-viewpoint.azimuth, Eigen::Vector3d::UnitZ()) *
-                                   from_ours;
+  constexpr glm::dvec3 kX(1, 0, 0), kZ(0, 0, 1);
+  const glm::dmat3 from_ours = TurnAbout(90, kX);
+  const glm::dmat3 rotation = TurnAbout(viewpoint.theta, kZ) *
+                              TurnAbout(viewpoint.elevation - 90, kX) *
+                              TurnAbout(-viewpoint.azimuth, kZ) * from_ours;
   Camera64 out;
-  for (int i = 0; i < 9; ++i) out.rotation[i] = rotation(i / 3, i % 3);
+  for (int i = 0; i < 9; ++i) out.rotation[i] = rotation[i % 3][i / 3];
   out.translation[2] = -viewpoint.distance;
   out.fx = out.fy = viewpoint.focal * viewpoint.viewport;
   out.cx = viewpoint.px - 0.5;
