@@ -134,7 +134,7 @@ Bytes EncodeRecord(const Result<Record>& record) {
 // Errors: that of the encoded Result, or kDataLoss. What the numbers mean is the caller's to check.
 template <class Record>
 Result<Record> DecodeRecord(std::span<const std::uint8_t> bytes) {
-  const Status broken = DataLoss("the importer handed over data that is not whole");
+  const Status broken = DataLoss("the importer returned incomplete data");
   child_record::Reader reader(bytes);
   std::uint32_t magic = 0, code = 0;
   std::string message;

@@ -65,7 +65,7 @@ TEST_F(DatasetTest, PublishedSetsHaveViewsAndSplitsOfTheirOwn) {
   const std::string set = " --input " + folder_.string() + " --out " + In("out");
   ExpectError("dataset --source choy --views 3" + set, "24 views", "--views");
   ExpectError("dataset --source nmr --size 32" + set, "64 pixels", "--size");
-  ExpectError("dataset --source dvr --test-share 0.1" + set, "--source dvr has a split of its own");
+  ExpectError("dataset --source dvr --test-share 0.1" + set, "--source dvr has a fixed split");
   ExpectError("dataset --source dibr --up z" + set, "--up");
   ExpectError("dataset --source folder --allow-broken" + set, "--allow-broken");
   ExpectError("dataset --source nmr --split-list a" + set, "--split-list");

@@ -99,7 +99,7 @@ TEST_F(Runs, AreExtendedIfAskedTo) {
     std::filesystem::remove(folder_ /
                             ("run/checkpoints/step_" + std::string(step) + ".safetensors"));
   EXPECT_EQ(Done("train --resume " + In("run"))["last_step"], 5);
-  ExpectRefused("train --resume " + In("run") + " --steps 2", 2, "it has 5 steps already");
+  ExpectRefused("train --resume " + In("run") + " --steps 2", 2, "has 5 steps already");
   ExpectRefused("train --resume " + In("run") + " --set network.code=9 --steps 9", 2,
                 "network.code");
 }
@@ -128,7 +128,7 @@ TEST_F(Runs, OfFitsGoOnWithoutAnyOption) {
   EXPECT_EQ(more["steps"], 6);
   EXPECT_EQ(more["training"]["views"], 4);
   EXPECT_EQ(Done(go_on)["steps"], 6);  // it is a fit of six steps now
-  ExpectRefused(go_on + " --steps 3", 2, "it has 6 steps already, more than 3");
+  ExpectRefused(go_on + " --steps 3", 2, "has 6 steps already, more than 3");
   EXPECT_EQ(Done(go_on)["steps"], 6);
   // What was given or not given then, by name and with both values.
   ExpectRefused(go_on + " --smoothing 4", 2, "--smoothing: was 3, is 4; leave it out");

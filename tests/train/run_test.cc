@@ -72,13 +72,13 @@ TEST_F(RunTest, KeysOfFormerVersionsArePassedOver) {
   const auto old = Ok(ParseConfig(texture + "network.wrap = true\n", "old"));
   EXPECT_EQ(WriteConfig(*old), WriteConfig(ParseConfig(texture, "new").value()));
   ExpectMessage(ParseConfig(texture + "network.wrap = false\n", "c.toml").status(), "c.toml",
-                "line 2", "network.wrap no longer exists", "true");
+                "line 2", "network.wrap was removed", "true");
   const auto set = [](const char* assignment) {
     TrainConfig config = ParseConfig("task.kind = \"textured_image\"\n", "new").value();
     return ApplyOverrides({assignment}, &config);
   };
   EXPECT_TRUE(set("network.wrap=true").ok());
-  ExpectMessage(set("network.wrap=false"), "network.wrap no longer exists");
+  ExpectMessage(set("network.wrap=false"), "network.wrap was removed");
   ExpectMessage(set("network.wrap=maybe"), "unknown key \"network.wrap\"");
 }
 
@@ -89,7 +89,7 @@ TEST_F(RunTest, KeysWithoutAResultMayHaveHadAnyValue) {
 TEST_F(RunTest, NumbersOfFormerVersionsAreCompared) {
   EXPECT_TRUE(ParseConfig("network.stiffness = 0.0\n", "old").ok());
   ExpectMessage(ParseConfig("network.stiffness = 5.0\n", "old").status(), "network.stiffness",
-                "does what 0 meant");
+                "behaves as with 0");
 }
 
 // toml++ frees tables in tables by recursion.

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/broken_members.h"
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <map>
+#include <span>
 
 #include "base/error.h"
 
@@ -24,19 +28,15 @@ Status BrokenMembers::Check(std::size_t total, bool allow) const {
 }
 
 std::string BrokenMembers::Summary() const {
-  struct Kind {
-    int count = 0;
-    std::string first;
-  };
-  std::map<std::string, Kind> kinds;
-  for (const auto& [name, reason] : members_) {
-    Kind& kind = kinds[WithoutFile(reason)];
-    if (kind.count++ == 0) kind.first = name;
-  }
+  constexpr std::size_t kNamed = 5;
+  std::map<std::string, std::vector<std::string>> kinds;
+  for (const auto& [name, reason] : members_) kinds[WithoutFile(reason)].push_back(name);
   std::string out;
-  for (const auto& [reason, kind] : kinds)
-    out += fmt::format("  {:>5}  {} ({}{})\n", kind.count, reason, kind.first,
-                       kind.count > 1 ? ", ..." : "");
+  for (const auto& [reason, names] : kinds) {
+    const std::span<const std::string> named(names.data(), std::min(kNamed, names.size()));
+    out += fmt::format("  {:>5}  {} ({}{})\n", names.size(), reason, fmt::join(named, ", "),
+                       names.size() > kNamed ? ", ..." : "");
+  }
   return out;
 }
 

@@ -22,7 +22,7 @@ class BrokenMembers {
   // InvalidArgument where more than kMostShare of `total` are broken, unless `allow`: how many, the
   // first of them, and that --allow-broken goes on without them.
   Status Check(std::size_t total, bool allow) const;
-  // A line for each reason, with how many have it and the first that does; empty if there are none.
+  // A line for each reason: how many have it, and the first five of them; empty if there are none.
   // Reasons mostly begin with the file: what is the same in several is what follows it.
   std::string Summary() const;
 

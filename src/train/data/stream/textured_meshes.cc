@@ -57,7 +57,7 @@ class Loader {
       places[{source_->entries()[e].class_name, source_->entries()[e].id}] = e;
     for (std::size_t i = 0; i < models_.size(); ++i) {
       const auto at = places.find({ClassOf(models_[i]), InfoOf(models_[i]).id});
-      if (at == places.end()) return Changed(models_[i], "is not there any more");
+      if (at == places.end()) return Changed(models_[i], "no longer exists");
       entries_[i] = at->second;
     }
     return {};

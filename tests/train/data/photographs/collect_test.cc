@@ -124,7 +124,7 @@ TEST_F(CollectTest, BrokenMembersOfPascal3dCostThemselves) {
   ASSERT_TRUE(made.ok()) << made.status().message();
   EXPECT_EQ(made->photographs[0], 10);
   const std::string summary = made->broken.Summary();
-  for (const char* part : {"3 broken members", "_101.mat: ", "_103.mat: ", "_105.mat: "})
+  for (const char* part : {"_101.mat", "_103.mat", "_105.mat"})
     EXPECT_NE(summary.find(part), std::string::npos) << part << "\n" << summary;
   ExpectTrains("cars");
   job.class_name = "boat";
@@ -160,7 +160,7 @@ TEST_F(CollectTest, BrokenPicturesOfCubCostThemselves) {
   ASSERT_TRUE(made.ok()) << made.status().message();
   EXPECT_EQ(made->photographs, (std::array<int, 3>{10, 0, 4}));
   const std::string summary = made->broken.Summary();
-  for (const char* part : {"2 broken members", "bar_1.png", "bar_3.png"})
+  for (const char* part : {"bar_1.png", "bar_3.png"})
     EXPECT_NE(summary.find(part), std::string::npos) << part << "\n" << summary;
   const auto read = OpenPhotographs(folder_ / "birds");
   ASSERT_TRUE(read.ok()) << read.status().message();

@@ -300,7 +300,7 @@ TEST(BrokenMembers, OnePercentIsAllowed) {
   EXPECT_TRUE(broken.Check(99, true).ok());
   broken.Add("car/b", "b.png: cut off");
   broken.Add("car/c", "empty");
-  EXPECT_EQ(broken.Summary(), "      2  cut off (car/a, ...)\n      1  empty (car/c)\n");
+  EXPECT_EQ(broken.Summary(), "      2  cut off (car/a, car/b)\n      1  empty (car/c)\n");
 }
 
 }  // namespace tilegrad::train::rendered_views_test
