@@ -24,15 +24,24 @@ ROWS, COLUMNS, SIDE, TEXTURES = 21, 50, 256, 256
 CONFIG = pathlib.Path(__file__).parents[2] / "configs/texture_quick.toml"
 
 
+def chunk(kind, data):
+    """Of a PNG file."""
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
 def png(seed):
     """Coloured stripes with some noise."""
     rng = random.Random(seed)
     base = bytes(rng.randrange(256) for _ in range(3 * 16))
     rows = b"".join(b"\0" + bytes((base[3 * ((x + y) // 16 % 16) + c] + rng.getrandbits(3)) % 256 for x in range(SIDE) for c in range(3))
                     for y in range(SIDE))
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", SIDE, SIDE, 8, 2, 0, 0, 0)) + chunk(b"IDAT", zlib.compress(rows, 6))
             + chunk(b"IEND", b""))
+
+
+def corner(row, column):
+    """A vertex and its texture coordinates, counted from 1."""
+    return f"{row * COLUMNS + column % COLUMNS + 1}/{row * (COLUMNS + 1) + column + 1}"
 
 
 def rest_of_obj():
@@ -40,8 +49,8 @@ def rest_of_obj():
     lines = [f"vt {c / COLUMNS:.4f} {r / (ROWS - 1):.4f}" for r in range(ROWS) for c in range(COLUMNS + 1)] + ["usemtl painted"]
     for r in range(ROWS - 1):
         for c in range(COLUMNS):
-            at = lambda dr, dc: f"{(r + dr) * COLUMNS + (c + dc) % COLUMNS + 1}/{(r + dr) * (COLUMNS + 1) + c + dc + 1}"
-            lines += [f"f {at(0, 0)} {at(0, 1)} {at(1, 1)}", f"f {at(0, 0)} {at(1, 1)} {at(1, 0)}"]
+            here, far = corner(r, c), corner(r + 1, c + 1)
+            lines += [f"f {here} {corner(r, c + 1)} {far}", f"f {here} {far} {corner(r + 1, c)}"]
     return "\n".join(lines) + "\n"
 
 
