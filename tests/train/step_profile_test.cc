@@ -15,7 +15,8 @@ class StepProfileTest : public TempFolderTest {
     Ok(WriteNoiseDataset(folder_ / "data"));
     auto config = ParseConfig(kTinyConfig, "tiny");
     EXPECT_TRUE(config.ok()) << config.status().message();
-    job_ = {.config = std::move(config).value(), .data = folder_ / "data"};
+    job_.config = std::move(config).value();
+    job_.data = folder_ / "data";
     job_.config.schedule.steps = 4;
   }
   void Run(const std::string& name, const Workers& workers) {
