@@ -6,8 +6,8 @@
 #include <numeric>
 #include <vector>
 
-#include "base/dense.h"
 #include "base/error.h"
+#include "train/dense.h"
 
 namespace tilegrad::train {
 namespace {

@@ -6,7 +6,6 @@
 #include <memory>
 #include <mutex>
 
-#include "base/dense.h"
 #include "base/error.h"
 #include "io/image_file.h"
 #include "render/picture/mesh_pictures.h"
@@ -17,6 +16,7 @@
 #include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/factorization.h"
 #include "train/data/photographs/points3.h"
+#include "train/dense.h"
 
 namespace tilegrad::train {
 namespace {

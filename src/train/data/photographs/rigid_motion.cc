@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/dense.h"
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
 #include "train/data/photographs/points3.h"
+#include "train/dense.h"
 
 namespace tilegrad::train {
 namespace {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/dense.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
+#include "train/dense.h"
 
 namespace tilegrad::train {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/dense.h"
+#include "train/dense.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-namespace tilegrad {
+namespace tilegrad::train {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -63,4 +63,4 @@ std::vector<double> Product(std::span<const double> a, std::span<const double> b
   return out;
 }
 
-}  // namespace tilegrad
+}  // namespace tilegrad::train

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace tilegrad {
+namespace tilegrad::train {
 
 // Normal equations of a linear least-squares problem.
 struct NormalEquations {
@@ -35,4 +35,4 @@ std::vector<double> FunctionOf(const Eigenpairs& parts, double (*f)(double));
 
 std::vector<double> Product(std::span<const double> a, std::span<const double> b, std::size_t n);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::train
