@@ -62,8 +62,7 @@ Status MakePhotographSets(const PhotographSetOptions& options) {
   for (const std::string& name : classes) {
     const train::CollectionJob job{options.source, options.input, name, options.masks,
                                    options.allow_broken};
-    const Status status =
-        MakeSet(job, classes.size() > 1 ? out / name : out, workers, options.force);
+    Status status = MakeSet(job, classes.size() > 1 ? out / name : out, workers, options.force);
     const bool empty = status.code() == StatusCode::kNotFound && classes.size() > 1;
     if (!status.ok() && !empty) return status;
     if (empty) Print("left out: {}\n", status.message());
