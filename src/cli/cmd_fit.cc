@@ -323,7 +323,7 @@ Status RunShown(const FitOptions& options, train::FitJob* job, const Workers& wo
   Live live;
   if (options.live)
     TILEGRAD_TRY(live.Start({options.out, {}, options.config.steps, train::FitLabels()}));
-  const Status status = RunClaimed(options, job, workers, live.Sink(progress));
+  Status status = RunClaimed(options, job, workers, live.Sink(progress));
   live.Finish(status);
   return status;
 }

@@ -374,7 +374,7 @@ Status RunPrediction(const PredictOptions& options) {
   Status first;
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(prediction, image, &json);
+    Status status = PredictOne(prediction, image, &json);
     if (status.ok()) continue;
     if (status.code() == StatusCode::kCancelled) return status;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());

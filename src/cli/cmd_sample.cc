@@ -212,7 +212,7 @@ Status RunSampling(const SampleOptions& options) {
     codes.push_back(model->Code(options.seed, static_cast<std::uint64_t>(i)));
   TILEGRAD_ASSIGN(const auto meshes, GenerateAll(*model, codes));
   nlohmann::ordered_json json = {{"seed", options.seed},
-                                 {"textured", model->textured()},
+                                 {"textured", model->has_textures()},
                                  {"sheet", files.sheet.string()},
                                  {"turntable", files.turntable.string()}};
   for (std::size_t i = 0; i < meshes.size(); ++i) {

@@ -22,7 +22,7 @@ class GeneratorModel : public Model {
   // Numbers of a code.
   std::int64_t noise() const { return config_.network.noise; }
   // Whether textures have learned: in the first stage only shapes do.
-  bool textured() const { return textured_; }
+  bool has_textures() const { return textured_; }
   // Code `index` of those that `seed` stands for: standard normal, the same on every machine.
   std::vector<float> Code(std::uint64_t seed, std::uint64_t index) const;
   // codes: [n][noise()].

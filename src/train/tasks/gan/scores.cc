@@ -95,7 +95,7 @@ class Scorer {
     TILEGRAD_ASSIGN(const FeatureRows pictures, judge_->Pictures(truth));
     const FeatureRows shapes = CoverFeatures(truth);
     TILEGRAD_TRY(Add("generator", {pictures, shapes}, made, rows));
-    if (!model_.textured()) return {};
+    if (!model_.has_textures()) return {};
     TILEGRAD_ASSIGN(const ObjectViews mean, Generated(true));
     return Add("its shapes, mean texture", {pictures, shapes}, mean, rows);
   }

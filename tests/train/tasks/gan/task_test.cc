@@ -153,7 +153,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
     const Workers workers(count);
     const auto predictor = Ok(Predictor::Load(run, workers));
     auto& model = *predictor->model().generator();
-    EXPECT_TRUE(model.textured());
+    EXPECT_TRUE(model.has_textures());
     std::vector<float> codes = model.Code(5, 0);
     for (const float x : model.Code(5, 1)) codes.push_back(x);
     auto meshes = Ok(model.Generate(codes));
