@@ -2,14 +2,14 @@
 #include "base/scratch_bytes.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <atomic>
 #include <filesystem>
 #include <new>
-#include <string>
 #include <system_error>
 
 namespace tilegrad {
@@ -18,10 +18,12 @@ namespace {
 // Room for `size` bytes, so that no write to the mapping can fail; -1 where there is none.
 int OpenScratchFile(std::size_t size) {
   std::error_code error;
-  std::string name = (std::filesystem::temp_directory_path(error) / "tilegrad-XXXXXX").string();
-  const int fd = ::mkostemp(name.data(), O_CLOEXEC);
+  static std::atomic<unsigned> count = 0;
+  const auto file = std::filesystem::temp_directory_path(error) /
+                    fmt::format("tilegrad-{}-{}", ::getpid(), count++);
+  const int fd = ::open(file.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0600);
   if (fd < 0) return -1;
-  ::unlink(name.c_str());
+  ::unlink(file.c_str());
   if (::posix_fallocate(fd, 0, static_cast<off_t>(size)) == 0) return fd;
   ::close(fd);
   return -1;

@@ -93,19 +93,21 @@ Status RunProfile(const ProfileOptions& options) {
 
 void AddProfile(CommandList* list) {
   const auto [command, options] = AddCommand(
-      list, "profile", "Predict what a training step takes on many cores, and what holds it back",
+      list, "profile", "Predict the time of a training step on many cores, and its bottlenecks",
       RunProfile);
-  command->Add("--config", &options->config, "as of train", {Required{}});
+  command->Add("--config", &options->config, "configuration, as in train", {Required{}});
   command->Add("--data", &options->data, "dataset folder", {Required{}});
-  command->Add("--set", &options->overrides, "override a key, as of train (repeatable)");
-  command->Add("--workers", &options->workers, "numbers of cores to predict for",
+  command->Add("--set", &options->overrides, "override a key, as in train (repeatable)");
+  command->Add("--workers", &options->workers, "core counts to predict for",
                {SplitAtCommas{}, Range{2, kMostWorkers}});
-  command->Add("--steps", &options->steps, "to record, after three to warm up", {Range{1, 10000}});
-  command->Add("--bandwidth", &options->bandwidth,
-               "GB/s to memory of all cores together; 0: each core has what one here has",
-               {NotNegative()});
+  command->Add("--steps", &options->steps, "steps to record after three warm-up steps",
+               {Range{1, 10000}});
+  command->Add(
+      "--bandwidth", &options->bandwidth,
+      "memory bandwidth of all cores together, GB/s; 0: that of one core here, times cores",
+      {NotNegative()});
   command->Add("--start", &options->start,
-               "microseconds until all cores take part in a loop; 0: grows from what is measured",
+               "microseconds to start a loop on all cores; 0: extrapolated from this machine",
                {NotNegative()});
 }
 

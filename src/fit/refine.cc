@@ -208,7 +208,7 @@ Status Normalize(Mesh* mesh, Camera* camera) {
   const Bounds box = MeshBounds(*mesh);
   TILEGRAD_TRY(NormalizeToBox(*mesh, kPredictionHalfExtent));
   const glm::dvec3 low(box.low), high(box.high), half = 0.5 * (high - low);
-  Alignment moved;
+  Similarity moved;
   moved.scale = static_cast<double>(kPredictionHalfExtent) / std::max({half.x, half.y, half.z});
   for (int i = 0; i < 3; ++i) moved.offset[i] = -moved.scale * 0.5 * (low[i] + high[i]);
   *camera = Moved(*camera, moved);

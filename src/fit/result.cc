@@ -42,11 +42,11 @@ void ScoreCameras(const FitJob& job, const FitScene& scene, FitOutcome* outcome)
   const std::vector<int>& views = job.input.training;
   const std::vector<Camera> truth = Choose(GivenCameras(job.input), views);
   std::vector<Camera> before = Choose(TurnedCameras(job, scene.pivot), views);
-  const Alignment first = found ? AlignCameras(before, truth) : Alignment();
+  const Similarity first = found ? AlignCameras(before, truth) : Similarity();
   for (Camera& camera : before) camera = Moved(camera, first);
   outcome->camera_error_before = MeanAngle(before, truth);
   std::vector<Camera> fitted = Choose(scene.cameras, views);
-  const Alignment alignment = AlignCameras(fitted, truth);
+  const Similarity alignment = AlignCameras(fitted, truth);
   for (Camera& camera : fitted) camera = Moved(camera, alignment);
   outcome->camera_error_after = MeanAngle(fitted, truth);
 }

@@ -76,34 +76,7 @@ glm::dvec3 CentreOf(const Camera& camera) {
   return -(glm::transpose(RotationOf(camera)) * TranslationOf(camera));
 }
 
-// The rotation R with the largest trace(R^T m), as B. Horn finds it (JOSA A 4, 1987): its
-// quaternion is the eigenvector of the largest eigenvalue of a symmetric 4x4 matrix. Always a
-// rotation, also where the orthogonal matrix nearest to m is a reflection.
-glm::dmat3 NearestRotation(const glm::dmat3& m) {
-  const auto at = [&m](int row, int column) { return m[column][row]; };
-  const double w[3] = {at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)};
-  glm::dmat4 k(0);
-  k[0][0] = at(0, 0) + at(1, 1) + at(2, 2);
-  for (int i = 0; i < 3; ++i) {
-    k[0][i + 1] = k[i + 1][0] = w[i];
-    for (int j = 0; j < 3; ++j) k[i + 1][j + 1] = at(i, j) + at(j, i) - (i == j ? k[0][0] : 0);
-  }
-  double size = 0;
-  for (int i = 0; i < 16; ++i) size += std::abs(k[i / 4][i % 4]);
-  if (!(size > 0)) return glm::dmat3(1);
-  k += glm::dmat4(size);  // no eigenvalue is negative: the largest is that of largest magnitude
-  constexpr int kSquarings = 40;
-  for (int i = 0; i < kSquarings; ++i) {
-    k = k * k;
-    k /= k[0][0] + k[1][1] + k[2][2] + k[3][3];
-  }
-  glm::dvec4 q = k[0];
-  for (int i = 1; i < 4; ++i) q = glm::dot(k[i], k[i]) > glm::dot(q, q) ? k[i] : q;
-  q = glm::normalize(q);
-  return glm::mat3_cast(glm::dquat(q[0], q[1], q[2], q[3]));
-}
-
-glm::dmat3 MatrixOf(const Alignment& a) {
+glm::dmat3 MatrixOf(const Similarity& a) {
   glm::dmat3 m;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) m[c][r] = a.rotation[3 * r + c];
@@ -155,33 +128,22 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
   return scores;
 }
 
-Alignment AlignCameras(std::span<const Camera> from, std::span<const Camera> to) {
+Similarity AlignCameras(std::span<const Camera> from, std::span<const Camera> to) {
   glm::dmat3 sum(0);
-  glm::dvec3 mean_from(0), mean_to(0);
-  const auto n = static_cast<double>(from.size());
+  std::vector<std::array<double, 3>> places_from, places_to;
   for (std::size_t i = 0; i < from.size(); ++i) {
     sum += glm::transpose(RotationOf(to[i])) * RotationOf(from[i]);
-    mean_from += CentreOf(from[i]) / n;
-    mean_to += CentreOf(to[i]) / n;
+    const glm::dvec3 a = CentreOf(from[i]);
+    const glm::dvec3 b = CentreOf(to[i]);
+    places_from.push_back({a[0], a[1], a[2]});
+    places_to.push_back({b[0], b[1], b[2]});
   }
-  const glm::dmat3 rotation = NearestRotation(sum);
-  double along = 0, square = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    const glm::dvec3 a = rotation * (CentreOf(from[i]) - mean_from), b = CentreOf(to[i]) - mean_to;
-    along += glm::dot(a, b);
-    square += glm::dot(a, a);
-  }
-  Alignment out;
-  if (square > 0 && along > 0) out.scale = along / square;
-  const glm::dvec3 offset = mean_to - out.scale * (rotation * mean_from);
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) out.rotation[3 * r + c] = rotation[c][r];
-    out.offset[r] = offset[r];
-  }
-  return out;
+  std::array<double, 9> m;
+  for (int i = 0; i < 9; ++i) m[static_cast<std::size_t>(i)] = sum[i % 3][i / 3];
+  return FitSimilarity(NearestRotation(m), places_from, places_to);
 }
 
-Camera Moved(const Camera& camera, const Alignment& a) {
+Camera Moved(const Camera& camera, const Similarity& a) {
   // s (R p + t) = (R Q^T)(s Q p + b) + s t - R Q^T b
   const glm::dmat3 r = RotationOf(camera) * glm::transpose(MatrixOf(a));
   const glm::dvec3 t =
@@ -194,7 +156,7 @@ Camera Moved(const Camera& camera, const Alignment& a) {
   return out;
 }
 
-void Move(const Alignment& a, std::vector<float>* positions) {
+void Move(const Similarity& a, std::vector<float>* positions) {
   const glm::dmat3 q = MatrixOf(a);
   for (std::size_t i = 0; i < positions->size(); i += 3) {
     float* p = positions->data() + i;

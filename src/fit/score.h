@@ -8,6 +8,7 @@
 #include "fit/input.h"
 #include "fit/scene.h"
 #include "render/picture/picture.h"
+#include "train/similarity.h"
 
 namespace tilegrad::train {
 
@@ -31,18 +32,12 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
 double MeanPsnr(std::span<const ViewScore> scores);
 double MeanIou(std::span<const ViewScore> scores);
 
-// The similarity p' = scale * rotation * p + offset that brings cameras `from` to stand and look
-// like `to` as well as possible: rotation from their axes, the rest from their centres. Refined
-// cameras fix a scene only up to it.
-struct Alignment {
-  double scale = 1;
-  double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major
-  double offset[3] = {0, 0, 0};
-};
-Alignment AlignCameras(std::span<const Camera> from, std::span<const Camera> to);
+// Brings cameras `from` to stand and look like `to` as well as possible: rotation from their axes,
+// the rest from their centres. Refined cameras fix a scene only up to it.
+Similarity AlignCameras(std::span<const Camera> from, std::span<const Camera> to);
 // The camera that sees a world moved by `a` as `camera` sees the world.
-Camera Moved(const Camera& camera, const Alignment& a);
-void Move(const Alignment& a, std::vector<float>* positions);
+Camera Moved(const Camera& camera, const Similarity& a);
+void Move(const Similarity& a, std::vector<float>* positions);
 // Degrees between the two cameras' orientations.
 double AngleBetween(const Camera& a, const Camera& b);
 

@@ -167,7 +167,9 @@ TEST(FitMasks, AFloorStandsOutWhereThereIsOne) {
     const Workers workers(1);
     const Floor floor(input.images, input.cameras, {{0, 0, 0}, 0.9f}, workers);
     EXPECT_EQ(floor.found(), place != Place::kPaper);
-    if (floor.found()) EXPECT_NEAR(floor.height(), kFloor, 0.02f);
+    if (floor.found()) {
+      EXPECT_NEAR(floor.height(), kFloor, 0.02f);
+    }
     const glm::vec3 up = UpOf(input.cameras);
     EXPECT_NEAR(up.y, 1, 1e-4f);
   }

@@ -449,7 +449,7 @@ TEST_F(Fit, TransformsRoundTrip) {
 }
 
 TEST(FitScore, AlignmentFindsASimilarity) {
-  Alignment truth;
+  Similarity truth;
   const double angle = 0.4;
   truth.scale = 1.3;
   truth.rotation[0] = truth.rotation[4] = std::cos(angle);
@@ -462,7 +462,7 @@ TEST(FitScore, AlignmentFindsASimilarity) {
     from.push_back(OrbitCamera({50, 40, 30}, 70 * i, 10 * i, 2));
     to.push_back(Moved(from.back(), truth));
   }
-  const Alignment found = AlignCameras(from, to);
+  const Similarity found = AlignCameras(from, to);
   EXPECT_NEAR(found.scale, truth.scale, 1e-5);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(found.rotation[i], truth.rotation[i], 1e-5);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.offset[i], truth.offset[i], 1e-5);
@@ -477,12 +477,12 @@ TEST(FitScore, AlignmentIsARotationWhateverTheCameras) {
       {1, 0, 0, 0, -1, 0, 0, 0, -1}, {-1, 0, 0, 0, 1, 0, 0, 0, -1}, {-1, 0, 0, 0, -1, 0, 0, 0, 1}};
   for (int i = 0; i < 3; ++i) {
     from[i] = to[i] = OrbitCamera({50, 40, 30}, 0, 0, 2);
-    Alignment turn;
-    std::copy_n(half_turns[i], 9, turn.rotation);
+    Similarity turn;
+    std::copy_n(half_turns[i], 9, turn.rotation.begin());
     to[i] = Moved(from[i], turn);
   }
-  const Alignment found = AlignCameras(from, to);
-  const double* r = found.rotation;
+  const Similarity found = AlignCameras(from, to);
+  const auto& r = found.rotation;
   const double determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
                              r[1] * (r[3] * r[8] - r[5] * r[6]) +
                              r[2] * (r[3] * r[7] - r[4] * r[6]);

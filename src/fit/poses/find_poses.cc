@@ -32,7 +32,7 @@ constexpr double kAgree = 12;                    // degrees, mean
 constexpr double kCameraDistance = 1.6;
 
 double MeanGap(std::span<const Camera> a, std::span<const Camera> b) {
-  const Alignment alignment = AlignCameras(a, b);
+  const Similarity alignment = AlignCameras(a, b);
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += AngleBetween(Moved(a[i], alignment), b[i]);
   return sum / static_cast<double>(a.size());
@@ -162,7 +162,7 @@ Result<std::vector<Camera>> Refine(const PosePictures& pictures, std::span<const
   const glm::dvec3 y(up[0], up[1], up[2]);
   const glm::dvec3 any = std::abs(y.z) < 0.7 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
   const glm::dvec3 x = glm::normalize(glm::cross(y, any)), z = glm::cross(x, y);
-  Alignment turn;  // of the world, so that y is up
+  Similarity turn;  // of the world, so that y is up
   const glm::dvec3 rows[] = {x, y, z};
   for (int i = 0; i < 9; ++i) turn.rotation[i] = rows[i / 3][i % 3];
   std::vector<Camera> out;

@@ -139,7 +139,7 @@ Result<FoundPoses> Search(const InputPosesJob& job, const TargetImages& images,
 
 // Held-out cameras were given in another world.
 void MoveHeldOut(const std::vector<Camera>& given, FitInput* input) {
-  const Alignment alignment =
+  const Similarity alignment =
       AlignCameras(Chosen(given, input->training), Chosen(input->cameras, input->training));
   for (const int i : input->held_out) {
     Camera& camera = input->cameras[static_cast<std::size_t>(i)];
@@ -202,7 +202,7 @@ Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const Fit
     TILEGRAD_TRY(TakePoses(job.file, kept, from, &refined));
   } else {
     TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
-    Alignment shrink;
+    Similarity shrink;
     shrink.scale = 0.5 / static_cast<double>(sphere.radius);
     for (int i = 0; i < 3; ++i) {
       shrink.offset[i] = -shrink.scale * static_cast<double>(sphere.centre[i]);
@@ -211,7 +211,7 @@ Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const Fit
     for (Camera& camera : near) camera = Moved(camera, shrink);
     TILEGRAD_ASSIGN(refined.cameras,
                     RefinePoses(Chosen(input.images, input.training), near, workers, watch));
-    const Alignment back = AlignCameras(refined.cameras, from);
+    const Similarity back = AlignCameras(refined.cameras, from);
     for (Camera& camera : refined.cameras) camera = Moved(camera, back);
     TILEGRAD_TRY(Keep(job, refined));
   }

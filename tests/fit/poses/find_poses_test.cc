@@ -78,7 +78,7 @@ double MeanError(const FitInput& input) {
     found.push_back(input.cameras[static_cast<std::size_t>(i)]);
     given.push_back(input.given_cameras[static_cast<std::size_t>(i)]);
   }
-  const Alignment alignment = AlignCameras(found, given);
+  const Similarity alignment = AlignCameras(found, given);
   double sum = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     sum += AngleBetween(Moved(found[i], alignment), given[i]) / static_cast<double>(found.size());

@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "scene/weak_perspective_ref.h"
-#include "train/data/photographs/points3.h"
 #include "train/data/photographs/rigid_motion.h"
+#include "train/points3.h"
 
 namespace tilegrad::train {
 namespace {

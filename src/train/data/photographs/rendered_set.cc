@@ -11,17 +11,16 @@
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/picture.h"
 #include "scene/shapes.h"
-#include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/cmr_writer.h"
 #include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/factorization.h"
-#include "train/data/photographs/points3.h"
-#include "train/dense.h"
+#include "train/points3.h"
+#include "train/similarity.h"
 
 namespace tilegrad::train {
 namespace {
 
-using points3::Dot, points3::Point, points3::operator+, points3::operator-, points3::operator*;
+using points3::Point, points3::operator+, points3::operator*;
 
 constexpr int kWidth = 208, kHeight = 160, kSide = 144;       // pixels; the object's square
 constexpr double kStretch = 0.15, kFov = 30, kHidden = 0.03;  // world units behind what is seen
@@ -194,57 +193,6 @@ Status FindCameras(PhotographSet* set) {
   return {};
 }
 
-// x -> scale * rotation * x + shift.
-struct Similarity {
-  Mat3Array rotation{};
-  double scale = 1;
-  Point shift{};
-
-  Point operator()(const Point& x) const { return scale * weak_ref::Rotate(rotation, x) + shift; }
-};
-
-Point MeanOf(const std::vector<Point>& points) {
-  Point sum{};
-  for (const Point& p : points) sum = sum + p;
-  return (1 / static_cast<double>(points.size())) * sum;
-}
-
-// The rotation that turns `from` towards `to`, both about their means, in least squares (Horn,
-// "Closed-form solution of absolute orientation using unit quaternions", 1987).
-Mat3Array RotationBetween(const std::vector<Point>& from, const std::vector<Point>& to) {
-  const Point a_mean = MeanOf(from), b_mean = MeanOf(to);
-  double s[3][3] = {};
-  for (std::size_t k = 0; k < from.size(); ++k) {
-    const Point a = from[k] - a_mean, b = to[k] - b_mean;
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j) s[i][j] += a[i] * b[j];
-  }
-  const double x = s[0][0], y = s[1][1], z = s[2][2];
-  const double yz = s[1][2] - s[2][1], zx = s[2][0] - s[0][2], xy = s[0][1] - s[1][0];
-  const double yz2 = s[1][2] + s[2][1], zx2 = s[2][0] + s[0][2], xy2 = s[0][1] + s[1][0];
-  const auto parts = SymmetricEigenpairs(std::array{x + y + z, yz, zx, xy,     //
-                                                    yz, x - y - z, xy2, zx2,   //
-                                                    zx, xy2, -x + y - z, yz2,  //
-                                                    xy, zx2, yz2, -x - y + z});
-  if (!parts) return Mat3Array{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const double* const q = &parts->vectors[12];
-  return RotationOf(std::array{q[0], q[1], q[2], q[3]});
-}
-
-Similarity SimilarityBetween(const std::vector<Point>& from, const std::vector<Point>& to) {
-  Similarity out{.rotation = RotationBetween(from, to)};
-  const Point a_mean = MeanOf(from), b_mean = MeanOf(to);
-  double along = 0, squares = 0;
-  for (std::size_t k = 0; k < from.size(); ++k) {
-    const Point a = from[k] - a_mean;
-    along += Dot(to[k] - b_mean, weak_ref::Rotate(out.rotation, a));
-    squares += Dot(a, a);
-  }
-  out.scale = along / squares;
-  out.shift = b_mean - out.scale * weak_ref::Rotate(out.rotation, a_mean);
-  return out;
-}
-
 // From the world of the models to that of the cameras, by the means of keypoints in both.
 Similarity WorldOfCameras(const PhotographSet& set) {
   std::vector<Point> mean(set.mean_keypoints.size());
@@ -254,7 +202,7 @@ Similarity WorldOfCameras(const PhotographSet& set) {
     for (std::size_t k = 0; k < mean.size(); ++k)
       mean[k] = mean[k] + (1 / static_cast<double>(train.size())) * points[k];
   }
-  return SimilarityBetween(mean, set.mean_keypoints);
+  return FitSimilarity(mean, set.mean_keypoints);
 }
 
 // Of the test part alone: nothing else knows the models.

@@ -7,8 +7,8 @@
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/factorization.h"
-#include "train/data/photographs/points3.h"
 #include "train/dense.h"
+#include "train/points3.h"
 
 namespace tilegrad::train {
 namespace {

@@ -200,8 +200,10 @@ constexpr std::size_t kPixels = std::size_t{kSize} * kSize;
 using Direction = std::array<float, 3>;
 
 struct Ball {
-  std::vector<double> texture = std::vector<double>(3 * kPixels), normals = texture,
-                      picture = texture, cover = std::vector<double>(kPixels);
+  std::vector<double> texture = std::vector<double>(3 * kPixels);
+  std::vector<double> normals = texture;
+  std::vector<double> picture = texture;
+  std::vector<double> cover = std::vector<double>(kPixels);
 
   // As a camera at infinity sees it. `law`: the light at a normal in its axes.
   template <class Law>
