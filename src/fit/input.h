@@ -86,8 +86,8 @@ bool HasAlpha(const FitInput& input);
 // Sets `seeks_masks`: whether masks are those that views have in common, which StartMasks then
 // finds. An error if that is asked for without cameras or of too few views.
 Status SeekMasks(Background background, FitInput* input);
-// Masks from alpha or plain backgrounds, unless they are to be sought; sets `masked`. An error only
-// if stopped.
+// Masks from alpha or plain backgrounds; sets `masked`. Where masks are to be sought, plain
+// backgrounds take their place only if no view is in doubt. An error only if stopped.
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch = {});
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
 Status TakePlainBackgrounds(FitInput* input, const Watch& watch = {});

@@ -37,12 +37,12 @@ Status TakePlainBackgrounds(FitInput* input, const Watch& watch) {
 
 namespace {
 
-Status LookForPlainBackgrounds(bool asked, FitInput* input, const Watch& watch) {
+// Keeps them where at most so many views are in doubt.
+Status LookForPlainBackgrounds(std::size_t most_doubts, FitInput* input, const Watch& watch) {
   FitInput masked = *input;
   TILEGRAD_TRY(TakePlainBackgrounds(&masked, watch));
   const std::size_t doubts = masked.warnings.size() - input->warnings.size();
-  // Backgrounds that are not plain make no masks unless somebody says so.
-  if (asked || 2 * doubts <= masked.names.size()) *input = std::move(masked);
+  if (doubts <= most_doubts) *input = std::move(masked);
   return {};
 }
 
@@ -106,9 +106,13 @@ Status SeekMasks(Background background, FitInput* input) {
 
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch) {
   if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
-  const bool asked = background == Background::kPlain;
-  if (asked || (background == Background::kAuto && !HasAlpha(*input) && !input->seeks_masks)) {
-    TILEGRAD_TRY(LookForPlainBackgrounds(asked, input, watch));
+  const std::size_t views = input->names.size();
+  if (background == Background::kPlain) {
+    TILEGRAD_TRY(LookForPlainBackgrounds(views, input, watch));
+  } else if (background == Background::kAuto && !HasAlpha(*input)) {
+    // Known cameras separate more than plain backgrounds, but a plain one is found more exactly.
+    TILEGRAD_TRY(LookForPlainBackgrounds(input->seeks_masks ? 0 : views / 2, input, watch));
+    input->seeks_masks = input->seeks_masks && !HasAlpha(*input);
   }
   input->masked = HasAlpha(*input);
   return {};

@@ -182,7 +182,7 @@ class Fit(FolderTest):
             save_image(folder / f"{i}.png", image)
         for images, cameras, last in (
                 (IMAGES, CAMERAS, "preparing"), (folder, None, "reading images"),
-                (IMAGES[..., :3], CAMERAS, "finding masks")):
+                (IMAGES[..., :3], CAMERAS, "looking for plain backgrounds")):
             told = Until(last)
             result = tilegrad.fit(images, cameras, callback=told, **SMALL)
             self.assertEqual((result.finished, result.mesh, result.steps), (False, None, 0))
