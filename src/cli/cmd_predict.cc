@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/json_text.h"
 #include "base/output_guard.h"
 #include "base/parallel.h"
 #include "base/progress.h"
@@ -174,7 +175,7 @@ nlohmann::ordered_json ScoresOf(const train::RefinedMesh& refined) {
 Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {
   nlohmann::ordered_json record = ScoresOf(refined);
   record["camera"] = CameraRecord(refined.camera);
-  return WriteTextAtomic(file, record.dump(1) + "\n");
+  return WriteTextAtomic(file, DumpJson(record, 1) + "\n");
 }
 
 struct PredictOptions {

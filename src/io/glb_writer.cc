@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
 #include "scene/srgb.h"
@@ -72,7 +73,7 @@ void AppendChunk(Bytes& out, const char type[5], const std::uint8_t* data, std::
 Result<Bytes> AssembleGlb(GlbBuilder& glb) {
   glb.json["buffers"] = Json::array({{{"byteLength", glb.binary.size()}}});
   // Names come from files and may not be UTF-8: replace what is not.
-  const std::string text = glb.json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = DumpJson(glb.json);
   const std::size_t total =
       12 + 8 + (text.size() + 3) / 4 * 4 + 8 + (glb.binary.size() + 3) / 4 * 4;
   if (total > 0xFFFFFFFFu)

@@ -185,7 +185,7 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
   TILEGRAD_TRY(CheckNesting(text, place));
   GltfDocument document;
   try {
-    const ParsedJson json = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
+    const ParsedJson json = ParseJsonOrDiscard(text);
     TILEGRAD_TRY(CheckImages(json, place));
     BufferFiles files(source, name, json);
     TILEGRAD_TRY(Parse(bytes, files, place, &document.model));

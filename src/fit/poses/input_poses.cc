@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "base/hash.h"
+#include "base/json_text.h"
 #include "fit/score.h"
 #include "fit/sphere.h"
 #include "train/json_fields.h"
@@ -87,7 +88,7 @@ Status TakePoses(const Path& path, const Json& file, std::span<const Camera> len
 Status Keep(const InputPosesJob& job, const FoundPoses& found) {
   const Json file = {
       {"agreement", found.agreement}, {"loss", found.loss}, {"poses", JsonOf(found.cameras)}};
-  return job.file.empty() ? Status() : WriteTextAtomic(job.file, file.dump(1) + "\n");
+  return job.file.empty() ? Status() : WriteTextAtomic(job.file, DumpJson(file, 1) + "\n");
 }
 
 // ---- Searches that were stopped before they agreed.
@@ -104,7 +105,7 @@ Status KeepSearches(const Path& path, const std::string& images,
   Json file = {{"images", images}, {"searches", Json::array()}};
   for (const PoseStart& s : searches)
     file["searches"].push_back({{"loss", s.loss}, {"poses", JsonOf(s.cameras)}});
-  return WriteTextAtomic(path, file.dump(1) + "\n");
+  return WriteTextAtomic(path, DumpJson(file, 1) + "\n");
 }
 
 // None where they are of other images.

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/escape_text.h"
+#include "base/json_text.h"
 #include "io/image_file.h"
 
 namespace tilegrad::train {
@@ -44,8 +45,7 @@ std::string Base64(std::span<const std::uint8_t> bytes) {
 }
 
 std::string ScriptJson(const nlohmann::ordered_json& json) {
-  const auto replace = nlohmann::ordered_json::error_handler_t::replace;
-  std::string out = Shown(json).dump(-1, ' ', false, replace);
+  std::string out = DumpJson(Shown(json));
   for (std::size_t at = out.find('<'); at != std::string::npos; at = out.find('<', at))
     out.replace(at, 1, "\\u003c");
   return out;

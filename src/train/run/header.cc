@@ -4,6 +4,7 @@
 #include <fstream>
 #include <limits>
 
+#include "base/json_text.h"
 #include "base/parallel.h"
 #include "base/simd_target.h"
 #include "tilegrad/version.h"
@@ -17,7 +18,7 @@ std::vector<std::pair<std::string, std::string>> TextsIn(const nlohmann::json& j
   std::vector<std::pair<std::string, std::string>> out;
   if (!json.contains(key)) return out;
   for (const auto& [name, value] : json[key].items())
-    out.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
+    out.emplace_back(name, value.is_string() ? value.get<std::string>() : DumpJson(value));
   return out;
 }
 

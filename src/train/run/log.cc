@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_text.h"
 
 namespace tilegrad::train {
 namespace {
@@ -25,11 +26,11 @@ double WallTime() {
 std::string ToLine(const LogEntry& entry) {
   Json json = {{"step", entry.step}};
   for (const auto& [tag, value] : entry.values) json[tag] = value;
-  return json.dump() + "\n";
+  return DumpJson(json) + "\n";
 }
 
 bool Parse(std::string_view line, LogEntry* entry) {
-  const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseJsonOrDiscard<Json>(line);
   if (!json.is_object() || !json.contains("step") || !json["step"].is_number_unsigned() ||
       json["step"].get<std::uint64_t>() > INT64_MAX) {
     return false;

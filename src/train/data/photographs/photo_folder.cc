@@ -135,7 +135,7 @@ class FolderReader {
                            ? std::ranges::find(set_.keypoint_names, name.get<std::string>())
                            : set_.keypoint_names.end();
     if (found == set_.keypoint_names.end())
-      return InvalidArgument("{}: {} is not one of its \"names\"", file_, name.dump());
+      return InvalidArgument("{}: {} is not one of its \"names\"", file_, DumpJson(name));
     return static_cast<int>(found - set_.keypoint_names.begin());
   }
 
@@ -160,9 +160,9 @@ class FolderReader {
     if (names == json.end() || !names->is_array() || names->empty() || names->size() > kMostNames)
       return InvalidArgument("{}: \"names\" has to be a list of 1 to {} names", file_, kMostNames);
     for (const ParsedJson& name : *names) {
-      if (!name.is_string()) return InvalidArgument("{}: {} is not a name", file_, name.dump());
+      if (!name.is_string()) return InvalidArgument("{}: {} is not a name", file_, DumpJson(name));
       if (IndexOf(name).ok())
-        return InvalidArgument("{}: \"names\" has {} twice", file_, name.dump());
+        return InvalidArgument("{}: \"names\" has {} twice", file_, DumpJson(name));
       set_.keypoint_names.push_back(name.get<std::string>());
     }
     TILEGRAD_ASSIGN(const auto sides, Pairs(json, "mirror"));
@@ -171,8 +171,8 @@ class FolderReader {
       int &of_left = set_.mirror[static_cast<std::size_t>(left)],
           &of_right = set_.mirror[static_cast<std::size_t>(right)];
       if (left == right || of_left != left || of_right != right)
-        return InvalidArgument("{}: \"mirror\" has {} or {} twice", file_, (*names)[left].dump(),
-                               (*names)[right].dump());
+        return InvalidArgument("{}: \"mirror\" has {} or {} twice", file_, DumpJson((*names)[left]),
+                               DumpJson((*names)[right]));
       std::swap(of_left, of_right);
       views_.left.emplace_back(right, left);
     }
@@ -184,10 +184,10 @@ class FolderReader {
   Result<Keypoint> ReadKeypoint(const ParsedJson& json, const std::string& where) const {
     if (json.is_null()) return Keypoint{};
     if (!json.is_array() || json.size() != 2 || !json[0].is_number() || !json[1].is_number())
-      return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, json.dump());
+      return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, DumpJson(json));
     const Keypoint keypoint{json[0].get<double>(), json[1].get<double>(), true};
     if (!(std::max(std::abs(keypoint.x), std::abs(keypoint.y)) <= kFarthest))
-      return InvalidArgument("{}: {}: {} is more than {} pixels away", file_, where, json.dump(),
+      return InvalidArgument("{}: {}: {} is more than {} pixels away", file_, where, DumpJson(json),
                              kFarthest);
     return keypoint;
   }
@@ -215,7 +215,7 @@ class FolderReader {
     TILEGRAD_ASSIGN(const std::string text, ReadText(file_));
     if (FirstNestedDeeper(text, 16) != std::string::npos)
       return InvalidArgument("{}: nested too deeply", file_);
-    const ParsedJson json = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
+    const ParsedJson json = ParseJsonOrDiscard(text);
     if (!json.is_object()) return InvalidArgument("{}: not a JSON object", file_);
     TILEGRAD_TRY(ReadNames(json));
     TILEGRAD_TRY(ReadPlaces(json));
