@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <charconv>
-#include <cmath>
 #include <optional>
 
+#include "base/half.h"
 #include "base/read_budget.h"
 #include "io/archive.h"
 
@@ -141,22 +140,11 @@ Bytes FortranToC(std::span<const std::uint8_t> data, const std::vector<std::size
   return out;
 }
 
-// IEEE 754 binary16. Its numbers are those of float32 with the exponent's bias of 127 instead
-// of 15.
-float FromHalf(std::uint32_t bits) {
-  const std::uint32_t sign = (bits & 0x8000) << 16, exponent = bits >> 10 & 31,
-                      fraction = bits & 1023;
-  if (exponent == 0)
-    return std::copysign(std::ldexp(static_cast<float>(fraction), -24),
-                         std::bit_cast<float>(sign | 0x3f800000));
-  const std::uint32_t wide = exponent == 31 ? 255 : exponent + 112;
-  return std::bit_cast<float>(sign | wide << 23 | fraction << 13);
-}
-
 NpyArray WithoutHalves(NpyArray halves) {
   std::vector<float> values(halves.data.size() / 2);
   for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = FromHalf(halves.data[2 * i] | std::uint32_t{halves.data[2 * i + 1]} << 8);
+    values[i] =
+        FromHalf(static_cast<std::uint16_t>(halves.data[2 * i] | halves.data[2 * i + 1] << 8));
   return MakeNpy<float>(std::move(halves.shape), values);
 }
 

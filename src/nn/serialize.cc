@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/half.h"
 #include "base/text.h"
 
 static_assert(std::endian::native == std::endian::little, "safetensors data is little endian");
@@ -26,7 +27,10 @@ constexpr std::size_t kLengthBytes = 8;
 constexpr std::size_t kMaxHeader = 100u << 20;  // the format's own limit
 constexpr const char* kMetadata = "__metadata__";
 
+constexpr const char* kHalfName = "F16";  // in files only: read as F32
+
 std::optional<DType> DTypeNamed(const std::string& name) {
+  if (name == kHalfName) return DType::kF32;
   for (DType dtype : {DType::kF32, DType::kF64, DType::kU8, DType::kI32, DType::kI64}) {
     if (name == NameOf(dtype)) return dtype;
   }
@@ -38,6 +42,12 @@ struct Entry {
   DType dtype = DType::kF32;
   Shape shape;
   std::size_t begin = 0;  // in the data
+  bool half = false;      // stored as F16
+
+  std::size_t Bytes() const {
+    const std::size_t each = half ? sizeof(std::uint16_t) : BytesOf(dtype);
+    return static_cast<std::size_t>(shape.elements()) * each;
+  }
 };
 
 Status BadEntry(const std::string& name, const char* why) {
@@ -75,16 +85,14 @@ Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t 
   if (offsets.size() != 2 || !IsCount(offsets[0]) || !IsCount(offsets[1])) {
     return BadEntry(name, "data_offsets are not two counts");
   }
-  const std::optional<DType> dtype = DTypeNamed(json["dtype"].get<std::string>());
-  if (!dtype) return BadEntry(name, "its dtype is none of F32, F64, U8, I32, I64");
+  const auto stored = json["dtype"].get<std::string>();
+  const std::optional<DType> dtype = DTypeNamed(stored);
+  if (!dtype) return BadEntry(name, "its dtype is none of F32, F64, F16, U8, I32, I64");
   const auto begin = offsets[0].get<std::uint64_t>(), end = offsets[1].get<std::uint64_t>();
   if (begin > end || end > data_bytes) return BadEntry(name, "its data lies beyond the file's end");
-  Entry entry{*dtype, {}, static_cast<std::size_t>(begin)};
+  Entry entry{*dtype, {}, static_cast<std::size_t>(begin), stored == kHalfName};
   TILEGRAD_ASSIGN(entry.shape, ParseShape(name, json["shape"], data_bytes));
-  const auto elements = static_cast<std::uint64_t>(entry.shape.elements());
-  if (elements * BytesOf(*dtype) != end - begin) {
-    return BadEntry(name, "its shape and its data differ in size");
-  }
+  if (entry.Bytes() != end - begin) return BadEntry(name, "its shape and its data differ in size");
   return entry;
 }
 
@@ -171,6 +179,22 @@ Status ParseMetadata(const Json& json, std::map<std::string, std::string>& metad
   return {};
 }
 
+Tensor TensorOf(const Context& context, const Entry& entry, std::span<const std::uint8_t> data) {
+  Tensor tensor = context.Empty(entry.shape, entry.dtype);
+  const std::uint8_t* from = data.data() + entry.begin;
+  if (!entry.half) {
+    if (tensor.bytes() != 0) std::memcpy(tensor.raw(), from, tensor.bytes());
+    return tensor;
+  }
+  for (float& value : tensor.span<float>()) {
+    std::uint16_t half = 0;
+    std::memcpy(&half, from, sizeof half);
+    value = FromHalf(half);
+    from += sizeof half;
+  }
+  return tensor;
+}
+
 }  // namespace
 
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes) {
@@ -188,17 +212,12 @@ Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint
       continue;
     }
     TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
-    const std::size_t size =
-        static_cast<std::size_t>(entry.shape.elements()) * BytesOf(entry.dtype);
-    ranges.emplace_back(entry.begin, entry.begin + size, name);
+    ranges.emplace_back(entry.begin, entry.begin + entry.Bytes(), name);
     entries.emplace_back(name, entry);
   }
   TILEGRAD_TRY(CheckApart(std::move(ranges)));
-  for (const auto& [name, entry] : entries) {
-    Tensor tensor = context.Empty(entry.shape, entry.dtype);
-    if (tensor.bytes() != 0) std::memcpy(tensor.raw(), data.data() + entry.begin, tensor.bytes());
-    file.tensors.push_back({name, std::move(tensor)});
-  }
+  for (const auto& [name, entry] : entries)
+    file.tensors.push_back({name, TensorOf(context, entry, data)});
   return file;
 }
 
@@ -226,32 +245,88 @@ void AppendMember(const std::string& name, const std::string& json, std::string*
   *text += Json(name).dump() + ':' + json;
 }
 
-std::string EntryJson(const Tensor& value, std::size_t begin, std::size_t end) {
-  std::vector<std::int64_t> extents;
-  for (int axis = 0; axis < value.shape().rank(); ++axis) extents.push_back(value.shape()[axis]);
-  return fmt::format(R"({{"dtype":"{}","shape":[{}],"data_offsets":[{},{}]}})",
-                     NameOf(value.dtype()), fmt::join(extents, ","), begin, end);
+// What the file holds of a tensor.
+struct StoredTensor {
+  const char* dtype;
+  std::span<const std::uint8_t> data;
+  Bytes halves;  // `data`, where it is not the tensor's own
+};
+
+Result<Bytes> HalvesOf(const NamedTensor& t) {
+  Bytes bytes(t.value.elements() * sizeof(std::uint16_t));
+  std::uint8_t* to = bytes.data();
+  for (const float value : t.value.span<float>()) {
+    const std::uint16_t half = ToHalf(value);
+    if ((half & kHalfInfinity) == kHalfInfinity) {
+      return InvalidArgument("safetensors: tensor \"{}\": {} is no number of float16 (at most {})",
+                             t.name, value, kLargestHalf);
+    }
+    std::memcpy(to, &half, sizeof half);
+    to += sizeof half;
+  }
+  return bytes;
 }
 
-}  // namespace
-
-Result<Bytes> EncodeSafetensors(const TensorFile& file) {
-  for (const auto& [key, value] : file.metadata) {
-    if (!IsUtf8(key) || !IsUtf8(value)) {
-      return InvalidArgument("safetensors: the metadata is not UTF-8");
-    }
+Result<StoredTensor> StoredOf(const NamedTensor& t, StoredFloats floats) {
+  StoredTensor out{NameOf(t.value.dtype()), {}, {}};
+  if (floats == StoredFloats::kHalf && t.value.dtype() == DType::kF32) {
+    TILEGRAD_ASSIGN(out.halves, HalvesOf(t));
+    out.dtype = kHalfName;
+    out.data = out.halves;
+  } else {
+    out.data = {reinterpret_cast<const std::uint8_t*>(t.value.raw()), t.value.bytes()};
   }
-  std::string text = "{";
-  if (!file.metadata.empty()) AppendMember(kMetadata, Json(file.metadata).dump(), &text);
+  return out;
+}
+
+std::string EntryJson(const StoredTensor& stored, const Shape& shape, std::size_t begin) {
+  std::vector<std::int64_t> extents;
+  for (int axis = 0; axis < shape.rank(); ++axis) extents.push_back(shape[axis]);
+  return fmt::format(R"({{"dtype":"{}","shape":[{}],"data_offsets":[{},{}]}})", stored.dtype,
+                     fmt::join(extents, ","), begin, begin + stored.data.size());
+}
+
+Status CheckTexts(const TensorFile& file) {
+  for (const auto& [key, value] : file.metadata) {
+    if (!IsUtf8(key) || !IsUtf8(value))
+      return InvalidArgument("safetensors: the metadata is not UTF-8");
+  }
   std::unordered_set<std::string> names = {kMetadata};
-  std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
     if (t.value.empty() || !names.insert(t.name).second) {
       return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
     }
     if (!IsUtf8(t.name)) return InvalidArgument("safetensors: a tensor's name is not UTF-8");
-    const std::size_t begin = std::exchange(end, end + t.value.bytes());
-    AppendMember(t.name, EntryJson(t.value, begin, end), &text);
+  }
+  return {};
+}
+
+// Data begins where the text ends.
+Bytes Assemble(const std::string& header, const std::vector<StoredTensor>& tensors) {
+  const std::uint64_t length = header.size();
+  Bytes bytes(kLengthBytes);
+  std::memcpy(bytes.data(), &length, kLengthBytes);
+  bytes.insert(bytes.end(), header.begin(), header.end());
+  std::size_t data = 0;
+  for (const StoredTensor& t : tensors) data += t.data.size();
+  bytes.reserve(bytes.size() + data);
+  for (const StoredTensor& t : tensors) bytes.insert(bytes.end(), t.data.begin(), t.data.end());
+  return bytes;
+}
+
+}  // namespace
+
+Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats) {
+  TILEGRAD_TRY(CheckTexts(file));
+  std::string text = "{";
+  if (!file.metadata.empty()) AppendMember(kMetadata, Json(file.metadata).dump(), &text);
+  std::vector<StoredTensor> tensors;
+  std::size_t end = 0;
+  for (const NamedTensor& t : file.tensors) {
+    TILEGRAD_ASSIGN(StoredTensor stored, StoredOf(t, floats));
+    AppendMember(t.name, EntryJson(stored, t.value.shape(), end), &text);
+    end += stored.data.size();
+    tensors.push_back(std::move(stored));
   }
   text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
@@ -259,20 +334,11 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
     return InvalidArgument("safetensors: names and metadata make a header of {} bytes, {} at most",
                            text.size(), kMaxHeader);
   }
-  Bytes bytes(kLengthBytes + text.size() + end);
-  const std::uint64_t length = text.size();
-  std::memcpy(bytes.data(), &length, kLengthBytes);
-  std::memcpy(bytes.data() + kLengthBytes, text.data(), text.size());
-  std::uint8_t* to = bytes.data() + kLengthBytes + text.size();
-  for (const NamedTensor& t : file.tensors) {
-    if (t.value.bytes() != 0) std::memcpy(to, t.value.raw(), t.value.bytes());
-    to += t.value.bytes();
-  }
-  return bytes;
+  return Assemble(text, tensors);
 }
 
-Status WriteSafetensors(const Path& path, const TensorFile& file) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeSafetensors(file));
+Status WriteSafetensors(const Path& path, const TensorFile& file, StoredFloats floats) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeSafetensors(file, floats));
   return WriteFileAtomic(path, bytes);
 }
 

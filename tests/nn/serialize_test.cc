@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <ctime>
 
@@ -115,6 +117,53 @@ TEST_F(Safetensors, RoundTripOfAllTypes) {
   }
 }
 
+TEST_F(Safetensors, ReadsHalvesAsFloats) {
+  Bytes bytes = File(R"({"a":{"dtype":"F16","shape":[2,2],"data_offsets":[0,8]}})", 8);
+  const std::uint8_t data[] = {0x00, 0x3c, 0x00, 0xc1, 0x01, 0x00, 0xff, 0x7b};
+  std::copy(std::begin(data), std::end(data), bytes.end() - 8);
+  const auto file = Ok(DecodeSafetensors(context_, bytes));
+  ASSERT_EQ(file->tensors.size(), 1u);
+  const Tensor& a = file->tensors[0].value;
+  EXPECT_EQ(a.dtype(), DType::kF32);
+  EXPECT_EQ(a.shape(), (Shape{2, 2}));
+  EXPECT_EQ(std::vector<float>(a.span<float>().begin(), a.span<float>().end()),
+            (std::vector<float>{1.0f, -2.5f, 0x1p-24f, 65504.0f}));
+  EXPECT_EQ(EncodeSafetensors(*file, StoredFloats::kHalf).value().size(),
+            (bytes.size() + 7) / 8 * 8);
+}
+
+TEST_F(Safetensors, WritesHalvesOfFloatsAlone) {
+  const std::vector<float> values = {1.0f / 3, -2.5f, 1e-9f};
+  const std::vector<double> doubles = {1.0 / 3};
+  const std::vector<std::int32_t> counts = {70000};
+  TensorFile file;
+  file.tensors = {{"f", context_.From({3}, values)},
+                  {"d", context_.Empty({1}, DType::kF64)},
+                  {"i", context_.Empty({1}, DType::kI32)}};
+  std::memcpy(file.tensors[1].value.raw(), doubles.data(), 8);
+  std::memcpy(file.tensors[2].value.raw(), counts.data(), 4);
+  const Bytes bytes = EncodeSafetensors(file, StoredFloats::kHalf).value();
+  ExpectIn(std::string(bytes.begin(), bytes.end()), R"("f":{"dtype":"F16","shape":[3],)",
+           R"("d":{"dtype":"F64")", R"("i":{"dtype":"I32")");
+  const auto back = Ok(DecodeSafetensors(context_, bytes));
+  EXPECT_EQ(back->tensors[0].value.data<float>()[0], 0.333251953125f);
+  EXPECT_EQ(back->tensors[0].value.data<float>()[1], -2.5f);
+  EXPECT_EQ(back->tensors[0].value.data<float>()[2], 0.0f);
+  EXPECT_EQ(back->tensors[1].value.data<double>()[0], doubles[0]);
+  EXPECT_EQ(back->tensors[2].value.data<std::int32_t>()[0], counts[0]);
+}
+
+TEST_F(Safetensors, NumbersBeyondHalvesAreRefused) {
+  for (const float value : {65520.0f, -1e9f, INFINITY, NAN}) {
+    const TensorFile file = {
+        {{"fine", context_.Full({2}, 65519.0)}, {"far", context_.Full({2}, value)}}, {}};
+    const auto bytes = EncodeSafetensors(file, StoredFloats::kHalf);
+    EXPECT_EQ(bytes.status().code(), StatusCode::kInvalidArgument) << value;
+    ExpectIn(bytes.status().message(), "tensor \"far\"", "no number of float16");
+    EXPECT_TRUE(EncodeSafetensors(file).ok());
+  }
+}
+
 TEST_F(Safetensors, EveryCutIsNoticed) {
   const Bytes whole(std::begin(kByHand), std::end(kByHand));
   for (std::size_t n = 0; n < whole.size(); ++n) {
@@ -136,6 +185,7 @@ TEST_F(Safetensors, HeadersThatLie) {
       {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,800]}})", "beyond the file's end"},
       {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[8,0]}})", "beyond the file's end"},
       {R"({"a":{"dtype":"F32","shape":[3],"data_offsets":[0,8]}})", "differ in size"},
+      {R"({"a":{"dtype":"F16","shape":[2],"data_offsets":[0,8]}})", "differ in size"},
       {R"({"a":{"dtype":"F32","shape":[-2],"data_offsets":[0,8]}})", "not a count"},
       {R"({"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,8]}})", "larger"},
       {R"({"a":{"dtype":"F32","shape":[0,4294967296,4294967296],"data_offsets":[0,0]}})", "larger"},
