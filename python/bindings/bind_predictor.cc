@@ -11,6 +11,7 @@
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/cutout.h"
+#include "train/named_weights.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
 
@@ -43,6 +44,9 @@ class Model {
   }
 
   int image_size() const { return predictor_.image_size(); }
+  int refine_steps() const {
+    return predictor_.model().CheckRefinable().ok() ? train::kRefineSteps : 0;
+  }
   py::str description() const { return Text(predictor_.description()); }
   py::dict TemplateMesh() const { return MeshToDict(predictor_.template_mesh()); }
 
@@ -92,13 +96,15 @@ class Model {
 void BindPredictor(py::module_& m) {
   m.def("prepare_cutout", &PrepareCutout, py::arg("image"), py::arg("mask"), py::arg("size"),
         py::arg("keep_framing"), "(4, size, size) uint8 of a picture (H, W, C) uint8.");
-  m.attr("REFINE_STEPS") = train::kRefineSteps;
+  m.attr("CUTOUT_WEIGHTS") = train::kCutoutWeights;
   m.attr("REFINE_SIZE") = train::kRefineSize;
   py::class_<Model>(m, "Model", "A trained network.")
       .def(py::init(&Model::Load), py::arg("path"), py::arg("threads"),
-           "path: of a run folder or a checkpoint.")
+           "path: as of train::FindRun.")
       .def_property_readonly("image_size", &Model::image_size, "Pixels a side.")
       .def_property_readonly("description", &Model::description, "A one-line description.")
+      .def_property_readonly("refine_steps", &Model::refine_steps,
+                             "Of a prediction, if no number is given.")
       .def("template_mesh", &Model::TemplateMesh, "The template sphere.")
       .def("predict", &Model::Predict, py::arg("images"),
            "Meshes of images (N, 4, size, size) uint8.")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes from images, by a network that `tilegrad train` has trained.
 
-    predictor = Predictor("runs/demo")
+    predictor = Predictor("runs/demo")                     # or Predictor(): weights that come along
     mesh = predictor.predict(load_image("chair.png"))      # a cut-out: RGBA
     save_mesh("chair.glb", mesh)
 """
@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -26,13 +26,14 @@ class Predictor:
     Calls from several Python threads run one at a time. Can be pickled (as its path); in a forked
     process it is loaded again at the first call, with one thread.
 
-    path: a run folder, whose newest whole checkpoint is taken, or one checkpoint.
+    path: a run folder, whose newest whole checkpoint is taken, one checkpoint, a file of weights, or
+        the name of weights that come along. None: those of them for cut-outs.
     threads: as of `tilegrad.Renderer`; the result does not depend on it.
     OSError, ValueError: name the file and what is wrong.
     """
 
-    def __init__(self, path: Path, threads: int = 0) -> None:
-        self._path = name_of(path)
+    def __init__(self, path: Optional[Path] = None, threads: int = 0) -> None:
+        self._path = name_of(_tools.CUTOUT_WEIGHTS if path is None else path)
         self._threads = thread_count("Predictor", threads)
         self._load(self._threads)
 
@@ -75,12 +76,14 @@ class Predictor:
         return _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))
 
     def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False,
-                refine: int = _tools.REFINE_STEPS) -> Mesh:
+                refine: Optional[int] = None) -> Mesh:
         """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
         half-extent is 0.45, its middle the origin.
 
         refine: gradient-descent steps that refine the prediction on the picture, 0 to 100,000;
-            0: the network's output, with the faces of the template."""
+            0: the network's output, with the faces of the template. None: 800, or 0 of a network
+            that predicts texture maps."""
+        refine = self._loaded.refine_steps if refine is None else refine
         if not 0 <= refine <= 100_000:
             raise ValueError(f"predict: refine is {refine}, must be in 0..100000")
         pixels, cutout = self._pixels(image, mask)

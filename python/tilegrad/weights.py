@@ -23,8 +23,8 @@ class Weights(dict[str, np.ndarray]):
 
 
 def load_weights(path: Path, *, max_bytes: Optional[int] = None) -> Weights:
-    """Reads a .safetensors or .npz file, float16 as float32. max_bytes: as of `load_mesh`. OSError, ValueError: name the
-    file and what is wrong."""
+    """Reads a .safetensors or .npz file, float16 as float32. max_bytes: as of `load_mesh`. OSError,
+    ValueError: name the file and what is wrong."""
     ending = _ending("load_weights", path)
     limit = _arrays.as_limit("load_weights", max_bytes)
     if ending == ".npz":

@@ -68,8 +68,8 @@ struct Subject {
 Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out) {
   TILEGRAD_ASSIGN(out->run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
-  if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0 &&
-      options.voxels.empty())
+  if (IsFolder(out->run) && kSplits.at(options.split) == train::Split::kTest &&
+      options.refine == 0 && options.voxels.empty())
     out->files = {out->run / "eval.md", out->run / "eval.json"};
   TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
   if (options.compare.empty()) return {};
@@ -151,7 +151,7 @@ void AddEval(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "eval", "3D IoU and F-score of a run on held-out models, beside three baselines",
       RunEvaluation);
-  AddRunOptions(command, &options->on);
+  AddRunOptions(command, &options->on, kRunOrWeights);
   command->Add("--views-per-model", &options->views_per_model, "input images per model",
                {Range{1, 1000}});
   command->Add("--split", &options->split,

@@ -32,6 +32,7 @@
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/eval/training_pictures.h"
+#include "train/named_weights.h"
 #include "train/predictor.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/object_pictures.h"
@@ -178,11 +179,13 @@ Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {
   return WriteTextAtomic(file, DumpJson(record, 1) + "\n");
 }
 
+constexpr int kAsNetworkAllows = -1;  // of PredictOptions::refine: kRefineSteps, or 0
+
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
   bool keep_framing = false, force = false, relight = false;
-  int refine = train::kRefineSteps;
+  int refine = kAsNetworkAllows;
   int workers = 0;
 };
 
@@ -357,16 +360,19 @@ Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>
   return {};
 }
 
-Status RunPrediction(const PredictOptions& options) {
+Status RunPrediction(const PredictOptions& given) {
+  PredictOptions options = given;
   if (!options.mask.empty() && options.images.size() > 1)
     return InvalidArgument("--mask works with one image, got {}", options.images.size());
-  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
+  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run, train::kCutoutWeights));
   const Workers workers(options.workers);
   ProgressLine line;
   const Watch watch = line.Watching();
   TILEGRAD_TRY(watch.At({"loading the network", 0, 0, ""}));
   TILEGRAD_ASSIGN(const TrainedNetwork network, LoadNetwork(run, workers));
   TILEGRAD_TRY(CheckRelight(options.relight, network.predictor));
+  if (options.refine == kAsNetworkAllows)
+    options.refine = network.predictor.model().CheckRefinable().ok() ? train::kRefineSteps : 0;
   OutputGuard guard(options.force);
   for (const std::string& image : options.images) guard.AddInput(image);
   guard.AddInput(options.mask);
@@ -394,7 +400,9 @@ void AddPredict(CommandList* list) {
   command->Add("images", &options->images,
                "images of an object: cut out (RGBA), on a plain background, or with --mask",
                {Required{}});
-  command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
+  command->Add("--run", &options->run,
+               fmt::format("{} [the newest run below runs/, else {}]", kRunOrWeights,
+                           train::kCutoutWeights));
   command->Add("--out", &options->out,
                "folder for NAME_predicted.glb, NAME_turntable.png and NAME_turntable.webp (an "
                "animation), named after the image; NAME_2 for a second image of that name");
@@ -406,8 +414,8 @@ void AddPredict(CommandList* list) {
   command->Add("--refine", &options->refine,
                "gradient-descent steps that refine the prediction on the image; writes "
                "NAME_match.png (image, prediction, refined) and NAME_match.json (agreement before "
-               "and after); 0: network output only",
-               {Range{0, 100000}});
+               "and after); 0: network output only [800; textured networks: 0]",
+               {NoDefault{}, Range{0, 100000}});
   command->Add("--relight", &options->relight,
                "also write NAME_relit.webp: the object under a moving light; needs a run that "
                "predicts light");

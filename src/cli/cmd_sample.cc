@@ -16,6 +16,7 @@
 #include "io/image_file.h"
 #include "io/webp_animation.h"
 #include "render/picture/composite.h"
+#include "train/named_weights.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/scores.h"
 #include "train/tasks/gan/sheet.h"
@@ -200,7 +201,7 @@ Status RunSampling(const SampleOptions& options) {
     return InvalidArgument("--interpolate needs two samples or more: --count 2");
   if (!options.score && !(options.data.empty() && options.judge.empty()))
     return InvalidArgument("--data and --judge need --score");
-  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
+  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run, train::kGeneratorWeights));
   const SampleFiles files(options);
   const OutputGuard guard(options.force);
   TILEGRAD_TRY(guard.CheckAll(files.all));
@@ -236,7 +237,9 @@ Status RunSampling(const SampleOptions& options) {
 void AddSample(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "sample", "Generate textured 3D objects with a trained generator", RunSampling);
-  command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
+  command->Add("--run", &options->run,
+               fmt::format("{} [the newest run below runs/, else {}]", kRunOrWeights,
+                           train::kGeneratorWeights));
   command->Add("--count", &options->count, "objects", {Range{1, 999}});
   command->Add("--out", &options->out,
                "folder for sample_001.glb and so on, sheet.png (each from the front and from "

@@ -133,6 +133,7 @@ void AddConfigs(CommandList* list);
 void AddDataset(CommandList* list);
 void AddDatasetView(CommandList* list);
 void AddEval(CommandList* list);
+void AddExport(CommandList* list);
 void AddFit(CommandList* list);
 void AddInfo(CommandList* list);
 void AddLive(CommandList* list);

@@ -87,8 +87,8 @@ Status CheckRanks(const Command& command) {
 
 void AddCommands(CommandList* list) {
   for (const auto add :
-       {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender, AddReport, AddSample,
-        AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews, AddInfo, AddProfile}) {
+       {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddExport, AddRender, AddReport,
+        AddSample, AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews, AddInfo, AddProfile}) {
     add(list);
   }
   for (Command& reader : *list) AddReadLimitOption(&reader);

@@ -13,6 +13,7 @@
 #include "base/json_text.h"
 #include "base/read_budget.h"
 #include "cli/console.h"
+#include "train/named_weights.h"
 #include "train/run/checkpoint.h"
 #include "train/run/run_files.h"
 
@@ -67,8 +68,8 @@ void AddForceOption(Command* command, bool* force) {
                "start over and replace existing output files; inputs are never overwritten");
 }
 
-void AddRunOptions(Command* command, RunOptions* options) {
-  command->Add("--run", &options->run, "run folder [the newest below runs/]");
+void AddRunOptions(Command* command, RunOptions* options, const char* what) {
+  command->Add("--run", &options->run, fmt::format("{} [the newest run below runs/]", what));
   command->Add("--data", &options->data, "dataset folder [the training dataset]");
   AddWorkersOption(command, &options->workers);
 }
@@ -92,8 +93,10 @@ Status CheckIsRun(const Path& folder) {
   return NotFound("{}: not the folder of a training or a fit", folder.string());
 }
 
-Result<Path> ChooseRun(const std::string& given) {
-  if (!given.empty()) return Path(given);
+namespace {
+
+// The run below runs/ whose last checkpoint is the newest.
+std::optional<Path> NewestRun() {
   // By when a checkpoint was written, and by name where that is the same moment: a look at an old
   // run (eval, report) changes its folder, too.
   std::optional<std::pair<std::filesystem::file_time_type, Path>> newest;
@@ -104,13 +107,26 @@ Result<Path> ChooseRun(const std::string& given) {
     const auto when = std::filesystem::last_write_time(files.back(), error);
     newest = std::max(newest, std::optional(std::pair(when, entry.path())));
   }
-  if (!newest)
-    return NotFound(
-        "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
-        "--help)");
-  PrintRemark("{}: using the newest run below runs/; --run chooses another\n",
-              newest->second.string());
-  return newest->second;
+  return newest ? std::optional(newest->second) : std::nullopt;
+}
+
+}  // namespace
+
+Result<Path> ChooseRun(const std::string& given, const char* otherwise) {
+  if (!given.empty()) return train::FindRun(given);
+  if (const auto newest = NewestRun()) {
+    PrintRemark("{}: using the newest run below runs/; --run chooses another\n", newest->string());
+    return *newest;
+  }
+  const Status none = NotFound(
+      "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
+      "--help)");
+  if (otherwise == nullptr) return none;
+  auto weights = train::WeightsNamed(otherwise);
+  if (!weights.ok()) return NotFound("{}; {}", none.message(), weights.status().message());
+  PrintRemark("{}: using the weights \"{}\" that come along; --run chooses others\n",
+              weights->string(), otherwise);
+  return weights;
 }
 
 Status WithCommand(const Status& status, const std::string& command) {
@@ -140,11 +156,13 @@ std::optional<Path> FindFromRun(const Path& name, const Path& run) {
 
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
-  const Path file = run / "run.json";
-  if (!PathExists(run)) return NotFound("{}: no such folder", run.string());
+  const Path folder = train::RunFolderOf(run), file = folder / "run.json";
+  if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
+  if (IsFile(folder))
+    return NotFound("{}: a file of weights names no dataset; name it with --data", run.string());
   if (!PathExists(file)) {
     return NotFound("{}: not a run folder of tilegrad train: there is no run.json in it",
-                    run.string());
+                    folder.string());
   }
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(text, file.string()));
@@ -152,7 +170,7 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }
   const Path dataset = json["dataset"].get<std::string>();
-  if (const auto found = FindFromRun(dataset, run)) return *found;
+  if (const auto found = FindFromRun(dataset, folder)) return *found;
   return NotFound("{}: cannot find its dataset {}; name it with --data", file.string(),
                   dataset.string());
 }

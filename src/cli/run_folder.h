@@ -17,7 +17,8 @@ struct RunOptions {
   std::string run, data;  // empty: see ChooseRun, ChooseDataset
   int workers = 0;
 };
-void AddRunOptions(Command* command, RunOptions* options);
+// `what`: that --run takes.
+void AddRunOptions(Command* command, RunOptions* options, const char* what = "run folder");
 // --threads. CLI11's envname() would give the variable to commands that were not chosen, and blame
 // the option.
 void AddWorkersOption(Command* command, int* workers);
@@ -35,9 +36,13 @@ train::ExistingRun ExistingOf(bool resume, bool force);
 Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const OutputGuard& guard);
 // Whether the folder holds a training run or a fit.
 Status CheckIsRun(const Path& folder);
-// `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
-// note on the terminal names; an error if there is none.
-Result<Path> ChooseRun(const std::string& given);
+// What --run says it takes where weights do as well as a run.
+inline constexpr const char* kRunOrWeights =
+    "run folder, checkpoint, file of weights or name of weights that come along";
+// `given`, a path or the name of weights. If that is empty: the run below runs/ whose last
+// checkpoint is the newest; if there is none, the weights of the name `otherwise`. A note on the
+// terminal says which. An error if there is neither.
+Result<Path> ChooseRun(const std::string& given, const char* otherwise = nullptr);
 // Adds the command that resumes it to a stopped run's message.
 Status WithCommand(const Status& status, const std::string& command);
 // With a note on the terminal of each newer checkpoint that could not be read.
@@ -46,7 +51,7 @@ Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);
 // the run was started, which is here or some folder above the run.
 std::optional<Path> FindFromRun(const Path& name, const Path& run);
 // `given`, or if that is empty the dataset that the run's run.json names, seen from here or from a
-// folder above the run.
+// folder above the run. `run` may be a checkpoint; a file of weights names no dataset.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);
 
 }  // namespace tilegrad::cli

@@ -44,7 +44,7 @@ struct Entry {
   std::size_t begin = 0;  // in the data
   bool half = false;      // stored as F16
 
-  std::size_t Bytes() const {
+  std::size_t Size() const {
     const std::size_t each = half ? sizeof(std::uint16_t) : BytesOf(dtype);
     return static_cast<std::size_t>(shape.elements()) * each;
   }
@@ -92,7 +92,7 @@ Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t 
   if (begin > end || end > data_bytes) return BadEntry(name, "its data lies beyond the file's end");
   Entry entry{*dtype, {}, static_cast<std::size_t>(begin), stored == kHalfName};
   TILEGRAD_ASSIGN(entry.shape, ParseShape(name, json["shape"], data_bytes));
-  if (entry.Bytes() != end - begin) return BadEntry(name, "its shape and its data differ in size");
+  if (entry.Size() != end - begin) return BadEntry(name, "its shape and its data differ in size");
   return entry;
 }
 
@@ -212,7 +212,7 @@ Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint
       continue;
     }
     TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
-    ranges.emplace_back(entry.begin, entry.begin + entry.Bytes(), name);
+    ranges.emplace_back(entry.begin, entry.begin + entry.Size(), name);
     entries.emplace_back(name, entry);
   }
   TILEGRAD_TRY(CheckApart(std::move(ranges)));

@@ -31,6 +31,13 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   return out;
 }
 
+Status Predictor::ExportWeights(const Path& file, const std::string& credits,
+                                nn::StoredFloats floats) const {
+  Checkpoint weights{info(), all_->model->weights()};
+  weights.info.credits = credits;
+  return WriteWeights(all_->context, file, weights, floats);
+}
+
 Status Predictor::CheckImageSize(const Dataset& dataset) const {
   if (dataset.info().image_size == image_size()) return {};
   return InvalidArgument("{}: images are {} pixels a side, the network was trained on {}",

@@ -21,9 +21,12 @@ namespace tilegrad::train {
 
 class Predictor {
  public:
-  // `path`: a run folder (its newest whole checkpoint is taken) or one checkpoint. Errors name the
-  // file and what is wrong.
+  // `path`: a run folder (its newest whole checkpoint is taken), one checkpoint, a file of weights
+  // or the name of weights that come along. Errors name the file and what is wrong.
   static Result<Predictor> Load(const Path& path, const Workers& workers);
+
+  // A file of its weights alone, with those credits of its training data: WriteWeights.
+  Status ExportWeights(const Path& file, const std::string& credits, nn::StoredFloats floats) const;
 
   // Newer checkpoints of the run folder that could not be read.
   const std::vector<std::string>& warnings() const { return all_->found.warnings; }

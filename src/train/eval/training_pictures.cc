@@ -11,6 +11,7 @@
 #include "io/npz.h"
 #include "render/picture/composite.h"
 #include "train/data/cutout.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -19,9 +20,6 @@ constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
                       kPictureBytes = 4 * kPixels;
 
 Path FileOf(const Path& run) { return run / "thumbnails.npz"; }
-
-// A file is a checkpoint: <run>/checkpoints/step_NUMBER.safetensors.
-Path RunOf(const Path& path) { return IsFile(path) ? path.parent_path().parent_path() : path; }
 
 // Which of `count` are taken so that at most `most` are, evenly spread.
 std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
@@ -194,7 +192,7 @@ Status TrainingPictures::Load(const Path& file) {
 }
 
 Result<std::optional<TrainingPictures>> TrainingPictures::Read(const Path& run) {
-  const Path file = FileOf(RunOf(run));
+  const Path file = FileOf(RunFolderOf(run));
   if (!PathExists(file)) return std::optional<TrainingPictures>();
   TrainingPictures out;
   if (const Status loaded = out.Load(file); !loaded.ok()) return loaded.Within(file.string());

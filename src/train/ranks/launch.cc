@@ -10,6 +10,7 @@
 #include <initializer_list>
 
 #include "base/error.h"
+#include "base/own_binary.h"
 #include "base/parallel.h"
 #include "train/ranks/plugin_folder.h"
 
@@ -32,9 +33,8 @@ int NumberFrom(std::initializer_list<const char*> names) {
 }
 
 Result<Path> FindPlugin() {
-  std::error_code error;
-  const Path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  for (const Path& folder : {program.parent_path(), program.parent_path() / kPluginFolder}) {
+  const Path folder_of_program = OwnBinary().parent_path();
+  for (const Path& folder : {folder_of_program, folder_of_program / kPluginFolder}) {
     if (PathExists(folder / kPlugin)) return folder / kPlugin;
   }
   return NotFound(

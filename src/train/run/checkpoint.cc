@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
+#include "train/named_weights.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::train {
@@ -15,7 +16,7 @@ namespace {
 constexpr std::string_view kCheckpointFormatName = "tilegrad-checkpoint-",
                            kCheckpointFormat = "tilegrad-checkpoint-1";
 constexpr std::string_view kStepPrefix = "step_", kStepSuffix = ".safetensors";
-constexpr const char* kChecksum = "checksum";
+constexpr const char *kChecksum = "checksum", *kCredits = "credits";
 
 Path Folder(const Path& run) { return run / "checkpoints"; }
 
@@ -49,20 +50,35 @@ std::string ChecksumOf(const nn::TensorFile& file) {
   return hash.Text();
 }
 
+std::map<std::string, std::string> MetadataOf(const CheckpointInfo& info) {
+  std::map<std::string, std::string> out = {{"format", std::string(kCheckpointFormat)},
+                                            {"step", std::to_string(info.step)},
+                                            {"image_size", std::to_string(info.image_size)},
+                                            {"seconds", fmt::format("{}", info.seconds)},
+                                            {"half_extent", fmt::format("{}", info.half_extent)},
+                                            {"config", info.config}};
+  if (!info.credits.empty()) out[kCredits] = info.credits;
+  return out;
+}
+
 }  // namespace
 
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors) {
-  nn::TensorFile file{std::move(tensors),
-                      {{"format", std::string(kCheckpointFormat)},
-                       {"step", std::to_string(info.step)},
-                       {"image_size", std::to_string(info.image_size)},
-                       {"seconds", fmt::format("{}", info.seconds)},
-                       {"half_extent", fmt::format("{}", info.half_extent)},
-                       {"config", info.config}}};
+  nn::TensorFile file{std::move(tensors), MetadataOf(info)};
   file.metadata[kChecksum] = ChecksumOf(file);
   return nn::WriteSafetensors(
       Folder(run) / fmt::format("{}{:08}{}", kStepPrefix, info.step, kStepSuffix), file);
+}
+
+Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
+                    nn::StoredFloats floats) {
+  const nn::TensorFile whole{weights.tensors, MetadataOf(weights.info)};
+  TILEGRAD_ASSIGN(const Bytes bytes, nn::EncodeSafetensors(whole, floats));
+  // The checksum is that of what a reader gets.
+  TILEGRAD_ASSIGN(nn::TensorFile stored, nn::DecodeSafetensors(context, bytes));
+  stored.metadata[kChecksum] = ChecksumOf(stored);
+  return nn::WriteSafetensors(file, stored, floats);
 }
 
 namespace {
@@ -122,6 +138,7 @@ Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
   }
   CheckpointInfo info{*step, *image_size, m.at("config"), *seconds};
   info.half_extent = Number<double>(m, "half_extent").value_or(info.half_extent);
+  if (m.count(kCredits) > 0) info.credits = m.at(kCredits);
   return Checkpoint{std::move(info), std::move(file->tensors)};
 }
 
@@ -174,9 +191,10 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
 }
 
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {
-  if (IsFolder(path)) return LoadNewestCheckpoint(context, path);
-  TILEGRAD_ASSIGN(Checkpoint checkpoint, LoadCheckpoint(context, path));
-  return FoundCheckpoint{std::move(checkpoint), path, {}, {}};
+  TILEGRAD_ASSIGN(const Path found, FindRun(path));
+  if (IsFolder(found)) return LoadNewestCheckpoint(context, found);
+  TILEGRAD_ASSIGN(Checkpoint checkpoint, LoadCheckpoint(context, found));
+  return FoundCheckpoint{std::move(checkpoint), found, {}, {}};
 }
 
 void SetAside(const std::vector<Path>& broken) {

@@ -20,6 +20,7 @@ struct CheckpointInfo {
   double seconds = 0;           // trained so far
   // Of what it predicts, world units; earlier versions wrote none and trained at this size.
   double half_extent = 0.45;
+  std::string credits = {};  // of what it was trained on, a line each; files of weights have them
 };
 
 struct Checkpoint {
@@ -30,6 +31,11 @@ struct Checkpoint {
 // Whole or not at all.
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors);
+// One file of what predicts, for whatever takes a run: `weights` has the tensors that
+// Task::LoadModel reads. It is a checkpoint from which no training goes on. kHalf: as of
+// EncodeSafetensors.
+Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
+                    nn::StoredFloats floats);
 // Errors name the file: cut short, not a checkpoint of this program, another checksum, ...
 Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& file);
 
@@ -45,7 +51,7 @@ struct FoundCheckpoint {
 // NotFound if there is none, DataLoss naming the first reason if there are only damaged ones.
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
 
-// The newest one of a run's folder, or the one file that `path` is.
+// The newest one of a run's folder, or the one file that `path` is or names (FindRun).
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path);
 
 // Renames files, "step_00000012.safetensors.broken", for whoever goes on from an older one: they

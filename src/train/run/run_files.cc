@@ -12,6 +12,8 @@
 namespace tilegrad::train {
 namespace {
 
+constexpr const char* kCheckpoints = "checkpoints";  // the folder of them
+
 constexpr std::array kRunNames = {kTrainSettings,
                                   kFitSettings,
                                   "run.json",
@@ -36,7 +38,7 @@ struct Series {
   const char *folder, *begin;
 };
 constexpr std::array kSeries = {
-    Series{"checkpoints", "step_"},  Series{"samples", "step_"}, Series{"timelapse", "0"},
+    Series{kCheckpoints, "step_"},   Series{"samples", "step_"}, Series{"timelapse", "0"},
     Series{"live", "mesh_"},         Series{"masks", ""},        Series{"live", "state.js"},
     Series{"tensorboard", "events."}};
 
@@ -78,6 +80,12 @@ Result<bool> HoldsRun(const Path& folder) {
                      error.message());
   }
   return !ListCheckpoints(folder).empty();
+}
+
+Path RunFolderOf(const Path& path) {
+  const Path folder = path.parent_path();
+  if (folder.filename() != kCheckpoints || !IsFile(path)) return path;
+  return folder.has_parent_path() ? folder.parent_path() : Path(".");
 }
 
 bool IsOfFit(const std::string& settings) {

@@ -25,6 +25,9 @@ Result<std::map<std::int64_t, Path>> FilesOfSteps(const Path& folder, std::strin
 // Whether it holds a run, which may have done no step yet: settings, or checkpoints.
 Result<bool> HoldsRun(const Path& folder);
 
+// The folder of the run whose folder or checkpoint `path` is; `path` itself where that is neither.
+Path RunFolderOf(const Path& path);
+
 // Whether a checkpoint's settings are those of a fit.
 bool IsOfFit(const std::string& settings);
 

@@ -10,6 +10,7 @@ namespace tilegrad::train {
 
 Status Model::LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state) {
   parameters_ = nn::CountParameters(network);
+  weights_ = nn::State(network);
   return LoadPredictingWeights(network, state);
 }
 

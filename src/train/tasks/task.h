@@ -61,6 +61,8 @@ class Model {
  public:
   virtual ~Model() = default;
   std::int64_t parameters() const { return parameters_; }
+  // The tensors that Task::LoadModel reads: all that a file of weights needs.
+  const std::vector<nn::NamedTensor>& weights() const { return weights_; }
   // What it predicts before it has learned anything, normalised as predictions are. Without
   // vertices of a task that predicts no meshes.
   const Mesh& template_mesh() const { return template_; }
@@ -78,12 +80,13 @@ class Model {
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
 
  protected:
-  // Loads the weights that predict, and counts them. Errors say what does not fit in the state.
+  // Loads, counts and notes the weights that predict. Errors say what does not fit in the state.
   Status LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state);
   // Brought to the place and size of predictions, whose largest half-extent is that.
   Status SetTemplate(const Mesh& start, double half_extent);
 
   std::int64_t parameters_ = 0;
+  std::vector<nn::NamedTensor> weights_;
   Mesh template_;
 };
 

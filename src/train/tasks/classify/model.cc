@@ -66,6 +66,7 @@ Result<std::unique_ptr<ClassifierModel>> ClassifierModel::Load(nn::Context& cont
       context, config, std::move(classes), static_cast<int>(checkpoint.info.image_size)));
   TILEGRAD_TRY(context.TakeStatus());
   TILEGRAD_TRY(model->LoadWeights(model->network_, checkpoint.tensors));
+  model->weights_.push_back(ClassNames(context, model->classes_));
   return model;
 }
 

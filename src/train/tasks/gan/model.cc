@@ -51,6 +51,7 @@ Result<std::unique_ptr<GeneratorModel>> GeneratorModel::Load(nn::Context& contex
   std::unique_ptr<GeneratorModel> model(new GeneratorModel(context, config, textured));
   TILEGRAD_TRY(context.TakeStatus());
   TILEGRAD_TRY(LoadKept(model->generator_, checkpoint.tensors));
+  model->weights_ = KeptState(model->generator_);
   return model;
 }
 
