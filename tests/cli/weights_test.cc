@@ -119,10 +119,6 @@ TEST_F(Weights, AreScoredBesideTheirRun) {
                               Shared("image/checkpoints/step_00000002.safetensors")))["rows"],
             of_run["rows"]);
   ExpectRefused("eval --run " + Shared("full.safetensors"), 3, "names no dataset", "--data");
-  ExpectDone("eval --run " + Shared("image") + " --data " + Shared("d"));
-  ExpectIn(ExpectDone("eval --run " + Shared("full.safetensors") + " --data " + Shared("d") +
-                      " --compare " + Shared("image")),
-           "0.0");
 }
 
 TEST_F(Weights, ComeAlongByName) {

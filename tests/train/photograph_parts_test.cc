@@ -43,6 +43,49 @@ TEST_F(PhotographParts, PinholesAndTheirGradients) {
   EXPECT_NEAR(camera.cx, 32 * (c[1] + 1), 1e-5);
 }
 
+// The first row keeps its direction, the second its side of it; also where one is long, or where
+// the quaternion's w is near 0.
+TEST_F(PhotographParts, RowsAreRotationsWithGradients) {
+  std::vector<double> rows = {0.3, -0.2, 0.9, 0.5, 2, 0.1};
+  for (const double start : {-1, 0, 0, 0, 1, 0, -1, 0, 0, 0, -1, 0}) rows.push_back(start);
+  const auto noise = Uniform(12, -0.1, 0.1, 4);
+  for (std::size_t i = 0; i < 12; ++i) rows[6 + i] += noise[i];
+  const nn::Shape shape = {3, 6};
+  const nn::Var out = QuaternionsOfRows(Const(shape, rows));
+  const auto q = out.value().span<double>();
+  for (std::size_t b = 0; b < 3; ++b) {
+    const std::array<double, 4> unit = {q[4 * b], q[4 * b + 1], q[4 * b + 2], q[4 * b + 3]};
+    EXPECT_NEAR(std::hypot(std::hypot(unit[0], unit[1]), std::hypot(unit[2], unit[3])), 1, 1e-12);
+    EXPECT_GE(unit[0], 0);
+    const auto matrix = RotationOf(unit);
+    const double* row = &rows[6 * b];
+    const double length = std::hypot(row[0], row[1], row[2]);
+    double across = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(matrix[c], row[c] / length, 1e-12);
+      across += matrix[6 + c] * row[3 + c];
+    }
+    EXPECT_NEAR(across, 0, 1e-12);
+    EXPECT_GT(matrix[3] * row[3] + matrix[4] * row[4] + matrix[5] * row[5], 0);
+  }
+  ExpectGradient([&](const nn::Var& x) { return QuaternionsOfRows(x); }, shape, rows);
+}
+
+// No length, and parallel: some rotation, finite gradients.
+TEST_F(PhotographParts, RowsOfNoRotationDoNoHarm) {
+  const std::vector<double> rows = {0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 3, 1, 0, 0, 0, 0, 0};
+  const nn::Var in = nn::Parameter(context_, context_.From({3, 6}, std::span<const double>(rows)));
+  const nn::Var out = QuaternionsOfRows(in);
+  const nn::Tensor d_rows = nn::Grad(nn::Sum(out, {0, 1}), {in})[0].value();
+  for (std::size_t b = 0; b < 3; ++b) {
+    double squares = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      squares += std::pow(out.value().span<double>()[4 * b + i], 2);
+    EXPECT_NEAR(squares, 1, 1e-12);
+  }
+  for (const double d : d_rows.span<double>()) EXPECT_TRUE(std::isfinite(d));
+}
+
 // A picture of 4 x 2 pixels whose values are their columns, and twice their rows.
 TEST_F(PhotographParts, PicturesAreSampledBetweenPixelCentres) {
   std::vector<double> pixels;

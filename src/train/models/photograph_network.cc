@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
+#include "scene/weak_perspective_ref.h"
 #include "train/ops/weak_cameras.h"
 
 namespace tilegrad::train {
@@ -33,13 +34,6 @@ KeypointPlace Middle(const std::vector<KeypointPlace>& points) {
   for (const KeypointPlace& p : points)
     for (std::size_t c = 1; c < 3; ++c) sum[c] += p[c] / static_cast<double>(points.size());
   return sum;  // in the plane of symmetry
-}
-
-// Scale, shift and quaternion from the last layer's output. Its bias is an upright camera.
-nn::Var CamerasOf(const nn::Var& raw) {
-  return nn::Concat({kStartScale * nn::Exp(nn::Tanh(nn::Slice(raw, 1, 0, 1))),
-                     nn::Slice(raw, 1, 1, 3), UnitRows(nn::Slice(raw, 1, 3, 7))},
-                    1);
 }
 
 // Of logits [B, N]: for each row the place of its largest number in all rows of [B N, ..].
@@ -104,6 +98,9 @@ double HullReach(const std::vector<KeypointPlace>& points, const KeypointPlace& 
 }
 
 Status CheckNetwork(const PhotographNetworkConfig& config, int image_size) {
+  if (config.rotation != "quaternion" && config.rotation != "rows")
+    return InvalidArgument("network.rotation is \"{}\", but must be \"quaternion\" or \"rows\"",
+                           config.rotation);
   if (config.texture != "direct" && config.texture != "flow")
     return InvalidArgument("network.texture is \"{}\", but must be \"direct\" or \"flow\"",
                            config.texture);
@@ -154,14 +151,13 @@ void PhotographNetwork::BuildHeads(Rng& rng) {
   nn::FillConstant(offsets.bias.value(), 0);
   const std::int64_t count = config_.azimuths, logits = count > 1 ? count : 0;
   auto& camera =
-      nn::AddLinear(all_.camera, "fc", context_, latent, count * kWeakNumbers + logits, rng);
+      nn::AddLinear(all_.camera, "fc", context_, latent, count * CameraNumbers() + logits, rng);
   std::vector<double> start;
   for (int k = 0; k < count; ++k) {
-    start.insert(start.end(), {0, 0, 0});
-    const std::array<double, 4> rotation = StartingRotation(k, static_cast<int>(count));
-    start.insert(start.end(), rotation.begin(), rotation.end());
+    const std::vector<double> numbers = StartingNumbers(k);
+    start.insert(start.end(), numbers.begin(), numbers.end());
   }
-  start.resize(static_cast<std::size_t>(count * kWeakNumbers + logits));
+  start.resize(static_cast<std::size_t>(count * CameraNumbers() + logits));
   camera.bias.value() =
       context_.From({static_cast<std::int64_t>(start.size())}, std::span<const double>(start));
 }
@@ -219,16 +215,43 @@ void PhotographNetwork::Texture(const PictureCode::Encoded& encoded, nn::Mode mo
   out->textures = nn::Permute(map, {0, 2, 3, 1});
 }
 
+std::int64_t PhotographNetwork::CameraNumbers() const {
+  return turns_by_rows() ? kWeakNumbers + 2 : kWeakNumbers;
+}
+
+// The bias of the last layer: an upright camera.
+std::vector<double> PhotographNetwork::StartingNumbers(int k) const {
+  std::vector<double> out(3, 0.0);
+  const auto quaternion = StartingRotation(k, static_cast<int>(config_.azimuths));
+  const std::array<double, 9> matrix = RotationOf(quaternion);
+  if (turns_by_rows()) {
+    out.insert(out.end(), matrix.begin(), matrix.begin() + 6);
+  } else {
+    out.insert(out.end(), quaternion.begin(), quaternion.end());
+  }
+  return out;
+}
+
+// Scale, shift and quaternion from the last layer's output.
+nn::Var PhotographNetwork::CamerasOf(const nn::Var& raw) const {
+  const nn::Var rotation = nn::Slice(raw, 1, 3, CameraNumbers());
+  return nn::Concat(
+      {kStartScale * nn::Exp(nn::Tanh(nn::Slice(raw, 1, 0, 1))), nn::Slice(raw, 1, 1, 3),
+       turns_by_rows() ? QuaternionsOfRows(rotation) : UnitRows(rotation)},
+      1);
+}
+
 void PhotographNetwork::Cameras(const nn::Var& latent, nn::Mode mode, Prediction* out) {
   const nn::Var raw = all_.camera.Forward(latent, mode);
-  const std::int64_t count = config_.azimuths, numbers = count * kWeakNumbers;
+  const std::int64_t count = config_.azimuths, numbers = count * CameraNumbers();
   if (count == 1 || !raw.valid()) {
     out->cameras = raw.valid() ? CamerasOf(raw) : raw;
     return;
   }
   const std::int64_t rows = raw.shape()[0] * count;
   out->choice_logits = nn::Slice(raw, 1, numbers, numbers + count);
-  out->camera_choices = CamerasOf(nn::Reshape(nn::Slice(raw, 1, 0, numbers), {rows, kWeakNumbers}));
+  out->camera_choices =
+      CamerasOf(nn::Reshape(nn::Slice(raw, 1, 0, numbers), {rows, CameraNumbers()}));
   const std::vector<std::int32_t> likeliest = Likeliest(out->choice_logits.value());
   out->cameras = nn::Gather(out->camera_choices, 0, context_.Indices(likeliest));
 }

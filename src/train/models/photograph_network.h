@@ -32,6 +32,8 @@ struct PhotographNetworkConfig {
   // One picture of a car often does not distinguish front from rear; a single camera then learns
   // the mean of both.
   std::int64_t azimuths = 1;
+  // Of the camera head: "quaternion", or "rows", the first two of the rotation's matrix.
+  std::string rotation = "quaternion";
 };
 
 // What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
@@ -64,6 +66,10 @@ class PhotographNetwork {
   void StartShape(const PhotographStart& start);
   void Texture(const PictureCode::Encoded& encoded, nn::Mode mode, Prediction* out);
   void Cameras(const nn::Var& latent, nn::Mode mode, Prediction* out);
+  bool turns_by_rows() const { return config_.rotation == "rows"; }
+  std::int64_t CameraNumbers() const;  // of the head, for one camera
+  std::vector<double> StartingNumbers(int k) const;
+  nn::Var CamerasOf(const nn::Var& raw) const;
 
   nn::Context& context_;
   PhotographNetworkConfig config_;

@@ -2,6 +2,9 @@
 #include "train/ops/weak_cameras.h"
 
 #include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include "base/error.h"
 #include "scene/weak_perspective_ref.h"
@@ -88,7 +91,84 @@ void PinholesBackward(const nn::Tensor& cameras, int size, const T* d, T* d_came
   }
 }
 
+// One rotation of six numbers, and what its numbers do to it.
+class RowRotation {
+ public:
+  template <class T>
+  explicit RowRotation(const T* n) {
+    const glm::dvec3 a(n[0], n[1], n[2]), b(n[3], n[4], n[5]);
+    first_ = Unit(a, {1, 0, 0}, &length_);
+    along_ = glm::dot(b, first_);
+    // Beside parallel rows any second one does.
+    const glm::dvec3 aside = std::abs(first_.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+    second_ = Unit(b - along_ * first_, glm::normalize(glm::cross(first_, aside)), &across_);
+    third_ = glm::cross(first_, second_);
+    quaternion_ = QuaternionOf({first_.x, first_.y, first_.z, second_.x, second_.y, second_.z,
+                                third_.x, third_.y, third_.z});
+  }
+  const std::array<double, 4>& quaternion() const { return quaternion_; }
+
+  // What d_quaternion is by the six numbers. A turn by the small vector t in the camera's axes
+  // moves the quaternion by (0, t) q / 2, and of the rows first . third by t[1], first . second by
+  // -t[2], second . third by -t[0].
+  template <class T>
+  void Backward(const T* d, T* d_numbers) const {
+    const auto [w, x, y, z] = quaternion_;
+    const double turns[3] = {(-x * d[0] + w * d[1] - z * d[2] + y * d[3]) / 2,
+                             (-y * d[0] + z * d[1] + w * d[2] - x * d[3]) / 2,
+                             (-z * d[0] - y * d[1] + x * d[2] + w * d[3]) / 2};
+    const double by_third = (turns[1] + turns[0] * along_ / across_) / length_;
+    const glm::dvec3 d_a = by_third * third_ - turns[2] / length_ * second_,
+                     d_b = -turns[0] / across_ * third_;
+    for (int i = 0; i < 3; ++i) {
+      d_numbers[i] = static_cast<T>(d_a[i]);
+      d_numbers[3 + i] = static_cast<T>(d_b[i]);
+    }
+  }
+
+ private:
+  static constexpr double kShortest = 1e-6;
+  static glm::dvec3 Unit(const glm::dvec3& v, const glm::dvec3& otherwise, double* length) {
+    const double own = glm::length(v);
+    *length = std::max(own, kShortest);
+    return own < kShortest ? otherwise : v / own;
+  }
+
+  glm::dvec3 first_, second_, third_;  // rows of the rotation
+  double length_, across_;             // of the first numbers; of the others beside the first row
+  double along_;                       // of the others along it
+  std::array<double, 4> quaternion_;
+};
+
 }  // namespace
+
+nn::Var QuaternionsOfRows(const nn::Var& rows) {
+  if (!rows.valid()) return rows;
+  nn::Context& context = rows.context();
+  const nn::Tensor& at = rows.value();
+  const auto batch = static_cast<std::size_t>(rows.shape()[0]);
+  nn::Tensor out = context.Empty({rows.shape()[0], 4}, rows.dtype());
+  nn::WithFloatType(rows.dtype(), [&]<class T>(T) {
+    for (std::size_t b = 0; b < batch; ++b) {
+      const RowRotation rotation(at.span<T>().data() + 6 * b);
+      std::ranges::transform(rotation.quaternion(), out.data<T>() + 4 * b,
+                             [](double q) { return static_cast<T>(q); });
+    }
+  });
+  auto backward = [at, batch, &context](std::span<const nn::Tensor> d) {
+    nn::Tensor d_rows = context.Empty(at.shape(), at.dtype());
+    nn::WithFloatType(at.dtype(), [&]<class T>(T) {
+      for (std::size_t b = 0; b < batch; ++b)
+        RowRotation(at.span<T>().data() + 6 * b)
+            .Backward(d[0].span<T>().data() + 4 * b, d_rows.data<T>() + 6 * b);
+    });
+    return std::vector<nn::Tensor>{d_rows};
+  };
+  return nn::External(context, {.name = "quaternions of rows",
+                                .inputs = {rows},
+                                .outputs = {out},
+                                .backward = std::move(backward)})[0];
+}
 
 nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras) {
   if (!points.valid() || !cameras.valid()) return points.valid() ? cameras : points;

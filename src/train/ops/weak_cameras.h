@@ -15,6 +15,12 @@ inline constexpr std::int64_t kWeakNumbers = 7;
 // points [B, K, 3], cameras [B, 7] -> [B, K, 2]: where they are seen. Gradients to both.
 nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras);
 
+// rows [B, 6] -> [B, 4]: unit quaternions, w >= 0, of the rotations whose first two rows are
+// nearest to such a row's by Gram and Schmidt. Every rotation has its numbers and neighbours of it
+// near ones, which four numbers do not give (Zhou et al., CVPR 2019, section 4.2). Rows of no
+// length or that are parallel have some rotation, and a gradient that is finite.
+nn::Var QuaternionsOfRows(const nn::Var& rows);
+
 // cameras [B, 7] -> [B, 16], SceneVars::cameras of images of `size` pixels a side: pinholes at
 // kPinholeDistance. With a gradient.
 nn::Var PinholeCameras(const nn::Var& cameras, int size);

@@ -16,7 +16,10 @@ ConfigFields FieldsOf(PhotographNetworkConfig* c) {
        Without(FieldsOf(&c->sphere), {"network.template_radius", "network.symmetric"}),
        {OutputDeviation(&c->output_deviation),
         {"network.azimuths", &c->azimuths, 1, 64,
-         "camera hypotheses per photograph, evenly spread in azimuth; the likeliest is used"}}});
+         "camera hypotheses per photograph, evenly spread in azimuth; the likeliest is used"},
+        {"network.rotation", &c->rotation, 0, 0,
+         "what the camera head gives of a rotation: \"quaternion\", or \"rows\": two of its "
+         "matrix"}}});
 }
 
 ConfigFields FieldsOf(PhotographLosses* c) {
