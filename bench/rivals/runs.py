@@ -23,6 +23,7 @@ def parser(description: str | None, methods: Iterable[str]) -> argparse.Argument
     out.add_argument("--steps", type=int, help="of each run")
     out.add_argument("--seeds", type=int, nargs="+")
     out.add_argument("--methods", nargs="+", choices=list(methods), default=list(methods))
+    out.add_argument("--sheet", metavar="FILE", help="also write what the first seed's runs predict, side by side")
     out.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="for all")
     return out
 

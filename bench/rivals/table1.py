@@ -9,7 +9,8 @@ Trains and scores each renderer with each seed, one run after the other, and pri
 Markdown: 3D IoU / F-score of each class, and both rules of IoU, with standard errors over held-out
 models; then differences to our renderer by pairs of models, with errors over models and seeds. A run
 that is finished is kept, one that was stopped goes on. Processor time is that of training, start-up
-included.
+included. --sheet FILE.png, with PYTHONPATH=build/release/python: the paper's figure 4, a row an object of
+each class: input, each renderer's prediction from there and from another side, and the truth from there.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ import sys
 from typing import Any
 
 import runs
+import sheet
 
+# Input | prediction, and from another side | the truth from there.
+LAYOUT = sheet.Layout(columns=4, before=(0,), own=(1, 2), after=(3,), gap=4)
 METHODS = {
     "N3MR": ["render.rule=n3mr"],
     "SoftRas-Mesh": ["render.rule=softras"],
@@ -52,9 +56,13 @@ def train(options: argparse.Namespace, run: pathlib.Path, method: str, seed: int
     used.write_text(str(earlier + processor_seconds() - before))
 
 
+def folder(options: argparse.Namespace, method: str, seed: int) -> pathlib.Path:
+    return pathlib.Path(options.out) / f"{method.lower()}-{seed}"
+
+
 def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any]:
     """The scores of a run, which is trained and evaluated first if need be."""
-    run = pathlib.Path(options.out) / f"{method.lower()}-{seed}"
+    run = folder(options, method, seed)
     if not (run / "eval.json").exists():
         train(options, run, method, seed)
         runs.evaluate(options, run)
@@ -98,11 +106,15 @@ def main() -> int:
     try:
         results = {method: [scores(options, method, seed) for seed in options.seeds]
                    for method in options.methods}
+        first = {method: folder(options, method, options.seeds[0]) for method in options.methods}
+        told = sheet.write(options, first, LAYOUT) if options.sheet else ""
     except subprocess.CalledProcessError as error:
         print(f"table1: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results, options.steps))
     print(runs.comparisons(results, "DIB-R", {score: (100, 1) for score in SCORES}))
+    if told:
+        print(told)
     return 0
 
 

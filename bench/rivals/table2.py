@@ -10,6 +10,8 @@ Trains and scores one run after the other and prints the table as Markdown. Erro
 pixels and channels of the image, with standard errors over held-out models; below each of ours stand
 the predicted texture without light and under the mean of all lights. Differences come last, by pairs
 of models, with errors over models and seeds. A run that is finished is kept, one that was stopped goes on.
+--sheet FILE.png, with PYTHONPATH=build/release/python: the paper's figure 5, a row an object: input, of each
+renderer texture + light, texture and light, and the true texture and light.
 """
 
 from __future__ import annotations
@@ -23,7 +25,10 @@ import sys
 from typing import Any
 
 import runs
+import sheet
 
+# Input | texture + light, texture and light | the true texture and light.
+LAYOUT = sheet.Layout(columns=11, before=(0,), own=(1, 2, 3), after=(4, 5), gap=2)
 METHODS = {"N3MR": "render.rule=n3mr", "DIB-R": "render.rule=dibr"}
 # Cars of ShapeNet as printed: texture L1, angle of the light, texture + light L1.
 PAPER = {"N3MR": (0.03640, 23.5585, 0.02208), "DIB-R": (0.02179, 9.7096, 0.01362)}
@@ -31,9 +36,13 @@ SCORES = {"texture_l1": (1, 4), "light_angle": (1, 1), "lit_l1": (1, 4)}  # fact
 BASELINES = ("without light", "mean light")
 
 
+def folder(options: argparse.Namespace, method: str, seed: int) -> pathlib.Path:
+    return pathlib.Path(options.out) / f"{method.lower()}-{seed}"
+
+
 def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any]:
     """The scores of a run, which is trained and evaluated first if need be."""
-    run = pathlib.Path(options.out) / f"{method.lower()}-{seed}"
+    run = folder(options, method, seed)
     if not (run / "eval.json").exists():
         runs.train(options, run, [METHODS[method], f"schedule.seed={seed}"])
         runs.evaluate(options, run)
@@ -74,11 +83,15 @@ def main() -> int:
     try:
         results = {method: [scores(options, method, seed) for seed in options.seeds]
                    for method in options.methods}
+        first = {method: folder(options, method, options.seeds[0]) for method in options.methods}
+        told = sheet.write(options, first, LAYOUT) if options.sheet else ""
     except subprocess.CalledProcessError as error:
         print(f"table2: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results))
     print(runs.comparisons(results, "DIB-R", SCORES))
+    if told:
+        print(told)
     return 0
 
 

@@ -117,6 +117,18 @@ Result<ImageU8> TexturedImageTask::SamplePicture(std::int64_t /*steps*/) {
   return rows.empty() ? ImageU8() : SheetOf(rows, image_size());
 }
 
+// The pictures of all examples, a row each.
+void AddTexturedSheet(int size, Showcase* showcase) {
+  if (showcase->examples.empty()) return;
+  std::vector<std::vector<ShownPicture>> rows;
+  for (const Example& example : showcase->examples) rows.push_back(example.pictures);
+  showcase->sheet = SheetOf(rows, size);
+  for (const ShownPicture& picture : rows[0]) {
+    if (!showcase->sheet_columns.empty()) showcase->sheet_columns += ", ";
+    showcase->sheet_columns += picture.caption;
+  }
+}
+
 Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
                                          const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
@@ -149,6 +161,7 @@ Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const W
     out.examples.push_back(std::move(example));
     if (progress) progress({"predicting", out.examples.size(), held_out.models().size(), ""});
   }
+  AddTexturedSheet(size, &out);
   return out;
 }
 
