@@ -34,6 +34,8 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
 Status Predictor::ExportWeights(const Path& file, const std::string& credits,
                                 nn::StoredFloats floats) const {
   Checkpoint weights{info(), all_->model->weights()};
+  if (weights.tensors.empty())
+    return InternalError("a model of \"{}\" notes no weights", all_->config.kind);
   weights.info.credits = credits;
   return WriteWeights(all_->context, file, weights, floats);
 }
