@@ -238,6 +238,13 @@ Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
   return DecodeNpy(bytes, zip->Describe(EntryName(name)));
 }
 
+Result<NpyArray> DecodeNpzArray(const Bytes& npz, const std::string& place,
+                                const std::string& name) {
+  const ReadBudget budget;
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFromZip(npz, place, EntryName(name)));
+  return DecodeNpy(bytes, place + ": " + EntryName(name));
+}
+
 namespace {
 
 constexpr std::size_t kMostNameBytes = 65535;  // of a zip entry: its length has 16 bits

@@ -71,6 +71,9 @@ using NpzArrays = std::map<std::string, NpyArray>;
 Result<NpzArrays> LoadNpz(const Path& path);
 // One array; an error that lists what is there if `name` is not.
 Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name);
+// The same of a file in memory; `place` stands for it in messages.
+Result<NpyArray> DecodeNpzArray(const Bytes& npz, const std::string& place,
+                                const std::string& name);
 // Compressed, whole or not at all; the same arrays give the same bytes. One array at least.
 Status SaveNpz(const Path& path, const NpzArrays& arrays);
 

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "scene/shapes.h"
+#include "train/run/carried_files.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::train {
@@ -37,6 +38,8 @@ Status Predictor::ExportWeights(const Path& file, const std::string& credits,
   if (weights.tensors.empty())
     return InternalError("a model of \"{}\" notes no weights", all_->config.kind);
   weights.info.credits = credits;
+  TILEGRAD_ASSIGN(auto files, CarriedFiles(all_->context, checkpoint()));
+  for (nn::NamedTensor& carried : files) weights.tensors.push_back(std::move(carried));
   return WriteWeights(all_->context, file, weights, floats);
 }
 

@@ -25,7 +25,8 @@ class Predictor {
   // or the name of weights that come along. Errors name the file and what is wrong.
   static Result<Predictor> Load(const Path& path, const Workers& workers);
 
-  // A file of its weights alone, with those credits of its training data: WriteWeights.
+  // A file of what predicts, with those credits of its training data and CarriedFiles of its run:
+  // WriteWeights.
   Status ExportWeights(const Path& file, const std::string& credits, nn::StoredFloats floats) const;
 
   // Newer checkpoints of the run folder that could not be read.

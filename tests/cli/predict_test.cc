@@ -44,6 +44,8 @@ TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
   ExpectIn(said, "text.png: unlike the ",
            " training images; expect a poor mesh (nearest: ", ", at 0.", "; usual: 0.");
   ExpectIn(Said("text.png", "r/checkpoints/step_00000002.safetensors"), "unlike");
+  ExpectDone("export --half --run " + In("r") + " --out " + In("w.safetensors"));
+  ExpectIn(Said("text.png", "w.safetensors"), "unlike");
   // It needs no dataset.
   std::filesystem::rename(folder_ / "d", folder_ / "gone");
   const auto first_line = [](const std::string& text) { return text.substr(0, text.find('\n')); };

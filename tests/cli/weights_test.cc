@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "nn/serialize.h"
 #include "support/run_program.h"
@@ -119,6 +120,21 @@ TEST_F(Weights, AreScoredBesideTheirRun) {
                               Shared("image/checkpoints/step_00000002.safetensors")))["rows"],
             of_run["rows"]);
   ExpectRefused("eval --run " + Shared("full.safetensors"), 3, "names no dataset", "--data");
+}
+
+// They carry the list of the models that they learned from.
+TEST_F(Weights, AreNotScoredOnWhatTheyLearnedFrom) {
+  std::filesystem::copy(Shared("d"), folder_ / "d", std::filesystem::copy_options::recursive);
+  std::istringstream lines(ReadText(folder_ / "d/models.jsonl").value());
+  std::string swapped;
+  for (std::string line; std::getline(lines, line);) {
+    Json model = Json::parse(line);
+    model["split"] = model["split"] == "train" ? "test" : "train";
+    swapped += model.dump() + "\n";
+  }
+  Write("d/models.jsonl", swapped);
+  ExpectRefused("eval --run " + Shared("weights/furniture.safetensors") + " --data " + In("d"), 2,
+                "held-out models", "were trained on");
 }
 
 TEST_F(Weights, ComeAlongByName) {

@@ -7,12 +7,13 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "io/archive.h"
+#include "train/run/carried_files.h"
 #include "train/run/first_difference.h"
 
 namespace tilegrad::train {
 namespace {
 
-Path ModelListOf(const Path& run) { return run / "training_models.txt"; }
+constexpr const char* kModelList = "training_models.txt";  // of a run
 
 std::string ModelLine(const Dataset& dataset, int index) {
   const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
@@ -56,7 +57,7 @@ bool HasContents(const std::string& list) { return list.find("\ncamera ") != std
 }  // namespace
 
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step) {
-  const Path file = ModelListOf(run);
+  const Path file = run / kModelList;
   const std::string models = TextOf(dataset);
   TILEGRAD_ASSIGN(const std::string contents, ContentsOf(dataset));
   const std::string now = models + contents;
@@ -73,11 +74,10 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64
 }
 
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
-  const Path file = ModelListOf(run);
-  if (!PathExists(file)) return {};
-  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kModelList));
+  if (!list) return {};
   std::unordered_set<std::string> trained;
-  std::istringstream lines(text);
+  std::istringstream lines(std::string(list->bytes.begin(), list->bytes.end()));
   for (std::string line; std::getline(lines, line);) trained.insert(MeshOf(line));
   const std::vector<int> held_out = dataset.Select(split);
   std::vector<std::string> seen;

@@ -18,7 +18,7 @@ namespace tilegrad::train {
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step);
 
 // InvalidArgument if the run was trained on models of the dataset's `split`, or on other colours of
-// their meshes. Fine for a run without a list, and for a single checkpoint.
+// their meshes. Fine for a run without a list. `run`: as of ReadRunFile.
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split = Split::kTest);
 
 }  // namespace tilegrad::train

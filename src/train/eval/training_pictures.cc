@@ -8,10 +8,8 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "io/npz.h"
 #include "render/picture/composite.h"
 #include "train/data/cutout.h"
-#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -19,7 +17,7 @@ namespace {
 constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
                       kPictureBytes = 4 * kPixels;
 
-Path FileOf(const Path& run) { return run / "thumbnails.npz"; }
+constexpr const char* kThumbnails = "thumbnails.npz";  // of a run
 
 // Which of `count` are taken so that at most `most` are, evenly spread.
 std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
@@ -146,7 +144,7 @@ Status TrainingPictures::Write(const Path& run) const {
   for (const Model& model : models_) names += model.name + "\t" + model.class_name + "\n";
   const auto* text = reinterpret_cast<const std::uint8_t*>(names.data());
   const std::size_t kept = of_.size();
-  return io::SaveNpz(FileOf(run),
+  return io::SaveNpz(run / kThumbnails,
                      {{"pictures", io::MakeNpy<std::uint8_t>(
                                        {kept, 4, kThumbnailSize, kThumbnailSize}, pictures_)},
                       {"models", io::MakeNpy<std::int32_t>({kept}, of_)},
@@ -171,11 +169,15 @@ Status TrainingPictures::Check() const {
   return {};
 }
 
-Status TrainingPictures::Load(const Path& file) {
-  TILEGRAD_ASSIGN(const io::NpzArrays arrays, io::LoadNpz(file));
+Status TrainingPictures::Load(const RunFile& file) {
+  io::NpzArrays arrays;
   for (const char* name : {"pictures", "models", "names", "others", "count"}) {
-    if (!arrays.contains(name)) return DataLoss("no array \"{}\"", name);
+    TILEGRAD_ASSIGN(arrays[name], io::DecodeNpzArray(file.bytes, file.place, name));
   }
+  return Fill(arrays).Within(file.place);
+}
+
+Status TrainingPictures::Fill(const io::NpzArrays& arrays) {
   TILEGRAD_ASSIGN(pictures_, arrays.at("pictures").As<std::uint8_t>());
   TILEGRAD_ASSIGN(of_, arrays.at("models").As<std::int32_t>());
   TILEGRAD_ASSIGN(others_, arrays.at("others").As<float>());
@@ -192,10 +194,10 @@ Status TrainingPictures::Load(const Path& file) {
 }
 
 Result<std::optional<TrainingPictures>> TrainingPictures::Read(const Path& run) {
-  const Path file = FileOf(RunFolderOf(run));
-  if (!PathExists(file)) return std::optional<TrainingPictures>();
+  TILEGRAD_ASSIGN(const auto file, ReadRunFile(run, kThumbnails));
+  if (!file) return std::optional<TrainingPictures>();
   TrainingPictures out;
-  if (const Status loaded = out.Load(file); !loaded.ok()) return loaded.Within(file.string());
+  TILEGRAD_TRY(out.Load(*file));
   return std::optional(std::move(out));
 }
 

@@ -13,9 +13,11 @@
 
 #include "base/file.h"
 #include "base/parallel.h"
+#include "io/npz.h"
 #include "scene/image.h"
 #include "train/data/batches.h"
 #include "train/data/dataset.h"
+#include "train/run/carried_files.h"
 
 namespace tilegrad::train {
 
@@ -43,8 +45,8 @@ class TrainingPictures {
   // picture makes no difference; pictures where nothing is opaque, or all, are left out.
   static TrainingPictures Of(const Dataset& dataset, const ImageStore& store,
                              const Workers& workers);
-  // Of a run folder, or of that of one checkpoint; nothing if there is no such file. Errors name
-  // the file and what is wrong.
+  // Of a run folder, of that of one checkpoint, or as a file of weights carries them; nothing if
+  // there is no such file. Errors name the file and what is wrong.
   static Result<std::optional<TrainingPictures>> Read(const Path& run);
   Status Write(const Path& run) const;
 
@@ -71,7 +73,8 @@ class TrainingPictures {
   // The first of the nearest among those that may_match(i); none if there is none.
   template <class MayMatch>
   std::optional<Found> Search(std::span<const std::uint8_t> small, const MayMatch& may_match) const;
-  Status Load(const Path& file);
+  Status Load(const RunFile& file);
+  Status Fill(const io::NpzArrays& arrays);
   Status Check() const;
 
   std::int64_t count_ = 0;

@@ -18,6 +18,7 @@
 #include "train/metrics/keypoint_score.h"
 #include "train/predictor.h"
 #include "train/ranks/share.h"
+#include "train/run/carried_files.h"
 #include "train/run/first_difference.h"
 #include "train/tasks/photographs/batch.h"
 #include "train/tasks/photographs/pictures.h"
@@ -30,7 +31,7 @@ enum CameraMethod { kCeiling, kMean, kOwnCamera, kOurs, kMethods };
 constexpr const char* kRowNames[kMethods] = {"true keypoints", "mean shape", "predicted camera",
                                              "tilegrad"};
 
-Path PhotographListOf(const Path& run) { return run / "training_photographs.txt"; }
+constexpr const char* kPhotographList = "training_photographs.txt";  // of a run
 
 std::string TextOf(const PhotographSet& set) {
   std::string text;
@@ -230,18 +231,18 @@ class PhotographJudge {
 
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
   const std::string now = TextOf(set);
-  if (is_new) return WriteTextAtomic(PhotographListOf(run), now);
-  TILEGRAD_ASSIGN(const std::string then, ReadText(PhotographListOf(run)));
+  if (is_new) return WriteTextAtomic(run / kPhotographList, now);
+  TILEGRAD_ASSIGN(const std::string then, ReadText(run / kPhotographList));
   if (then == now) return {};
   return InvalidArgument("{}: this run was started with other photographs than those of {}: {}",
                          run.string(), set.folder.string(), FirstDifference(then, now));
 }
 
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
-  if (!PathExists(PhotographListOf(run))) return {};
-  TILEGRAD_ASSIGN(const std::string text, ReadText(PhotographListOf(run)));
+  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kPhotographList));
+  if (!list) return {};
   std::set<std::string> trained;
-  std::istringstream lines(text);
+  std::istringstream lines(std::string(list->bytes.begin(), list->bytes.end()));
   for (std::string line; std::getline(lines, line);) trained.insert(line);
   for (const int i : set.Select(split)) {
     const std::string& id = set.photographs[static_cast<std::size_t>(i)].id;
