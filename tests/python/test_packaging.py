@@ -90,6 +90,11 @@ class Pip(Workspace):
         self.assertIn("tilegrad-fit.1", os.listdir(env / "share/man/man1"))
         package, = env.glob("lib/python3*/site-packages/tilegrad")
         self.assertTrue(list((package / "lib").glob("*.copyright")))
+        weights = {path.name for path in (SOURCE / "data/weights").glob("*.safetensors")}
+        self.assertEqual({path.name for path in package.glob("share/tilegrad/weights/*")}, weights)
+        if "car-generator.safetensors" in weights:
+            subprocess.run([env / "bin/tilegrad", "sample", "--count", "1", "--out", "sample"],
+                           check=True, cwd=self.work, env=clean, capture_output=True)
         for binary in [package / "bin/tilegrad", *package.glob("*.so")]:
             lines = subprocess.run(["ldd", binary], capture_output=True, text=True,
                                    check=True).stdout

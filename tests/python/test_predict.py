@@ -113,6 +113,17 @@ class Predict(FolderTest):
         one = files.load_checkpoint(checkpoint.file)
         self.assertEqual(one.step, 3)
 
+    def test_weights_come_along_by_name(self) -> None:
+        run_program("export", "--run", run(), "--out", self.folder / "furniture.safetensors")
+        self.addCleanup(os.environ.pop, "TILEGRAD_WEIGHTS")
+        os.environ["TILEGRAD_WEIGHTS"] = str(self.folder)
+        image = files.load_image(self.image)
+        expected = self._python(files.Predictor(run()).predict(image, refine=0))
+        for predictor in (files.Predictor(), files.Predictor("furniture")):
+            self.assertEqual(self._python(predictor.predict(image, refine=0)), expected)
+        self.assertRaisesRegex(FileNotFoundError, "come along are furniture", files.Predictor,
+                               "cars")
+
     def test_grey_images_with_alpha_are_cut_outs(self) -> None:
         image = files.load_image(self.image)
         image[..., 1] = image[..., 2] = image[..., 0]
