@@ -72,11 +72,12 @@ Status SyncFolder(const Path& folder) {
 }
 
 // Errors name `path`, the name that the caller knows.
-Status WriteTemporary(const Path& temporary, const Path& path,
-                      std::span<const std::uint8_t> bytes) {
+Status WriteTemporary(const Path& temporary, const Path& path, BytePieces pieces) {
   FileHandle file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
   if (file.fd() < 0) return SystemError(path, "cannot create");
-  if (!WriteAll(file.fd(), bytes)) return SystemError(path, "cannot write");
+  for (const auto& piece : pieces) {
+    if (!WriteAll(file.fd(), piece)) return SystemError(path, "cannot write");
+  }
   if (::fsync(file.fd()) != 0) return SystemError(path, "cannot sync");
   if (!file.Close()) return SystemError(path, "cannot close");
   return {};
@@ -125,10 +126,12 @@ bool IsDevice(const Path& path) {
   return ::stat(path.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode);
 }
 
-Status WriteToDevice(const Path& path, std::span<const std::uint8_t> bytes) {
+Status WriteToDevice(const Path& path, BytePieces pieces) {
   FileHandle file(path, O_WRONLY);
   if (file.fd() < 0) return SystemError(path, "cannot open");
-  if (!WriteAll(file.fd(), bytes)) return SystemError(path, "cannot write");
+  for (const auto& piece : pieces) {
+    if (!WriteAll(file.fd(), piece)) return SystemError(path, "cannot write");
+  }
   if (!file.Close()) return SystemError(path, "cannot close");
   return {};
 }
@@ -143,12 +146,16 @@ Path BehindLinks(const Path& path) {
 
 }  // namespace
 
-Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> bytes) {
-  if (IsDevice(path_or_link)) return WriteToDevice(path_or_link, bytes);
+Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes) {
+  return WriteFileAtomic(path, BytePieces(&bytes, 1));
+}
+
+Status WriteFileAtomic(const Path& path_or_link, BytePieces pieces) {
+  if (IsDevice(path_or_link)) return WriteToDevice(path_or_link, pieces);
   const Path path = BehindLinks(path_or_link);
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   const Path temporary = TemporaryOf(path);
-  Status status = WriteTemporary(temporary, path, bytes);
+  Status status = WriteTemporary(temporary, path, pieces);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(path, "cannot be replaced");
   }

@@ -30,6 +30,9 @@ Result<std::string> ReadText(const Path& path, std::size_t max_bytes = std::size
 // Missing parent folders are created. Symbolic links stay, devices and pipes are written to.
 Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes);
 Status WriteTextAtomic(const Path& path, std::string_view text);
+// The same with contents that lie in several places, one behind the other.
+using BytePieces = std::span<const std::span<const std::uint8_t>>;
+Status WriteFileAtomic(const Path& path, BytePieces pieces);
 
 // Appends and fsyncs if `durable`. A line that was cut by a crash is the reader's to detect.
 Status AppendText(const Path& path, std::string_view text, bool durable);

@@ -4,7 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <deque>
 #include <functional>
 #include <map>
@@ -42,10 +42,13 @@ class Simulation {
     const LoopRecord& record;
     std::size_t owner;
     double begin;
+    std::size_t place;  // of its seconds in taken_
     std::size_t started = 0, ended = 0;
-    bool left = false;  // by its owner
+    bool awaited = true, left = false;  // by its owner
     bool HasTask() const { return started < record.tasks.size(); }
     bool IsOver() const { return ended == record.tasks.size(); }
+    // Whether a worker without a loop of its own may take a task.
+    bool IsOpen() const { return HasTask() && (awaited || started - ended < record.helpers); }
   };
   // A strand that a worker is in.
   struct Frame {
@@ -64,9 +67,11 @@ class Simulation {
   void Advance(std::size_t worker, double time) {
     auto& stack = stacks_[worker];
     if (!stack.empty() && stack.back().inner == nullptr) {
-      if (stack.back().stretch < stack.back().strand.loops.size()) {
+      Frame& frame = stack.back();
+      if (frame.stretch < frame.strand.loops.size()) {
         Open(worker, time);
-      } else {
+        if (frame.inner == nullptr) return;  // a side loop: the strand continues
+      } else if (!AwaitSideLoop(worker, time)) {
         Close(worker, time);
       }
     }
@@ -75,9 +80,39 @@ class Simulation {
 
   void Open(std::size_t worker, double time) {
     Frame& frame = stacks_[worker].back();
-    frame.inner = &loops_.emplace_back(OpenLoop{frame.strand.loops[frame.stretch], worker, time});
-    const double start = frame.of == nullptr ? machine_.start_seconds : 0;
-    for (const std::size_t other : std::exchange(idle_, {})) events_.emplace(time + start, other);
+    const LoopRecord& record = frame.strand.loops[frame.stretch];
+    OpenLoop& loop = loops_.emplace_back(OpenLoop{record, worker, time, taken_.size()});
+    loop.awaited = record.helpers == 0;
+    if (frame.of == nullptr) taken_.push_back(0);
+    WakeOthers(time, frame.of == nullptr);
+    if (loop.awaited) {
+      frame.inner = &loop;
+    } else {
+      events_.emplace(time + frame.strand.stretches[++frame.stretch], worker);
+    }
+  }
+
+  // After each start time twice as many take part; those who are awake do at once.
+  void WakeOthers(double time, bool asleep) {
+    std::size_t awake = 1;
+    for (const std::size_t other : std::exchange(idle_, {})) {
+      const double starts = asleep ? std::bit_width(awake++) : 0;
+      events_.emplace(time + starts * machine_.start_seconds, other);
+    }
+  }
+
+  // At the end of the whole: whether a side loop is left, which its owner now waits for.
+  bool AwaitSideLoop(std::size_t worker, double time) {
+    Frame& frame = stacks_[worker].back();
+    if (frame.of != nullptr) return false;
+    const auto left = std::find_if(loops_.begin(), loops_.end(),
+                                   [](const auto& l) { return !l.awaited && !l.IsOver(); });
+    if (left == loops_.end()) return false;
+    left->awaited = true;
+    left->begin = time;
+    frame.inner = &*left;
+    WakeOthers(time, true);
+    return true;
   }
 
   // Of a strand. Its loop's owner may wait for it.
@@ -86,7 +121,8 @@ class Simulation {
     stacks_[worker].pop_back();
     if (loop == nullptr) return;
     ++loop->ended;
-    if (loop->IsOver() && loop->owner != worker) events_.emplace(time, loop->owner);
+    if (loop->IsOver() && loop->awaited && loop->owner != worker)
+      events_.emplace(time, loop->owner);
   }
 
   void Continue(std::size_t worker, double time) {
@@ -104,7 +140,7 @@ class Simulation {
   OpenLoop* Oldest() {
     while (!loops_.empty() && loops_.front().left) loops_.pop_front();
     const auto found =
-        std::find_if(loops_.begin(), loops_.end(), [](const auto& l) { return l.HasTask(); });
+        std::find_if(loops_.begin(), loops_.end(), [](const auto& l) { return l.IsOpen(); });
     return found == loops_.end() ? nullptr : &*found;
   }
 
@@ -113,9 +149,10 @@ class Simulation {
     loop.left = true;
     if (machine_.bytes_per_second > 0)
       time = std::max(time, loop.begin + loop.record.bytes / machine_.bytes_per_second);
-    if (frame->of == nullptr) taken_.push_back(time - loop.begin);
+    if (frame->of == nullptr) taken_[loop.place] = time - loop.begin;
     frame->inner = nullptr;
-    events_.emplace(time + frame->strand.stretches[++frame->stretch], worker);
+    const bool ended = frame->stretch == frame->strand.loops.size();  // a side loop was left
+    events_.emplace(ended ? time : time + frame->strand.stretches[++frame->stretch], worker);
   }
 
   using Event = std::pair<double, std::size_t>;  // time and worker
@@ -168,7 +205,7 @@ void Spin(double seconds) {
 }
 
 // What a loop takes beyond its tasks, of which every worker gets one, where nine of ten take
-// longer: what other programs hold up is not the machine's.
+// longer: what other programs hold up is not the machine's. By the doublings until all take part.
 double MeasureStart(const Workers& workers) {
   constexpr int kLoops = 301;
   constexpr double kBefore = 30e-6, kTask = 100e-6;
@@ -181,7 +218,8 @@ double MeasureStart(const Workers& workers) {
     beyond.push_back(SecondsSince(begin) - kTask);
   }
   std::nth_element(beyond.begin(), beyond.begin() + kLoops / 10, beyond.end());
-  return std::max(0.0, beyond[kLoops / 10]);
+  const auto doublings = std::bit_width(static_cast<unsigned>(workers.count()) - 1u);
+  return std::max(0.0, beyond[kLoops / 10]) / std::max(1, static_cast<int>(doublings));
 }
 
 // The best of a few rounds over arrays that no cache holds: two reads and a write of each number.
@@ -218,11 +256,6 @@ LoopForecast Forecast(const Strand& strand, const LoopMachine& machine) {
 
 LoopCosts MeasureLoopCosts(const Workers& workers) {
   return {MeasureStart(workers), MeasureMemory(workers)};
-}
-
-double StartSeconds(double measured_seconds, int measured, int workers) {
-  if (workers <= 1) return 0;
-  return measured_seconds * std::max(1.0, std::log2(workers) / std::log2(std::max(2, measured)));
 }
 
 }  // namespace tilegrad

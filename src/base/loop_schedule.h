@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recorded strand of work would take on many workers, by greedy scheduling: an idle worker
-// takes the next task of the oldest loop that has one. R. Graham, Bounds on multiprocessing timing
+// takes the next task of the oldest loop that has one; a SideLoop begun within it is over when the
+// strand is. R. Graham, Bounds on multiprocessing timing
 // anomalies, 1969: at most work / workers + the longest chain of tasks.
 #pragma once
 
@@ -14,8 +15,8 @@ namespace tilegrad {
 // The machine that is asked about.
 struct LoopMachine {
   int workers = 1;
-  // From the begin of a loop until workers other than the one that begins it take part. Loops
-  // within loops find others awake and start at once.
+  // From the begin of a loop until a second worker takes part, and until twice as many do each
+  // time: workers wake each other. Loops within loops find others awake and start at once.
   double start_seconds = 0;
   // Of all workers together to memory: a loop takes no less than its bytes need. 0: no limit.
   double bytes_per_second = 0;
@@ -40,13 +41,9 @@ LoopForecast Forecast(const Strand& strand, const LoopMachine& machine);
 
 // What loops cost on this machine, measured with all of the workers.
 struct LoopCosts {
-  double start_seconds = 0;     // of LoopMachine, for that many workers
+  double start_seconds = 0;     // of LoopMachine
   double bytes_per_second = 0;  // that all workers together read and write
 };
 LoopCosts MeasureLoopCosts(const Workers& workers);
-
-// `workers` on a machine where a loop of `measured` workers starts in that time: workers wake each
-// other, so that the time grows with the number's logarithm.
-double StartSeconds(double measured_seconds, int measured, int workers);
 
 }  // namespace tilegrad

@@ -24,14 +24,14 @@ void LoopTrace::Begin() {
   begin_ = Clock::now();
 }
 
-void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
-                    LoopSite site) {
+void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
+                    std::size_t helpers) {
   const double bytes = std::exchange(traffic_, 0);
-  if (n <= 1) {  // nothing that another worker could do
+  if (n == 0 || (n == 1 && helpers == 0)) {  // nothing that another worker could do
     if (n == 1) task(0, 0);
     return;
   }
-  events_.push_back({n, site, bytes});
+  events_.push_back({n, site, bytes, helpers});
   for (std::size_t i = 0; i < n; ++i) {
     task(i, 0);
     events_.push_back({});
@@ -58,7 +58,7 @@ class LoopTrace::Reader {
  private:
   LoopRecord ReadLoop() {
     const Event& begin = events_[next_++];
-    LoopRecord loop{begin.site, begin.bytes, {}};
+    LoopRecord loop{begin.site, begin.bytes, {}, begin.helpers};
     for (std::size_t i = 0; i < begin.tasks; ++i) {
       loop.tasks.push_back(ReadStrand());
       ++next_;  // its end

@@ -25,6 +25,8 @@ struct LoopRecord {
   LoopSite site{};
   double bytes = 0;  // that it moves in memory, as far as it says (Workers::NoteTraffic)
   std::vector<Strand> tasks;
+  // > 0: a SideLoop, which so many workers take part in until the strand that began it has ended.
+  std::size_t helpers = 0;
 };
 
 // Seconds of all stretches.
@@ -42,15 +44,18 @@ class LoopTrace {
 
  private:
   friend class Workers;
+  friend class SideLoop;
   using Clock = std::chrono::steady_clock;
   struct Event {            // a loop begins, or a task of the innermost open loop ends
     std::size_t tasks = 0;  // of the loop that begins
     LoopSite site{};
     double bytes = 0;
+    std::size_t helpers = 0;
     Clock::time_point at = Clock::now();
   };
   class Reader;
-  void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site);
+  void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
+           std::size_t helpers = 0);
   void NoteTraffic(double bytes) { traffic_ = bytes; }
 
   std::vector<Event> events_;

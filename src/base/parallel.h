@@ -15,6 +15,7 @@
 namespace tilegrad {
 
 class LoopTrace;
+class SideLoop;
 
 // Where a loop stands in the source: its name in a LoopTrace.
 struct LoopSite {
@@ -92,6 +93,7 @@ class Workers {
                 LoopSite site = LoopSite::Here()) const;
 
  private:
+  friend class SideLoop;
   struct Impl;
   bool HasArena() const;  // of oneTBB, which this process may use
 

@@ -32,7 +32,7 @@ void PrintMeasured(const train::StepProfile& profile) {
   Print("measured: {:.2f} ms a step on 1 worker, {:.2f} ms on {} ({:.2f} times as fast)\n",
         Milliseconds(profile.one), Milliseconds(profile.all), profile.cores,
         profile.one / profile.all);
-  Print("a loop starts in {:.1f} us; {} workers move {:.1f} GB/s\n",
+  Print("a second worker takes part in a loop after {:.1f} us; {} workers move {:.1f} GB/s\n",
         1e6 * profile.costs.start_seconds, profile.cores, 1e-9 * profile.costs.bytes_per_second);
 }
 
@@ -107,7 +107,8 @@ void AddProfile(CommandList* list) {
       "memory bandwidth of all cores together, GB/s; 0: that of one core here, times cores",
       {NotNegative()});
   command->Add("--start", &options->start,
-               "microseconds to start a loop on all cores; 0: extrapolated from this machine",
+               "microseconds until a second core takes part in a loop, and until twice as many do "
+               "each time; 0: as measured here",
                {NotNegative()});
 }
 

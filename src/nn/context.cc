@@ -8,7 +8,8 @@
 namespace tilegrad::nn {
 namespace {
 
-constexpr std::size_t kGrain = 65536;  // numbers to a task
+constexpr std::size_t kGrain = 65536;         // numbers to a task
+constexpr std::size_t kCopiedBytes = 524288;  // to a task
 
 template <class From>
 Tensor Converted(Tensor tensor, std::span<const From> values, const Workers& workers) {
@@ -59,7 +60,9 @@ Tensor Context::Indices(std::span<const std::int32_t> values) const {
 
 Tensor Context::Copy(const Tensor& tensor) const {
   Tensor copy = Empty(tensor.shape(), tensor.dtype());
-  std::memcpy(copy.raw(), tensor.raw(), tensor.bytes());
+  ForChunks(&workers_, tensor.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
+    std::memcpy(copy.raw() + begin, tensor.raw() + begin, end - begin);
+  });
   return copy;
 }
 

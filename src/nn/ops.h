@@ -4,6 +4,7 @@
 
 #include <initializer_list>
 #include <limits>
+#include <memory>
 #include <span>
 
 #include "base/function_ref.h"
@@ -133,6 +134,9 @@ struct AxisMap {
   Tensor begin;   // [out + 1] of kI32: row i has the terms begin[i] .. begin[i + 1]
   Tensor index;   // [terms] of kI32, below `in`
   Tensor weight;  // [terms]
+  // The transposed matrix, which adjoints need: copies share it. It has no tensors until it is
+  // made.
+  std::shared_ptr<AxisMap> transposed;
 };
 
 struct AxisTerm {

@@ -301,32 +301,30 @@ Status CheckTexts(const TensorFile& file) {
   return {};
 }
 
-// Data begins where the text ends.
-Bytes Assemble(const std::string& header, const std::vector<StoredTensor>& tensors) {
-  const std::uint64_t length = header.size();
-  Bytes bytes(kLengthBytes);
-  std::memcpy(bytes.data(), &length, kLengthBytes);
-  bytes.insert(bytes.end(), header.begin(), header.end());
-  std::size_t data = 0;
-  for (const StoredTensor& t : tensors) data += t.data.size();
-  bytes.reserve(bytes.size() + data);
-  for (const StoredTensor& t : tensors) bytes.insert(bytes.end(), t.data.begin(), t.data.end());
-  return bytes;
+// A file before it is written.
+struct EncodedFile {
+  std::string header;  // its length included
+  std::vector<StoredTensor> tensors;
+};
+
+std::string HeaderOf(const std::string& text) {
+  const std::uint64_t length = text.size();
+  std::string header(kLengthBytes, '\0');
+  std::memcpy(header.data(), &length, kLengthBytes);
+  return header + text;
 }
 
-}  // namespace
-
-Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats) {
+Result<EncodedFile> Encode(const TensorFile& file, StoredFloats floats) {
   TILEGRAD_TRY(CheckTexts(file));
+  EncodedFile out;
   std::string text = "{";
   if (!file.metadata.empty()) AppendMember(kMetadata, Json(file.metadata).dump(), &text);
-  std::vector<StoredTensor> tensors;
   std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
     TILEGRAD_ASSIGN(StoredTensor stored, StoredOf(t, floats));
     AppendMember(t.name, EntryJson(stored, t.value.shape(), end), &text);
     end += stored.data.size();
-    tensors.push_back(std::move(stored));
+    out.tensors.push_back(std::move(stored));
   }
   text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
@@ -334,12 +332,30 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats) {
     return InvalidArgument("safetensors: names and metadata make a header of {} bytes, {} at most",
                            text.size(), kMaxHeader);
   }
-  return Assemble(text, tensors);
+  out.header = HeaderOf(text);
+  return out;
+}
+
+// The file: `header`, then the data.
+std::vector<std::span<const std::uint8_t>> PiecesOf(const EncodedFile& file) {
+  const auto* header = reinterpret_cast<const std::uint8_t*>(file.header.data());
+  std::vector<std::span<const std::uint8_t>> pieces = {{header, file.header.size()}};
+  for (const StoredTensor& t : file.tensors) pieces.push_back(t.data);
+  return pieces;
+}
+
+}  // namespace
+
+Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats) {
+  TILEGRAD_ASSIGN(const EncodedFile encoded, Encode(file, floats));
+  Bytes bytes;
+  for (const auto& piece : PiecesOf(encoded)) bytes.insert(bytes.end(), piece.begin(), piece.end());
+  return bytes;
 }
 
 Status WriteSafetensors(const Path& path, const TensorFile& file, StoredFloats floats) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeSafetensors(file, floats));
-  return WriteFileAtomic(path, bytes);
+  TILEGRAD_ASSIGN(const EncodedFile encoded, Encode(file, floats));
+  return WriteFileAtomic(path, PiecesOf(encoded));
 }
 
 }  // namespace tilegrad::nn

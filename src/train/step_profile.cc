@@ -54,9 +54,8 @@ class Measured {
 };
 
 LoopMachine MachineOf(int workers, const ProfileRequest& request, const StepProfile& here) {
-  LoopMachine machine{workers, request.start_seconds > 0
-                                   ? request.start_seconds
-                                   : StartSeconds(here.costs.start_seconds, here.cores, workers)};
+  LoopMachine machine{workers,
+                      request.start_seconds > 0 ? request.start_seconds : here.costs.start_seconds};
   const double each = here.costs.bytes_per_second / here.cores;
   machine.bytes_per_second = each * workers;
   if (request.bytes_per_second > 0 && workers > here.cores)

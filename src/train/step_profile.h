@@ -17,7 +17,7 @@ struct ProfileRequest {
   // Of the machine that is asked about, all of its workers together. 0: each has what one of this
   // machine has when all are busy.
   double bytes_per_second = 0;
-  double start_seconds = 0;  // of LoopMachine; 0: follows from what is measured here
+  double start_seconds = 0;  // of LoopMachine; 0: as measured here
 };
 
 struct StepProfile {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -44,7 +45,7 @@ class PortionedUpdate {
   }
 
   // Task::Backward of this rank's portions, the means of all, Task::Update. `values` are those of
-  // the whole batch on rank 0; elsewhere they mean nothing.
+  // the whole batch on rank 0; elsewhere they mean nothing. at.next: of a step that follows.
   Status Run(const UpdateIndex& at, StepValues* values) {
     sums_->BeginUpdate();
     value_sums_.BeginUpdate();
@@ -85,8 +86,10 @@ class PortionedUpdate {
 
   Status Backward(UpdateIndex at) {
     at.listener = sums_.get();
+    const std::optional<BatchIndex> following = at.next;
     for (std::size_t i = 0; i < sums_->portions().size(); ++i) {
       at.portion = {sums_->portions()[i], portions_};
+      at.next = NextAfter(i, at.step, following);
       portion_.Clear();
       portion_.loss = kNoLoss;
       sums_->BeginPortion(i);
@@ -95,6 +98,16 @@ class PortionedUpdate {
       AddValues();
     }
     return {};
+  }
+
+  // What comes after this rank's portion number i of a step: its next one, or the first of the
+  // step that follows.
+  std::optional<BatchIndex> NextAfter(std::size_t i, std::int64_t step,
+                                      std::optional<BatchIndex> following) const {
+    const auto& own = sums_->portions();
+    if (i + 1 < own.size()) return BatchIndex{step, {own[i + 1], portions_}};
+    if (following) following->portion = {own[0], portions_};
+    return following;
   }
 
   void AddValues() {
@@ -227,10 +240,14 @@ class Training : public RunWork {
   }
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
+  // Returns when nothing runs beside the steps.
+  void Settle() { task_.Settle(); }
+
   // The computing of a step.
   Status Updates(std::int64_t step, StepValues* values) {
     for (int update = 0; update < task_.Updates(step); ++update) {
-      const UpdateIndex at{step, update};
+      UpdateIndex at{step, update};
+      if (step + 1 < config_.schedule.steps) at.next = BatchIndex{step + 1};
       if (portioned_) {
         TILEGRAD_TRY(portioned_->Run(at, values));
         continue;
@@ -299,7 +316,9 @@ class TrainingRehearsal : public Rehearsal {
   }
   Status Step() override {
     values_.Clear();
-    return training_.Updates(step_++, &values_);
+    TILEGRAD_TRY(training_.Updates(step_++, &values_));
+    training_.Settle();
+    return {};
   }
 
  private:

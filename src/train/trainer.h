@@ -34,7 +34,8 @@ struct TrainJob {
   std::function<Status()> begun = nullptr;  // once the run has its folder
 };
 
-// The steps of a training without its run: nothing is written. For measurements.
+// The steps of a training without its run: nothing is written. For measurements: what a step has
+// begun for the next one is done when it returns.
 class Rehearsal {
  public:
   virtual ~Rehearsal() = default;

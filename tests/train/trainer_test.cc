@@ -114,10 +114,12 @@ TEST_F(TrainerTest, StreamedRunsResumeAndDoNotDependOnWorkers) {
   ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
   RunWhole("whole", 1);
   RunWhole("two", 2);
+  RunWhole("sixteen", 16);
   StopAfter(4);
   ExpectFinishes();
   ExpectSameBits("whole", "run");
   ExpectSameBits("whole", "two");
+  ExpectSameBits("whole", "sixteen");
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / "stream.png"));
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "base/error.h"
@@ -13,8 +14,12 @@ namespace tilegrad::nn {
 namespace {
 
 AxisMap Allocate(Context& context, DType dtype, const AxisExtents& extents, std::int64_t terms) {
-  return {extents.in, extents.out, context.Empty({extents.out + 1}, DType::kI32),
-          context.Empty({terms}, DType::kI32), context.Empty({terms}, dtype)};
+  return {extents.in,
+          extents.out,
+          context.Empty({extents.out + 1}, DType::kI32),
+          context.Empty({terms}, DType::kI32),
+          context.Empty({terms}, dtype),
+          std::allocate_shared<AxisMap>(context.allocator<AxisMap>())};
 }
 
 // A counting sort of the terms by column keeps the rows of each column in order.
@@ -39,6 +44,11 @@ AxisMap Transposed(Context& context, const AxisMap& map) {
     }
   });
   return result;
+}
+
+const AxisMap& TransposedOnce(Context& context, const AxisMap& map) {
+  if (map.transposed->weight.empty()) *map.transposed = Transposed(context, map);
+  return *map.transposed;
 }
 
 }  // namespace
@@ -82,7 +92,7 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
             x.context().workers());
   });
   return Record({"map axis"}, std::move(y), {x}, [axis, map](const Adjoint& adj) {
-    return Vars{MapAxis(adj.dy(), axis, Transposed(adj.dy().context(), map))};
+    return Vars{MapAxis(adj.dy(), axis, TransposedOnce(adj.dy().context(), map))};
   });
 }
 

@@ -13,6 +13,7 @@ namespace tilegrad::train {
 
 struct Portion {
   std::int64_t index = 0, count = 1;
+  bool operator==(const Portion&) const = default;
 };
 
 // The positions of objects in the run: step * batch + slot. All that is random about an object

@@ -2,7 +2,9 @@
 #include "train/run/run.h"
 
 #include <chrono>
+#include <future>
 #include <sstream>
+#include <utility>
 
 #include "base/clocks.h"
 #include "base/error.h"
@@ -63,6 +65,8 @@ class Session {
   void LogStream(LogEntry* entry);
   void LogWait(double elapsed, LogEntry* entry);
   Status Save();
+  Status AwaitSave();
+  std::vector<nn::NamedTensor> Snapshot();
   std::int64_t End() const { return work_.End(plan_.schedule.steps); }
   double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
   bool OutOfTime() const {
@@ -84,6 +88,7 @@ class Session {
   double stream_seconds_ = 0, process_seconds_ = 0;  // the latter: of the process at that log
   double wait_seconds_ = 0;
   std::string note_;
+  std::future<Status> saving_;  // beside the steps
 };
 
 Status Session::Open() {
@@ -131,11 +136,26 @@ Status Session::Restore() {
 
 Status Session::Save() {
   if (saved_ == done_) return {};
-  const CheckpointInfo info{done_, plan_.image_size, plan_.settings, Seconds(), plan_.half_extent};
-  TILEGRAD_TRY(SaveCheckpoint(plan_.folder, info, work_.State()));
+  TILEGRAD_TRY(AwaitSave());
+  CheckpointInfo info{done_, plan_.image_size, plan_.settings, Seconds(), plan_.half_extent};
+  auto save = [this, info = std::move(info), state = Snapshot()]() mutable {
+    TILEGRAD_TRY(SaveCheckpoint(plan_.folder, info, std::move(state)));
+    PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
+    return Status();
+  };
+  // Deferred to AwaitSave where the system refuses a thread.
+  saving_ = std::async(std::launch::async | std::launch::deferred, std::move(save));
   saved_ = done_;
-  PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
   return {};
+}
+
+Status Session::AwaitSave() { return saving_.valid() ? saving_.get() : Status(); }
+
+// What later steps do not change.
+std::vector<nn::NamedTensor> Session::Snapshot() {
+  std::vector<nn::NamedTensor> state = work_.State();
+  for (nn::NamedTensor& t : state) t.value = context_.Copy(t.value);
+  return state;
 }
 
 Status Session::Log() {
@@ -209,6 +229,7 @@ Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
         {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(End()), note_});
   }
   TILEGRAD_TRY(Save());
+  TILEGRAD_TRY(AwaitSave());
   if (!stop || done_ >= End()) return {};
   return Cancelled("stopped at step {} of {}; everything is saved", done_, End());
 }

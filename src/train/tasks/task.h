@@ -46,6 +46,13 @@ struct TaskStart {
   WarningSink warn = nullptr;  // of what is likely not what was meant
 };
 
+// What a portion of a step's batch is known by.
+struct BatchIndex {
+  std::int64_t step = 0;  // from 0
+  Portion portion{};
+  bool operator==(const BatchIndex&) const = default;
+};
+
 // A step is one or more updates, each of some parameters: a task with an adversary takes several of
 // its critic and one of its generator.
 struct UpdateIndex {
@@ -54,6 +61,9 @@ struct UpdateIndex {
   Portion portion{};                         // of the batch
   nn::GradientListener* listener = nullptr;  // for nn::Gradients
   nn::UpdateShare* share = nullptr;          // for nn::Adam::Step
+  // The batch that this process computes with after this one, if the run has one more: it may be
+  // made meanwhile.
+  std::optional<BatchIndex> next = std::nullopt;
 };
 
 // A trained network as commands use it. Of most tasks it predicts: images in, meshes out.
@@ -175,6 +185,8 @@ class Task {
   // next one of its step, it leaves for the same portion.
   virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
                                                         StepValues* values) = 0;
+  // Returns when nothing that Backward has begun for UpdateIndex::next is under way.
+  virtual void Settle() {}
   // The tensors that Backward changes: nn::Buffers of its networks. Each portion starts with what
   // the step started with, and the step ends with the mean of what they end with. The default is an
   // error: a task has to say that it knows of portions.

@@ -162,9 +162,9 @@ Status TexturedStream::Worker::Take(const Job& job, Appearance appearance) {
   return {};
 }
 
-TexturedStream::TexturedStream(const Job& job, MeshCache meshes, const Workers& workers)
+TexturedStream::TexturedStream(const Job& job, MeshCache meshes, std::size_t lanes)
     : job_(job), meshes_(std::move(meshes)) {
-  for (int w = 0; w < workers.count(); ++w) workers_.push_back(std::make_unique<Worker>());
+  for (std::size_t w = 0; w < lanes; ++w) workers_.push_back(std::make_unique<Worker>());
 }
 TexturedStream::~TexturedStream() = default;
 TexturedStream::TexturedStream(TexturedStream&&) noexcept = default;

@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
@@ -58,7 +59,10 @@ class TexturedStream {
     // the views after the first have elevations of their own, and no object is mirrored.
     bool dataset_light = false;
   };
-  TexturedStream(const Job& job, MeshCache meshes, const Workers& workers);
+  // Calls with different numbers of `lanes` may overlap.
+  TexturedStream(const Job& job, MeshCache meshes, std::size_t lanes);
+  TexturedStream(const Job& job, MeshCache meshes, const Workers& workers)
+      : TexturedStream(job, std::move(meshes), static_cast<std::size_t>(workers.count())) {}
   ~TexturedStream();
   TexturedStream(TexturedStream&&) noexcept;
 
@@ -69,7 +73,7 @@ class TexturedStream {
   // The object at `position` of the run, step * batch + slot, made from mesh `model`, from as many
   // views as there are `views`, which are chosen: [views][4][size][size], planar, RGB over black
   // and the covered share of each pixel, in [0, 1]. Valid until the next call with the same
-  // `worker`, in [0, count()).
+  // `worker`, in [0, lanes).
   Result<std::span<const float>> Render(int model, std::uint64_t position, std::size_t worker,
                                         std::span<TexturedView> views);
   // Sets the object up as Render does, for Again, in views that are given instead of drawn ones.

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/classify/pictures.h"
 
+#include <memory>
+#include <utility>
+
 #include "base/rng.h"
 
 namespace tilegrad::train {
@@ -33,6 +36,26 @@ struct Placement {
   }
 };
 
+// A batch under construction.
+struct Gathering {
+  const LabelledImages& data;
+  std::vector<Sample> batch;
+  std::vector<Shift> shifts;
+  LabelledBatch out;
+
+  void Run(std::size_t i) {
+    const Sample& sample = batch[i];
+    const Placement placement{data.images.size, sample.mirrored,
+                              shifts.empty() ? Shift() : shifts[i]};
+    const std::size_t numbers = out.images.elements() / batch.size();
+    nn::WithFloatType(out.images.dtype(), [&]<class T>(T) {
+      placement.Read(data.images.Image(sample.model, sample.views[0]),
+                     out.images.data<T>() + i * numbers);
+    });
+    out.labels.data<std::int32_t>()[i] = data.labels[static_cast<std::size_t>(sample.model)];
+  }
+};
+
 }  // namespace
 
 Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<int>& models,
@@ -54,23 +77,25 @@ Shift RandomShift(std::uint64_t seed, std::uint64_t position, int most) {
   return {x, draw()};
 }
 
+BatchWork<LabelledBatch> LabelledWork(nn::Context& context, const LabelledImages& data,
+                                      std::vector<Sample> batch, std::vector<Shift> shifts) {
+  const auto count = static_cast<std::int64_t>(batch.size()),
+             size = static_cast<std::int64_t>(data.images.size);
+  const auto work =
+      std::make_shared<Gathering>(Gathering{data,
+                                            std::move(batch),
+                                            std::move(shifts),
+                                            {context.Empty({count, kPictureChannels, size, size}),
+                                             context.Empty({count}, nn::DType::kI32)}});
+  return {work->batch.size(), [work](std::size_t i, std::size_t) { work->Run(i); },
+          [work] { return Result<LabelledBatch>(std::move(work->out)); }};
+}
+
 LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
                              std::span<const Sample> batch, std::span<const Shift> shifts) {
-  const int size = data.images.size;
-  LabelledBatch out{
-      context.Empty({static_cast<std::int64_t>(batch.size()), kPictureChannels, size, size}),
-      context.Empty({static_cast<std::int64_t>(batch.size())}, nn::DType::kI32)};
-  const std::size_t numbers = out.images.elements() / batch.size();
-  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
-    context.workers().For(batch.size(), [&](std::size_t i, std::size_t) {
-      const Sample& sample = batch[i];
-      const Placement placement{size, sample.mirrored, shifts.empty() ? Shift() : shifts[i]};
-      placement.Read(data.images.Image(sample.model, sample.views[0]),
-                     out.images.data<T>() + i * numbers);
-      out.labels.data<std::int32_t>()[i] = data.labels[static_cast<std::size_t>(sample.model)];
-    });
-  });
-  return out;
+  return *MakeNow(
+      LabelledWork(context, data, {batch.begin(), batch.end()}, {shifts.begin(), shifts.end()}),
+      context.workers());
 }
 
 nn::Tensor ColorsOf(nn::Context& context, std::span<const std::uint8_t> images, int size) {

@@ -7,6 +7,7 @@
 
 #include "nn/tape.h"
 #include "train/data/batches.h"
+#include "train/tasks/next_batch.h"
 
 namespace tilegrad::train {
 
@@ -30,7 +31,10 @@ struct LabelledBatch {
   nn::Tensor images;  // [n, 3, size, size], RGB over black in [0, 1]
   nn::Tensor labels;  // [n] of kI32
 };
-// The first view of each sample; one shift for each, or none for all.
+// The first view of each sample; one shift for each, or none for all. `data` outlives the work.
+BatchWork<LabelledBatch> LabelledWork(nn::Context& context, const LabelledImages& data,
+                                      std::vector<Sample> batch, std::vector<Shift> shifts);
+// The same, on all workers.
 LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
                              std::span<const Sample> batch, std::span<const Shift> shifts = {});
 

@@ -48,6 +48,7 @@ class ClassifyTask : public NetworkTask {
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.images.size; }
+  void Settle() override { batches_->Settle(); }
   Status Begin(const Path& run, std::int64_t first_step) override {
     return RememberTrainedModels(run, *dataset_, first_step);
   }
@@ -76,7 +77,7 @@ class ClassifyTask : public NetworkTask {
   Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
   Status CheckDataset() const;
   Status LoadPictures(const TaskStart& start);
-  LabelledBatch Batch(const Slots& slots);
+  BatchWork<LabelledBatch> Batch(const BatchIndex& of);
 
   ClassifyConfig config_;
   std::optional<Dataset> dataset_;
@@ -84,6 +85,7 @@ class ClassifyTask : public NetworkTask {
   std::optional<BatchOrder> order_;
   std::optional<ClassifierNetwork> network_;
   std::optional<LearnedWeights> weights_;
+  std::optional<NextBatch<LabelledBatch>> batches_;
 };
 
 Status ClassifyTask::CheckDataset() const {
@@ -122,6 +124,7 @@ Status ClassifyTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(LoadPictures(start));
   lesson_.source = dataset_->info().source;
   lesson_.objects = train_.images.models;
+  batches_.emplace(context_->workers());
   order_.emplace(train_.images.models, train_.images.views, seed(), config_.mirrored);
   network_.emplace(*context_, config_.network,
                    static_cast<std::int64_t>(dataset_->info().classes.size()), seed());
@@ -129,18 +132,20 @@ Status ClassifyTask::Start(const TaskStart& start) {
   return {};
 }
 
-LabelledBatch ClassifyTask::Batch(const Slots& slots) {
-  const auto batch = order_->Batch(slots, /*views=*/1);
+BatchWork<LabelledBatch> ClassifyTask::Batch(const BatchIndex& of) {
+  const Slots slots = SlotsOf(of.step, config_.batch, of.portion);
+  auto batch = order_->Batch(slots, /*views=*/1);
   std::vector<Shift> shifts;
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const auto position = static_cast<std::uint64_t>(slots.first) + i;
     shifts.push_back(RandomShift(seed(), position, static_cast<int>(config_.shift)));
   }
-  return GatherLabelled(*context_, train_, batch, shifts);
+  return LabelledWork(*context_, train_, std::move(batch), std::move(shifts));
 }
 
-Result<nn::Var> ClassifyTask::Loss(const UpdateIndex& /*at*/, const Slots& slots, StepValues* out) {
-  const LabelledBatch batch = Batch(slots);
+Result<nn::Var> ClassifyTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
+  TILEGRAD_ASSIGN(const LabelledBatch batch,
+                  batches_->Take(at, [this](const BatchIndex& of) { return Batch(of); }));
   const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kTrain);
   LossSum sum(out);
   sum.Add("cross_entropy", "Cross entropy of the classes", 1,

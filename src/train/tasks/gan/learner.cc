@@ -52,7 +52,7 @@ Result<std::unique_ptr<GanLearner>> GanLearner::Make(nn::Context& context, const
                                                      const Sources& sources) {
   std::unique_ptr<GanLearner> out(new GanLearner(context, job, sources));
   TILEGRAD_ASSIGN(ObjectViews truth,
-                  sources.pictures->Draw(kScoreNumber, static_cast<int>(job.config.score_count)));
+                  sources.pictures->Draw({kScoreNumber, static_cast<int>(job.config.score_count)}));
   const auto half_axes = MeanHalfAxes(truth, job.camera);
   for (ShapeTextureGenerator* generator : {&out->generator_, &out->shown_, &out->kept_})
     generator->SetEllipsoid(half_axes);
@@ -93,7 +93,11 @@ std::uint64_t GanLearner::NumberOf(const UpdateIndex& at, int round) const {
 Status GanLearner::DrawReal(const UpdateIndex& at, int round) {
   const auto count = static_cast<int>(CountOf(at));
   const std::uint64_t number = NumberOf(at, round);
-  TILEGRAD_ASSIGN(ObjectViews views, sources_.pictures->Draw(number, count));
+  const auto batch_of = [&](const BatchIndex& of) {
+    return RealPictures::Batch{NumberOf({of.step, 0, of.portion}, 0), count};
+  };
+  TILEGRAD_ASSIGN(ObjectViews views, round > 0 ? sources_.pictures->Draw({number, count})
+                                               : sources_.pictures->Take(at, batch_of));
   real_.resize(static_cast<std::size_t>(at.portion.count));
   Seen& real = real_[static_cast<std::size_t>(at.portion.index)];
   real = {};

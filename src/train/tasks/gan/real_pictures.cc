@@ -2,6 +2,7 @@
 #include "train/tasks/gan/real_pictures.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "base/clocks.h"
@@ -60,60 +61,70 @@ std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& r
   return {world * front[0], world * side[1], world * side[0]};
 }
 
+// A batch under construction.
+struct RealPictures::Drawing {
+  RealPictures& pictures;
+  std::vector<Sample> models;
+  std::uint64_t first;  // position in the run
+  ObjectViews out;
+  std::vector<Status> failures = std::vector<Status>(models.size());
+
+  void Run(std::size_t b, std::size_t lane) {
+    const double start = ThreadSeconds();
+    const auto rgba = pictures.DrawOne(models[b].model, first + b, lane);
+    pictures.seconds_ += ThreadSeconds() - start;
+    failures[b] = rgba.status();
+    if (rgba.ok()) nn::WithFloatType(out.colors.dtype(), [&]<class T>(T) { Place<T>(*rgba, b); });
+  }
+  template <class T>
+  void Place(std::span<const float> rgba, std::size_t b) {
+    const std::size_t views = pictures.views_.size(), plane = rgba.size() / views / 4;
+    for (std::size_t v = 0; v < views; ++v) {
+      const auto view = rgba.subspan(4 * plane * v, 4 * plane);
+      const std::size_t at = b * views + v;
+      std::copy_n(view.begin(), 3 * plane, out.colors.data<T>() + 3 * plane * at);
+      std::copy_n(view.begin() + static_cast<std::ptrdiff_t>(3 * plane), plane,
+                  out.cover.data<T>() + plane * at);
+    }
+  }
+  Result<ObjectViews> Finish() {
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    return std::move(out);
+  }
+};
+
 RealPictures::RealPictures(nn::Context& context, const Job& job, MeshCache meshes)
     : context_(context),
       job_(job),
-      stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes, context.workers()),
-      order_(static_cast<int>(meshes.size()), 1, job.seed) {
+      stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes,
+              SideLoop::LanesOf(context.workers())),
+      order_(static_cast<int>(meshes.size()), 1, job.seed),
+      next_(context.workers()) {
   for (const Camera& camera : PrimaryCameras(job.camera, job.views)) views_.push_back({camera, {}});
 }
 
-Result<ObjectViews> RealPictures::Draw(std::uint64_t number, int count) {
-  const auto models = order_.Batch(static_cast<std::int64_t>(number), count, 1);
-  stream_.Expect(order_.Batch(static_cast<std::int64_t>(number) + 1, count, 1));
+BatchWork<ObjectViews> RealPictures::Work(const Batch& batch) {
+  const auto models = order_.Batch(static_cast<std::int64_t>(batch.number), batch.count, 1);
+  stream_.Expect(order_.Batch(static_cast<std::int64_t>(batch.number) + 1, batch.count, 1));
   const std::int64_t size = job_.size;
-  ObjectViews out{context_.Empty({count, 3 * job_.views, size, size}),
-                  context_.Empty({count, job_.views, size, size})};
-  TILEGRAD_TRY(Place(models, number * static_cast<std::uint64_t>(count), &out));
-  return out;
+  const auto work =
+      std::make_shared<Drawing>(Drawing{*this,
+                                        models,
+                                        batch.number * static_cast<std::uint64_t>(batch.count),
+                                        {context_.Empty({batch.count, 3 * job_.views, size, size}),
+                                         context_.Empty({batch.count, job_.views, size, size})}});
+  return {models.size(), [work](std::size_t b, std::size_t lane) { work->Run(b, lane); },
+          [work] { return work->Finish(); }};
+}
+
+Result<ObjectViews> RealPictures::Draw(const Batch& batch) {
+  return MakeNow(Work(batch), context_.workers());
 }
 
 Result<std::span<const float>> RealPictures::DrawOne(int model, std::uint64_t position,
-                                                     std::size_t worker) {
-  TILEGRAD_TRY(stream_.SetUp(model, position, worker, views_));
-  return stream_.Again(worker, Appearance::kTexture);
-}
-
-double RealPictures::TakeSeconds() {
-  double sum = 0;
-  for (double& seconds : seconds_) sum += std::exchange(seconds, 0);
-  return sum;
-}
-
-Status RealPictures::Place(std::span<const Sample> models, std::uint64_t first, ObjectViews* out) {
-  failures_.assign(models.size(), {});
-  seconds_.resize(std::max(seconds_.size(), models.size()));
-  const auto plane = static_cast<std::size_t>(job_.size) * static_cast<std::size_t>(job_.size);
-  nn::WithFloatType(context_.dtype(), [&]<class T>(T) {
-    T* const colors = out->colors.data<T>();
-    T* const cover = out->cover.data<T>();
-    context_.workers().For(models.size(), [&](std::size_t b, std::size_t worker) {
-      const double start = ThreadSeconds();
-      const auto rgba = DrawOne(models[b].model, first + b, worker);
-      seconds_[b] += ThreadSeconds() - start;
-      failures_[b] = rgba.status();
-      if (!rgba.ok()) return;
-      for (std::size_t v = 0; v < views_.size(); ++v) {
-        const auto view = rgba->subspan(4 * plane * v, 4 * plane);
-        const std::size_t at = b * views_.size() + v;
-        std::copy_n(view.begin(), 3 * plane, colors + 3 * plane * at);
-        std::copy_n(view.begin() + static_cast<std::ptrdiff_t>(3 * plane), plane,
-                    cover + plane * at);
-      }
-    });
-  });
-  for (const Status& failure : failures_) TILEGRAD_TRY(failure);
-  return {};
+                                                     std::size_t lane) {
+  TILEGRAD_TRY(stream_.SetUp(model, position, lane, views_));
+  return stream_.Again(lane, Appearance::kTexture);
 }
 
 }  // namespace tilegrad::train

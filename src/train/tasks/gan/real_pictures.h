@@ -5,12 +5,14 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <optional>
 #include <vector>
 
 #include "nn/tape.h"
 #include "train/data/batches.h"
 #include "train/data/stream/textured_stream.h"
+#include "train/tasks/next_batch.h"
 
 namespace tilegrad::train {
 
@@ -40,23 +42,33 @@ class RealPictures {
   };
   RealPictures(nn::Context& context, const Job& job, MeshCache meshes);
 
-  // Batch `number` of `count` objects, each drawn anew.
-  Result<ObjectViews> Draw(std::uint64_t number, int count);
+  struct Batch {
+    std::uint64_t number = 0;
+    int count = 0;  // objects, each drawn anew
+  };
+  Result<ObjectViews> Draw(const Batch& batch);
+  // As NextBatch has it. `batch_of`: BatchIndex -> Batch.
+  template <class BatchOf>
+  Result<ObjectViews> Take(const UpdateIndex& at, const BatchOf& batch_of) {
+    return next_.Take(at, [&](const BatchIndex& of) { return Work(batch_of(of)); });
+  }
+  void Settle() { next_.Settle(); }
   // Of processor time, since the last call.
-  double TakeSeconds();
+  double TakeSeconds() { return seconds_.exchange(0); }
   Result<ImageU8> Sheet(int objects, int views) { return stream_.Sheet(objects, views); }
 
  private:
-  Result<std::span<const float>> DrawOne(int model, std::uint64_t position, std::size_t worker);
-  Status Place(std::span<const Sample> models, std::uint64_t first, ObjectViews* out);
+  struct Drawing;
+  BatchWork<ObjectViews> Work(const Batch& batch);
+  Result<std::span<const float>> DrawOne(int model, std::uint64_t position, std::size_t lane);
 
   nn::Context& context_;
   Job job_;
   TexturedStream stream_;
   BatchOrder order_;
   std::vector<TexturedView> views_;
-  std::vector<Status> failures_;
-  std::vector<double> seconds_;  // of each object of a batch
+  std::atomic<double> seconds_ = 0;
+  NextBatch<ObjectViews> next_;  // last: it ends before what it uses goes
 };
 
 }  // namespace tilegrad::train

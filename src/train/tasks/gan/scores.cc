@@ -61,7 +61,7 @@ class Scorer {
         {config.stream, dataset.info().camera, config.views, dataset.info().image_size,
          static_cast<std::uint64_t>(config.schedule.seed)},
         meshes);
-    return pictures.Draw(kFarNumber, 2 * job_.count);
+    return pictures.Draw({kFarNumber, 2 * job_.count});
   }
 
   // With `mean`, the mean map on every shape: what shapes alone are worth.

@@ -27,6 +27,7 @@ class GanTask : public Task {
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
+  void Settle() override { pictures_->Settle(); }
   RunHeader Header() override;
   Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
     TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));

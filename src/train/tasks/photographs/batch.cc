@@ -2,6 +2,8 @@
 #include "train/tasks/photographs/batch.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "train/data/photographs/distance_barrier.h"
 
@@ -48,41 +50,62 @@ void AddKeypoints(nn::Context& context, PhotographBatch* batch) {
   batch->visible = context.From({b, k, 1}, std::span<const double>(visible));
 }
 
+// A batch under construction.
+struct Cutting {
+  nn::Context& context;
+  const PhotographsConfig& config;
+  const PhotoStore& store;
+  PhotographPlaces places;
+  PhotographBatch batch;
+
+  void Run(std::size_t i) {
+    const auto plane =
+        static_cast<std::size_t>(store.size()) * static_cast<std::size_t>(store.size());
+    Pixels pixels{std::vector<float>(3 * plane), std::vector<float>(plane), {}};
+    const auto seed = static_cast<std::uint64_t>(config.schedule.seed);
+    const bool random = places.first >= 0;
+    const std::uint64_t position =
+        static_cast<std::uint64_t>(std::max<std::int64_t>(places.first, 0)) + i;
+    batch.crops[i] =
+        store.Cut(places.photographs[i], {seed, position, random, 0.5}, pixels.rgb, pixels.mask);
+    if (!batch.barrier.empty()) {
+      pixels.barrier.resize(plane);
+      DistanceBarrier(pixels.mask, store.size(), pixels.barrier);
+    }
+    const bool cutout = random && Rng(seed ^ kCutoutStream, position).Uniform() < config.cutouts;
+    nn::WithFloatType(batch.input.dtype(),
+                      [&]<class T>(T) { Place<T>(std::move(pixels), cutout, i, &batch); });
+  }
+  PhotographBatch Finish() {
+    for (const CroppedPhoto& crop : batch.crops) batch.cameras.push_back(crop.camera);
+    AddKeypoints(context, &batch);
+    return std::move(batch);
+  }
+};
+
 }  // namespace
 
-PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
-                                  const PhotoStore& store, const std::vector<int>& photographs,
-                                  std::int64_t first) {
-  const auto b = static_cast<std::int64_t>(photographs.size());
+BatchWork<PhotographBatch> PhotographWork(nn::Context& context, const PhotographsConfig& config,
+                                          const PhotoStore& store, PhotographPlaces places) {
+  const std::size_t count = places.photographs.size();
+  const auto b = static_cast<std::int64_t>(count);
   const std::int64_t s = store.size();
-  const bool flow = config.network.texture == "flow";
   PhotographBatch batch;
   batch.input = context.Empty({b, 3, s, s});
   batch.colors = context.Empty({b, 3, s, s});
   batch.mask = context.Empty({b, s, s});
-  if (flow) batch.barrier = context.Empty({b, 1, s, s});
-  batch.crops.resize(photographs.size());
-  const auto seed = static_cast<std::uint64_t>(config.schedule.seed);
-  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
-    context.workers().For(photographs.size(), [&](std::size_t i, std::size_t) {
-      const auto plane = static_cast<std::size_t>(s * s);
-      Pixels pixels{std::vector<float>(3 * plane), std::vector<float>(plane), {}};
-      const std::uint64_t position =
-          static_cast<std::uint64_t>(std::max<std::int64_t>(first, 0)) + i;
-      batch.crops[i] =
-          store.Cut(photographs[i], {seed, position, first >= 0, 0.5}, pixels.rgb, pixels.mask);
-      if (flow) {
-        pixels.barrier.resize(plane);
-        DistanceBarrier(pixels.mask, static_cast<int>(s), pixels.barrier);
-      }
-      const bool cutout =
-          first >= 0 && Rng(seed ^ kCutoutStream, position).Uniform() < config.cutouts;
-      Place<T>(std::move(pixels), cutout, i, &batch);
-    });
-  });
-  for (const CroppedPhoto& crop : batch.crops) batch.cameras.push_back(crop.camera);
-  AddKeypoints(context, &batch);
-  return batch;
+  if (config.network.texture == "flow") batch.barrier = context.Empty({b, 1, s, s});
+  batch.crops.resize(count);
+  const auto work = std::make_shared<Cutting>(
+      Cutting{context, config, store, std::move(places), std::move(batch)});
+  return {count, [work](std::size_t i, std::size_t) { work->Run(i); },
+          [work] { return work->Finish(); }};
+}
+
+PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
+                                  const PhotoStore& store, const std::vector<int>& photographs,
+                                  std::int64_t first) {
+  return *MakeNow(PhotographWork(context, config, store, {photographs, first}), context.workers());
 }
 
 }  // namespace tilegrad::train

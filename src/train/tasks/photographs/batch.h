@@ -6,6 +6,7 @@
 
 #include "nn/context.h"
 #include "train/run/portion.h"
+#include "train/tasks/next_batch.h"
 #include "train/tasks/photographs/config.h"
 
 namespace tilegrad::train {
@@ -23,8 +24,15 @@ struct PhotographBatch {
   Portion portion{};                     // of the step's batch
 };
 
+struct PhotographPlaces {
+  std::vector<int> photographs;  // of the store
+  std::int64_t first = 0;        // place in the run of the first of them
+};
 // A random crop of each of `photographs`, which follows from their places in the run: `first`,
-// first + 1, ..; or with `first` < 0 the crop as it is.
+// first + 1, ..; or with `first` < 0 the crop as it is. `config` and `store` outlive the work.
+BatchWork<PhotographBatch> PhotographWork(nn::Context& context, const PhotographsConfig& config,
+                                          const PhotoStore& store, PhotographPlaces places);
+// The same, on all workers.
 PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
                                   const PhotoStore& store, const std::vector<int>& photographs,
                                   std::int64_t first);

@@ -23,6 +23,7 @@ class PhotographsTask : public NetworkTask {
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }
+  void Settle() override { batches_->Settle(); }
   Status Begin(const Path& run, std::int64_t first_step) override;
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
@@ -40,6 +41,7 @@ class PhotographsTask : public NetworkTask {
  private:
   LearnedWeights& weights() override { return step_->weights(); }
   Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
+  BatchWork<PhotographBatch> Batch(const BatchIndex& of);
   Status CheckCameras() const;
 
   PhotographsConfig config_;
@@ -47,6 +49,7 @@ class PhotographsTask : public NetworkTask {
   std::optional<PhotoStore> train_, held_out_;
   std::optional<BatchOrder> order_;
   std::optional<PhotographStep> step_;
+  std::optional<NextBatch<PhotographBatch>> batches_;
 };
 
 Status PhotographsTask::CheckCameras() const {
@@ -76,6 +79,7 @@ Status PhotographsTask::Start(const TaskStart& start) {
                                   config_.crop, image_size(), workers, start.progress, start.stop));
   lesson_.source = set_.source;
   lesson_.objects = train_->count();
+  batches_.emplace(workers);
   order_.emplace(static_cast<int>(train.size()), 1,
                  static_cast<std::uint64_t>(start.schedule.seed));
   step_.emplace(*context_, config_,
@@ -93,10 +97,16 @@ Status PhotographsTask::Begin(const Path& run, std::int64_t first_step) {
   return StartAs(config_.start);
 }
 
+BatchWork<PhotographBatch> PhotographsTask::Batch(const BatchIndex& of) {
+  const Slots slots = SlotsOf(of.step, config_.batch, of.portion);
+  PhotographPlaces places{{}, slots.first};
+  for (const Sample& sample : order_->Batch(slots, 1)) places.photographs.push_back(sample.model);
+  return PhotographWork(*context_, config_, *train_, std::move(places));
+}
+
 Result<nn::Var> PhotographsTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
-  std::vector<int> photographs;
-  for (const Sample& sample : order_->Batch(slots, 1)) photographs.push_back(sample.model);
-  PhotographBatch batch = GatherPhotographs(*context_, config_, *train_, photographs, slots.first);
+  TILEGRAD_ASSIGN(PhotographBatch batch,
+                  batches_->Take(at, [this](const BatchIndex& of) { return Batch(of); }));
   batch.portion = at.portion;
   out->images = slots.count;
   return step_->Loss(batch, at.step, out);

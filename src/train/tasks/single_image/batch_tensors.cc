@@ -2,7 +2,10 @@
 #include "train/tasks/single_image/batch_tensors.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
+#include "base/error.h"
 #include "nn/nn.h"
 
 namespace tilegrad::train {
@@ -35,8 +38,12 @@ struct BatchReader {
 // A batch under construction.
 struct Gathering {
   const ImageStore& store;
-  std::size_t views;
+  std::vector<Sample> batch;
+  StreamedObjects stream;
+  std::size_t views, streamed;  // streamed: of the batch, the first ones
   BatchTensors out;
+  std::vector<TexturedView> drawn = std::vector<TexturedView>(views * streamed);
+  std::vector<Status> failures = std::vector<Status>(streamed);
 
   // Object b, whose view v is image(v).
   template <class T, class From, class Image>
@@ -50,25 +57,42 @@ struct Gathering {
   }
 
   template <class T>
-  void FromStore(std::size_t b, const Sample& sample) {
+  void FromStore(std::size_t b) {
+    const Sample& sample = batch[b];
     const BatchReader<std::uint8_t> reader{static_cast<std::size_t>(store.size), sample.mirrored,
                                            1.0 / 255};
     Fill<T>(b, reader, [&](std::size_t v) { return store.Image(sample.model, sample.views[v]); });
     for (std::size_t v = 0; v < views; ++v)
       CamerasOf(b)[v] = store.CameraOf(sample.model, sample.views[v]);
-    Mirror(b, sample);
+    Mirror(b);
   }
   template <class T>
-  void FromStream(std::size_t b, const Sample& sample, std::span<const float> rgba) {
-    const BatchReader<float> reader{static_cast<std::size_t>(store.size), sample.mirrored, 1};
+  void FromStream(std::size_t b, std::size_t lane) {
+    const auto seen = std::span(drawn).subspan(b * views, views);
+    const auto position = static_cast<std::uint64_t>(stream.first) + b;
+    const auto rgba = stream.from->Render(batch[b].model, position, lane, seen);
+    failures[b] = rgba.status();
+    if (!rgba.ok()) return;
+    std::ranges::transform(seen, CamerasOf(b).begin(), &TexturedView::camera);
+    const BatchReader<float> reader{static_cast<std::size_t>(store.size), batch[b].mirrored, 1};
     Fill<T>(b, reader, [&](std::size_t v) {
-      return rgba.subspan(v * store.ImageBytes(), store.ImageBytes());
+      return rgba->subspan(v * store.ImageBytes(), store.ImageBytes());
     });
-    Mirror(b, sample);
+    Mirror(b);
   }
-  void Mirror(std::size_t b, const Sample& sample) {
-    if (!sample.mirrored) return;
+  void Mirror(std::size_t b) {
+    if (!batch[b].mirrored) return;
     for (Camera& camera : CamerasOf(b)) camera = MirroredCamera(camera, store.size);
+  }
+
+  void Run(std::size_t b, std::size_t lane) {
+    nn::WithFloatType(out.input.dtype(),
+                      [&]<class T>(T) { b < streamed ? FromStream<T>(b, lane) : FromStore<T>(b); });
+  }
+  Result<BatchTensors> Finish() {
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    if (stream.from != nullptr) out.stream_seconds = stream.from->TakeSeconds();
+    return std::move(out);
   }
 };
 
@@ -76,40 +100,23 @@ struct Gathering {
 
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch) {
-  return *GatherBatch(context, store, batch, nullptr, 0);
+  return *MakeNow(GatherWork(context, store, batch, {}), context.workers());
 }
 
-Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
-                                 const std::vector<Sample>& batch, TexturedStream* stream,
-                                 std::int64_t first) {
+BatchWork<BatchTensors> GatherWork(nn::Context& context, const ImageStore& store,
+                                   std::vector<Sample> batch, const StreamedObjects& stream) {
   const auto objects = static_cast<std::int64_t>(batch.size()),
              size = static_cast<std::int64_t>(store.size);
-  const auto views = batch[0].views.size();
+  const std::size_t views = batch[0].views.size();
+  const std::size_t streamed = stream.from != nullptr ? stream.from->Count(batch.size()) : 0;
   const std::int64_t images = objects * static_cast<std::int64_t>(views);
-  Gathering gathering{
-      store,
-      views,
-      {context.Empty({objects, 4, size, size}), context.Empty({images, 3, size, size}),
-       context.Empty({images, size, size}), std::vector<Camera>(static_cast<std::size_t>(images))}};
-  const std::size_t streamed = stream ? stream->Count(batch.size()) : 0;
-  std::vector<Status> failures(streamed);
-  std::vector<std::vector<TexturedView>> streamed_views(
-      static_cast<std::size_t>(context.workers().count()));
-  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
-    context.workers().For(batch.size(), [&](std::size_t b, std::size_t worker) {
-      const Sample& sample = batch[b];
-      if (b >= streamed) return gathering.FromStore<T>(b, sample);
-      const auto position = static_cast<std::uint64_t>(first) + b;
-      std::vector<TexturedView>& drawn = streamed_views[worker];
-      drawn.resize(views);
-      const auto rgba = stream->Render(sample.model, position, worker, drawn);
-      std::ranges::transform(drawn, gathering.CamerasOf(b).begin(), &TexturedView::camera);
-      failures[b] = rgba.status();
-      if (rgba.ok()) gathering.FromStream<T>(b, sample, *rgba);
-    });
-  });
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
-  return std::move(gathering.out);
+  BatchTensors out{context.Empty({objects, 4, size, size}), context.Empty({images, 3, size, size}),
+                   context.Empty({images, size, size}),
+                   std::vector<Camera>(static_cast<std::size_t>(images))};
+  const auto work = std::make_shared<Gathering>(
+      Gathering{store, std::move(batch), stream, views, streamed, std::move(out)});
+  return {work->batch.size(), [work](std::size_t b, std::size_t lane) { work->Run(b, lane); },
+          [work] { return work->Finish(); }};
 }
 
 }  // namespace tilegrad::train

@@ -8,6 +8,7 @@
 #include "scene/camera.h"
 #include "train/data/batches.h"
 #include "train/data/stream/textured_stream.h"
+#include "train/tasks/next_batch.h"
 
 namespace tilegrad::train {
 
@@ -17,13 +18,17 @@ struct BatchTensors {
   nn::Tensor truth_colors;      // [B * views, 3, size, size]
   nn::Tensor truth_alpha;       // [B * views, size, size]
   std::vector<Camera> cameras;  // [B * views]
+  double stream_seconds = 0;    // of processor time, for pictures that were rendered for it
 };
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch);
-// The first objects of the batch are rendered instead; null: none are. `first`: position in the run
-// of the first one.
-Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
-                                 const std::vector<Sample>& batch, TexturedStream* stream,
-                                 std::int64_t first);
+// Of a batch the first objects, which are rendered for it.
+struct StreamedObjects {
+  TexturedStream* from = nullptr;  // null: all are of the store
+  std::int64_t first = 0;          // position in the run of the batch's first object
+};
+// `store` and the stream outlive the work, whose lanes are the stream's.
+BatchWork<BatchTensors> GatherWork(nn::Context& context, const ImageStore& store,
+                                   std::vector<Sample> batch, const StreamedObjects& stream);
 
 }  // namespace tilegrad::train

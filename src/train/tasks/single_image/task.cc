@@ -27,6 +27,7 @@ class SingleImageTask : public NetworkTask {
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.size; }
+  void Settle() override { batches_->Settle(); }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<ImageU8> SamplePicture(std::int64_t steps) override {
@@ -51,6 +52,7 @@ class SingleImageTask : public NetworkTask {
  private:
   LearnedWeights& weights() override { return step_->weights(); }
   Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
+  BatchWork<BatchTensors> Batch(const BatchIndex& of);
   Status CheckDataset() const;
   Status KeepPictures(const Path& run, std::int64_t first_step) const;
   void WarnOfFewModels() const;
@@ -65,6 +67,7 @@ class SingleImageTask : public NetworkTask {
   std::optional<TrainStep> step_;
   std::optional<BatchOrder> order_;
   std::optional<TexturedStream> stream_;
+  std::optional<NextBatch<BatchTensors>> batches_;
 };
 
 Status SingleImageTask::Start(const TaskStart& start) {
@@ -74,6 +77,7 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
+  batches_.emplace(context_->workers());
   TILEGRAD_TRY(LoadMeshes(start));
   lesson_.source = dataset_->info().source;
   lesson_.half_extent = dataset_->info().camera.half_extent;
@@ -157,21 +161,25 @@ Status SingleImageTask::LoadMeshes(const TaskStart& start) {
                                       .size = info.image_size,
                                       .seed = static_cast<std::uint64_t>(start.schedule.seed),
                                       .dataset_light = true},
-                  std::move(meshes), workers);
+                  std::move(meshes), SideLoop::LanesOf(workers));
   return {};
 }
 
-Result<nn::Var> SingleImageTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
-  const auto batch = order_->Batch(slots, static_cast<int>(config_.views));
+BatchWork<BatchTensors> SingleImageTask::Batch(const BatchIndex& of) {
+  const Slots slots = SlotsOf(of.step, config_.batch, of.portion);
   if (stream_) {
-    const auto next = order_->Batch(SlotsOf(at.step + 1, config_.batch, at.portion), 1);
+    const auto next = order_->Batch(SlotsOf(of.step + 1, config_.batch, of.portion), 1);
     stream_->Expect(std::span(next).first(stream_->Count(next.size())));
   }
-  TILEGRAD_ASSIGN(
-      const BatchTensors tensors,
-      GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, slots.first));
+  return GatherWork(*context_, train_, order_->Batch(slots, static_cast<int>(config_.views)),
+                    {stream_ ? &*stream_ : nullptr, slots.first});
+}
+
+Result<nn::Var> SingleImageTask::Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) {
+  TILEGRAD_ASSIGN(const BatchTensors tensors,
+                  batches_->Take(at, [this](const BatchIndex& of) { return Batch(of); }));
   out->images = slots.count;
-  out->stream_seconds = stream_ ? stream_->TakeSeconds() : 0;
+  out->stream_seconds = tensors.stream_seconds;
   return step_->Loss(tensors, at.step, out);
 }
 

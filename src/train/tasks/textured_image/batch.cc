@@ -2,6 +2,8 @@
 #include "train/tasks/textured_image/batch.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "base/error.h"
 
@@ -25,30 +27,50 @@ void Place(std::span<const float> rgba, std::size_t m, TexturedBatch* batch) {
   }
 }
 
+// A batch under construction.
+struct Rendering {
+  TexturedStream& stream;
+  std::vector<Sample> models;
+  std::uint64_t first;
+  TexturedBatch batch;
+  std::vector<Status> failures = std::vector<Status>(models.size());
+
+  void Run(std::size_t b, std::size_t lane) {
+    const auto rgba =
+        stream.Render(models[b].model, first + b, lane, std::span(batch.views).subspan(2 * b, 2));
+    failures[b] = rgba.status();
+    if (!rgba.ok()) return;
+    const std::size_t image = rgba->size() / 2;
+    nn::WithFloatType(batch.input.dtype(), [&]<class T>(T) {
+      Place<T>(rgba->first(image), 2 * b, &batch);
+      Place<T>(rgba->subspan(image), 2 * b + 1, &batch);
+    });
+  }
+  Result<TexturedBatch> Finish() {
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    batch.stream_seconds = stream.TakeSeconds();
+    return std::move(batch);
+  }
+};
+
 }  // namespace
 
-Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
-                                  const std::vector<Sample>& models, std::int64_t first) {
-  const std::size_t inputs = kViewsOfObject * models.size(), images = 2 * inputs;
+BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream, int size,
+                                    std::vector<Sample> models, std::int64_t first) {
+  const std::size_t objects = models.size(), inputs = kViewsOfObject * objects, images = 2 * inputs;
   const auto m = static_cast<std::int64_t>(inputs), n = static_cast<std::int64_t>(images);
   TexturedBatch batch{context.Empty({m, 4, size, size}), context.Empty({n, 3, size, size}),
                       context.Empty({n, size, size}), std::vector<Camera>(images),
                       std::vector<TexturedView>(inputs)};
-  std::vector<Status> failures(models.size());
-  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
-    context.workers().For(models.size(), [&](std::size_t b, std::size_t worker) {
-      const std::uint64_t position = static_cast<std::uint64_t>(first) + b;
-      const auto rgba = stream.Render(models[b].model, position, worker,
-                                      std::span(batch.views).subspan(2 * b, 2));
-      failures[b] = rgba.status();
-      if (!rgba.ok()) return;
-      const std::size_t image = rgba->size() / 2;
-      Place<T>(rgba->first(image), 2 * b, &batch);
-      Place<T>(rgba->subspan(image), 2 * b + 1, &batch);
-    });
-  });
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
-  return batch;
+  const auto work = std::make_shared<Rendering>(
+      Rendering{stream, std::move(models), static_cast<std::uint64_t>(first), std::move(batch)});
+  return {objects, [work](std::size_t b, std::size_t lane) { work->Run(b, lane); },
+          [work] { return work->Finish(); }};
+}
+
+Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
+                                  const std::vector<Sample>& models, std::int64_t first) {
+  return MakeNow(RenderWork(context, stream, size, models, first), context.workers());
 }
 
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 #include "nn/context.h"
 #include "train/data/batches.h"
 #include "train/data/stream/textured_stream.h"
+#include "train/tasks/next_batch.h"
 
 namespace tilegrad::train {
 
@@ -21,12 +22,17 @@ struct TexturedBatch {
   std::vector<Camera> cameras;      // [N]
   std::vector<TexturedView> views;  // [M]
   Portion portion{};                // of the step's batch
+  double stream_seconds = 0;        // of processor time, for its pictures
 };
 
 // The input whose view image n shows.
 constexpr std::size_t InputOfImage(std::size_t n) { return n % 2 == 0 ? n / 2 : (n / 2) ^ 1; }
 
-// One object for each of `models`, rendered in parallel. `first`: position in the run of the first.
+// One object for each of `models`. `first`: position in the run of the first. The stream outlives
+// the work, whose lanes are the stream's.
+BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream, int size,
+                                    std::vector<Sample> models, std::int64_t first);
+// The same, on all workers.
 Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
                                   const std::vector<Sample>& models, std::int64_t first);
 

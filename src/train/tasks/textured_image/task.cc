@@ -24,6 +24,7 @@ class TexturedImageTask : public NetworkTask {
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
+  void Settle() override { batches_->Settle(); }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
@@ -42,6 +43,7 @@ class TexturedImageTask : public NetworkTask {
  private:
   LearnedWeights& weights() override { return step_->weights(); }
   Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) override;
+  BatchWork<TexturedBatch> Batch(const BatchIndex& of);
   ObjectPictures Pictures(int size) const {
     return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
   }
@@ -52,6 +54,7 @@ class TexturedImageTask : public NetworkTask {
   std::optional<HeldOutViews> held_out_;  // for sample pictures
   std::optional<BatchOrder> order_;
   std::optional<TexturedStep> step_;
+  std::optional<NextBatch<TexturedBatch>> batches_;
 };
 
 Status TexturedImageTask::Start(const TaskStart& start) {
@@ -73,9 +76,10 @@ Status TexturedImageTask::Start(const TaskStart& start) {
                                      workers, start.progress, start.stop));
   held_out_.emplace(std::move(held_out));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
+  batches_.emplace(workers);
   stream_.emplace(TexturedStream::Job{config_.stream, config_.light, dataset_->info().camera,
                                       image_size(), seed},
-                  std::move(meshes), workers);
+                  std::move(meshes), SideLoop::LanesOf(workers));
   order_.emplace(static_cast<int>(train.size()), 1, seed);
   step_.emplace(*context_, config_, image_size());
   TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, seed));
@@ -91,15 +95,19 @@ Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
   return io::SavePng(run / "stream.png", sheet);
 }
 
+BatchWork<TexturedBatch> TexturedImageTask::Batch(const BatchIndex& of) {
+  const Slots slots = SlotsOf(of.step, config_.batch, of.portion);
+  stream_->Expect(order_->Batch(SlotsOf(of.step + 1, config_.batch, of.portion), 1));
+  return RenderWork(*context_, *stream_, image_size(), order_->Batch(slots, 1), slots.first);
+}
+
 Result<nn::Var> TexturedImageTask::Loss(const UpdateIndex& at, const Slots& slots,
                                         StepValues* out) {
-  const auto models = order_->Batch(slots, 1);
-  stream_->Expect(order_->Batch(SlotsOf(at.step + 1, config_.batch, at.portion), 1));
   TILEGRAD_ASSIGN(TexturedBatch batch,
-                  RenderBatch(*context_, *stream_, image_size(), models, slots.first));
+                  batches_->Take(at, [this](const BatchIndex& of) { return Batch(of); }));
   batch.portion = at.portion;
   out->images = kViewsOfObject * slots.count;
-  out->stream_seconds = stream_->TakeSeconds();
+  out->stream_seconds = batch.stream_seconds;
   return step_->Loss(step_->Draw(batch, at.step), batch, at.step, out);
 }
 
