@@ -21,7 +21,7 @@ double WorkOf(const LoopRecord& loop) {
 void LoopTrace::Begin() {
   events_.clear();
   traffic_ = 0;
-  begin_ = Clock::now();
+  begin_ = ThreadSeconds();
 }
 
 void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
@@ -41,7 +41,7 @@ void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> t
 // Turns the list of events into strands.
 class LoopTrace::Reader {
  public:
-  Reader(const LoopTrace& trace, Clock::time_point end)
+  Reader(const LoopTrace& trace, double end)
       : events_(trace.events_), last_(trace.begin_), end_(end) {}
 
   // Up to the end of the task, or of all.
@@ -66,15 +66,13 @@ class LoopTrace::Reader {
     return loop;
   }
   // Seconds since the last event.
-  double Lap(Clock::time_point now) {
-    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
-  }
+  double Lap(double now) { return now - std::exchange(last_, now); }
 
   const std::vector<Event>& events_;
   std::size_t next_ = 0;
-  Clock::time_point last_, end_;
+  double last_, end_;
 };
 
-Strand LoopTrace::End() const { return Reader(*this, Clock::now()).ReadStrand(); }
+Strand LoopTrace::End() const { return Reader(*this, ThreadSeconds()).ReadStrand(); }
 
 }  // namespace tilegrad

@@ -3,10 +3,10 @@
 // stands between them. base/loop_schedule.h predicts from it what many workers would take.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <vector>
 
+#include "base/clocks.h"
 #include "base/function_ref.h"
 #include "base/parallel.h"
 
@@ -33,8 +33,9 @@ struct LoopRecord {
 double WorkOf(const Strand& strand);
 double WorkOf(const LoopRecord& loop);
 
-// Records the loops of the Workers that are made with it. Of one thread. A clock reading for each
-// loop and task is all that recording adds.
+// Records the loops of the Workers that are made with it. Of one thread, whose processor time it
+// reads: what other programs take away is not the loops'. A reading for each loop and task is all
+// that recording adds.
 class LoopTrace {
  public:
   // Forgets what was recorded; the clock starts.
@@ -45,13 +46,12 @@ class LoopTrace {
  private:
   friend class Workers;
   friend class SideLoop;
-  using Clock = std::chrono::steady_clock;
   struct Event {            // a loop begins, or a task of the innermost open loop ends
     std::size_t tasks = 0;  // of the loop that begins
     LoopSite site{};
     double bytes = 0;
     std::size_t helpers = 0;
-    Clock::time_point at = Clock::now();
+    double at = ThreadSeconds();
   };
   class Reader;
   void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
@@ -59,8 +59,7 @@ class LoopTrace {
   void NoteTraffic(double bytes) { traffic_ = bytes; }
 
   std::vector<Event> events_;
-  Clock::time_point begin_;
-  double traffic_ = 0;
+  double begin_ = 0, traffic_ = 0;
 };
 
 }  // namespace tilegrad

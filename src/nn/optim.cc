@@ -100,13 +100,14 @@ Status Adam::Step(std::span<const Gradient> gradients) {
     if (options_.map != nullptr) {
       UpdateThroughMap(slots_[i], gradients[i].Value().value());
     } else if (gradients[i].is_product()) {
-      UpdateByProduct(slots_[i], gradients[i]);
+      AddProduct(slots_[i], gradients[i]);
     } else {
       ForPieces(gradients[i].a().value().elements(), [&](std::size_t begin, std::size_t end) {
         pieces_.push_back({i, {begin, end}});
       });
     }
   }
+  UpdateProducts();
   UpdatePieces(gradients);
   return {};
 }
@@ -173,7 +174,7 @@ void Adam::UpdatePieces(std::span<const Gradient> gradients) {
   });
 }
 
-void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
+void Adam::AddProduct(Slot& slot, const Gradient& product) {
   const Tensor &a = product.a().value(), &b = product.b().value();
   const auto steps = static_cast<std::size_t>(a.shape()[0]);
   if (a.dtype() != DType::kF32 || steps == 0 || steps > kMostProductAdamSteps) {
@@ -189,7 +190,18 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
   gradient.b = b.data<float>();
   gradient.ldb = gradient.n;
   const Numbers all{0, slot.parameter.value.value().elements()};
-  ProductAdamStep(gradient, Problem<float>(slot, all), context_.kernels());
+  if (all.end == 0) return;
+  products_.push_back({gradient, Problem<float>(slot, all)});
+}
+
+void Adam::UpdateProducts() {
+  std::span<const ProductAdamProblem> all = products_;
+  while (!all.empty()) {
+    const std::size_t count = std::min(all.size(), kMostProductAdams);
+    ProductAdamSteps(all.first(count), context_.kernels());
+    all = all.subspan(count);
+  }
+  products_.clear();
 }
 
 void Adam::UpdateThroughMap(Slot& slot, const Tensor& gradient) {

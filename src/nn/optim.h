@@ -13,6 +13,7 @@
 
 #include "nn/context.h"
 #include "nn/kernels/adam.h"
+#include "nn/kernels/product_adam.h"
 #include "nn/layers.h"
 #include "nn/tape.h"
 #include "nn/tensor.h"
@@ -105,7 +106,9 @@ class Adam {
   // Numbers [begin, end); called by several threads, each with other numbers.
   void Update(Slot& slot, const Tensor& gradient, Numbers numbers);
   void UpdatePieces(std::span<const Gradient> gradients);
-  void UpdateByProduct(Slot& slot, const Gradient& product);
+  // To products_; or updates at once where the kernel does not take it.
+  void AddProduct(Slot& slot, const Gradient& product);
+  void UpdateProducts();
   void UpdateThroughMap(Slot& slot, const Tensor& gradient);
   template <class T>
   AdamProblem<T> Problem(Slot& slot, Numbers numbers) const;
@@ -114,8 +117,9 @@ class Adam {
   AdamOptions options_;
   AdamCoefficients coefficients_;
   std::vector<Slot> slots_;
-  std::vector<Var> parameters_;  // of the slots
-  std::vector<Piece> pieces_;    // of all parameters that a step moves in one loop
+  std::vector<Var> parameters_;               // of the slots
+  std::vector<Piece> pieces_;                 // of all parameters that a step moves in one loop
+  std::vector<ProductAdamProblem> products_;  // whose gradients the step computes as it goes
   std::int64_t steps_ = 0;
 };
 

@@ -21,7 +21,7 @@ struct ProfileRequest {
 };
 
 struct StepProfile {
-  double one = 0;  // seconds of a step on one worker, measured
+  double one = 0;  // seconds of a step on one worker, measured, of its processor time
   int cores = 1;   // that this process may use
   double all = 0;  // on that many workers, measured
   LoopCosts costs;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <numeric>
 
 #include "base/clocks.h"
@@ -116,7 +115,7 @@ TEST(LoopForecast, WastedTimeIsWhatIsMissingToAnEvenShare) {
 }
 
 void Spin(double seconds) {
-  for (const auto begin = std::chrono::steady_clock::now(); SecondsSince(begin) < seconds;) {
+  for (const double begin = ThreadSeconds(); ThreadSeconds() - begin < seconds;) {
   }
 }
 
@@ -124,9 +123,9 @@ TEST(LoopTrace, SumsToTheTimeThatPassed) {
   LoopTrace trace;
   const Workers workers(4, &trace);
   EXPECT_EQ(workers.count(), 4);
-  const auto before = std::chrono::steady_clock::now();
+  const double before = ThreadSeconds();
   trace.Begin();
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin = ThreadSeconds();
   Spin(2e-3);
   workers.NoteTraffic(64);
   workers.For(5, [](std::size_t i, std::size_t) { Spin(1e-3 * static_cast<double>(i)); });
@@ -134,9 +133,9 @@ TEST(LoopTrace, SumsToTheTimeThatPassed) {
   workers.ForRanges(30, 10, [&](std::size_t, std::size_t, std::size_t) {
     workers.For(2, [](std::size_t, std::size_t) {});
   });
-  const double passed = SecondsSince(begin);
+  const double passed = ThreadSeconds() - begin;
   const Strand strand = trace.End();
-  const double most = SecondsSince(before);
+  const double most = ThreadSeconds() - before;
   ASSERT_EQ(strand.loops.size(), 2u);
   ASSERT_EQ(strand.stretches.size(), 3u);
   EXPECT_GE(WorkOf(strand), passed - 1e-9);

@@ -12,7 +12,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <optional>
+#include <span>
 
 #include "nn/kernels/adam-inl.h"
 #include "nn/kernels/gemm-inl.h"
@@ -161,18 +164,53 @@ inline void UpdateItem(const ProductAdamPlan& plan, std::size_t item, const floa
   updater.Finish();
 }
 
-inline void ProductAdamTarget(const GemmProblem<float>& product, const AdamProblem<float>& adam,
-                              const KernelContext& context) {
+// The plans of several steps, and where what they share lies.
+struct ProductAdamPlans {
+  ProductAdamPlans(std::span<const ProductAdamProblem> problems, std::size_t workers)
+      : count(problems.size()) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& plan = plans[i].emplace(problems[i].product, problems[i].adam, workers);
+      panels[i + 1] = panels[i] + plan.gemm.rows.count();
+      items[i + 1] = items[i] + plan.gemm.items();
+      packed[i + 1] = packed[i] + RoundUp(plan.gemm.packed_a_size(), kAlignment);
+      worker_size = std::max(worker_size, plan.worker_size());
+      bytes += static_cast<double>(plan.adam.n * 6 * sizeof(float));
+    }
+  }
+
+  // Calls run(plan number, index in the plan) for number `at` of those that `ends` counts.
+  template <class Ends, class Run>
+  void In(const Ends& ends, std::size_t at, const Run& run) const {
+    std::size_t i = 0;
+    while (at >= ends[i + 1]) ++i;
+    run(i, at - ends[i]);
+  }
+
+  using Sums = std::array<std::size_t, kMostProductAdams + 1>;  // over the plans before
+  std::size_t count;
+  std::array<std::optional<ProductAdamPlan>, kMostProductAdams> plans;
+  Sums panels{}, items{}, packed{};
+  std::size_t worker_size = 0;
+  double bytes = 0;
+};
+
+inline void ProductAdamsTarget(std::span<const ProductAdamProblem> problems,
+                               const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
-  const ProductAdamPlan plan(product, adam, workers);
-  const std::size_t a_size = RoundUp(plan.gemm.packed_a_size(), kAlignment);
-  float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
-  context.workers.For(plan.gemm.rows.count(), [&](std::size_t panel, std::size_t) {
-    PackRowPanel(plan.gemm, panel, 0, 1, packed_a);
+  const ProductAdamPlans all(problems, workers);
+  const std::size_t a_size = all.packed[all.count];
+  float* packed_a = context.scratch.Floats(a_size + all.worker_size * workers);
+  context.workers.For(all.panels[all.count], [&](std::size_t index, std::size_t) {
+    all.In(all.panels, index, [&](std::size_t i, std::size_t panel) {
+      PackRowPanel(all.plans[i]->gemm, panel, 0, 1, packed_a + all.packed[i]);
+    });
   });
-  context.workers.NoteTraffic(static_cast<double>(adam.n * 6 * sizeof(float)));
-  context.workers.For(plan.gemm.items(), [&](std::size_t item, std::size_t worker) {
-    UpdateItem(plan, item, packed_a, packed_a + a_size + worker * plan.worker_size());
+  context.workers.NoteTraffic(all.bytes);
+  context.workers.For(all.items[all.count], [&](std::size_t index, std::size_t worker) {
+    all.In(all.items, index, [&](std::size_t i, std::size_t item) {
+      UpdateItem(*all.plans[i], item, packed_a + all.packed[i],
+                 packed_a + a_size + worker * all.worker_size);
+    });
   });
 }
 

@@ -9,12 +9,10 @@
 
 #if HWY_ONCE
 namespace tilegrad::nn {
-HWY_EXPORT(ProductAdamTarget);
+HWY_EXPORT(ProductAdamsTarget);
 
-void ProductAdamStep(const GemmProblem<float>& product, const AdamProblem<float>& adam,
-                     const KernelContext& context) {
-  if (product.m == 0 || product.n == 0) return;
-  HWY_DYNAMIC_DISPATCH(ProductAdamTarget)(product, adam, context);
+void ProductAdamSteps(std::span<const ProductAdamProblem> problems, const KernelContext& context) {
+  if (!problems.empty()) HWY_DYNAMIC_DISPATCH(ProductAdamsTarget)(problems, context);
 }
 
 }  // namespace tilegrad::nn

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "nn/kernels/adam.h"
 #include "nn/kernels/gemm.h"
@@ -16,10 +17,15 @@ namespace tilegrad::nn {
 // memory traffic.
 constexpr std::size_t kMostProductAdamSteps = 256;
 
-// The same bits as Gemm(product) into a gradient and AdamStep(adam) over it. `product.c` and
-// `adam.gradient` are not used; product.k is in [1, kMostProductAdamSteps], it has no bias and does
-// not accumulate, and adam.n = product.m product.n.
-void ProductAdamStep(const GemmProblem<float>& product, const AdamProblem<float>& adam,
-                     const KernelContext& context);
+// For each the same bits as Gemm(product) into a gradient and AdamStep(adam) over it. `product.c`
+// and `adam.gradient` are not used; product.k is in [1, kMostProductAdamSteps], it has no bias and
+// does not accumulate, and adam.n = product.m product.n.
+struct ProductAdamProblem {
+  GemmProblem<float> product;
+  AdamProblem<float> adam;
+};
+// Of several matrices, none of them empty, at most kMostProductAdams: two loops in all.
+constexpr std::size_t kMostProductAdams = 16;
+void ProductAdamSteps(std::span<const ProductAdamProblem> problems, const KernelContext& context);
 
 }  // namespace tilegrad::nn

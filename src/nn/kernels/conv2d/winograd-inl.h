@@ -265,8 +265,9 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
     });
     product.Multiply(context.workers);
     if (portion + 1 < count) continue;
-    context.workers.For(panels, [&](std::size_t panel, std::size_t) {
-      FinishWeightGrad(product, panel, d_weight);
+    const Panels channels(s.in_channels, kFinishedChannels);
+    context.workers.For(panels * channels.count(), [&](std::size_t index, std::size_t) {
+      FinishWeightGrad(product, index % panels, channels.range(index / panels), d_weight);
     });
   }
 }

@@ -206,6 +206,9 @@ constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half o
 constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
 constexpr std::size_t kSlotColumnPanels = 16;  // in one work item: 256 tiles
 
+constexpr int kFewCorrelationWorkers = 4;
+constexpr std::size_t kManySlotRowPanels = 7;  // in one work item of more workers: 42 rows
+
 // ---- Forward and input gradient: out[slot] = weights[slot] in[slot] ----
 
 struct SlotProduct {
@@ -295,27 +298,34 @@ struct WinogradCorrelation {
     return (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
   }
 
+  // Work items: some rows of a slot with all panels or, for many workers, fewer rows with one.
   void Multiply(const Workers& workers) const {
+    const bool many = workers.count() > kFewCorrelationWorkers;
+    const std::size_t item_rows = (many ? kManySlotRowPanels : kSlotRowPanels) * kTileRows;
+    const std::size_t item_panels = many ? 1 : panels, groups = panels / item_panels;
     std::size_t most = 0;
     for (std::size_t slot = 0; slot < input.plan.slots(); ++slot) {
-      most = std::max(most, DivideUp(input.size(slot), kSlotRowPanels * kTileRows));
+      most = std::max(most, DivideUp(input.size(slot), item_rows));
     }
-    workers.For(input.plan.slots() * most, [&](std::size_t index, std::size_t) {
-      const std::size_t slot = index / most, block = index % most;
-      const Panels blocks(input.size(slot), kSlotRowPanels * kTileRows);
-      if (block < blocks.count()) MultiplyRows(slot, blocks.begin(block), blocks.size(block));
+    workers.For(input.plan.slots() * most * groups, [&](std::size_t index, std::size_t) {
+      const std::size_t slot = index / groups / most, block = index / groups % most;
+      const std::size_t panel = index % groups * item_panels;
+      const Panels blocks(input.size(slot), item_rows);
+      if (block >= blocks.count()) return;
+      const Panels::Range some = blocks.range(block);
+      MultiplyRows(slot, some, {panel, panel + item_panels});
     });
   }
 
  private:
-  void MultiplyRows(std::size_t slot, std::size_t begin, std::size_t count) const {
-    const Panels row_panels(count, kTileRows);
+  void MultiplyRows(std::size_t slot, Panels::Range some, Panels::Range of_panels) const {
+    const Panels row_panels(some.end - some.begin, kTileRows);
     for (std::size_t t = 0; t < rows.tiles; t += kSlotDepth) {
       const std::size_t steps = std::min(kSlotDepth, rows.tiles - t);
-      for (std::size_t panel = 0; panel < panels; ++panel) {
+      for (std::size_t panel = of_panels.begin; panel < of_panels.end; ++panel) {
         const PackedColumns columns{outputs + OutputAt(slot, panel) + t * kTileColumns};
         for (std::size_t i = 0; i < row_panels.count(); ++i) {
-          const std::size_t row = begin + row_panels.begin(i);
+          const std::size_t row = some.begin + row_panels.begin(i);
           PlainRowsTile(inputs + in_layout.At(slot, row, 0) + t, in_layout.index_stride,
                         row_panels.size(i), columns, steps,
                         {.c = sums + SumAt(slot, panel, row),
@@ -396,8 +406,12 @@ inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t pa
   return from;
 }
 
+// Input channels of one work item.
+constexpr std::size_t kFinishedChannels = 8;
+
+// Of some input channels.
 inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t panel,
-                             float* d_weight) {
+                             Panels::Range some, float* d_weight) {
   const WinogradPlan& plan = product.input.plan;
   const std::size_t area = plan.kernel * plan.kernel, first = panel * kTileColumns;
   const std::size_t in_channels = plan.s.in_channels;
@@ -409,7 +423,7 @@ inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t pan
     }
   }
   float taps[kMostTaps * kTileColumns];
-  for (std::size_t c = 0; c < in_channels; ++c) {
+  for (std::size_t c = some.begin; c < some.end; ++c) {
     for (std::size_t a = 0; a < plan.stride; ++a) {
       for (std::size_t b = 0; b < plan.stride; ++b) {
         ForTaps<TransformWeightsBack>(plan.taps(a), plan.taps(b), sums[a * plan.stride + b], c,
