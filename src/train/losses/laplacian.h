@@ -5,6 +5,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "nn/tape.h"
 #include "scene/topology.h"
@@ -33,15 +34,16 @@ double LaplacianForward(const Topology& topology, std::span<const T> m, std::spa
 template <class T>
 void LaplacianBackward(const Topology& topology, std::span<const T> residual, T scale,
                        std::span<T> d_m) {
-  const auto degree = [&](std::int32_t v) {
-    return T(topology.offsets[v + 1] - topology.offsets[v]);
-  };
+  std::vector<T> shares(residual.size());  // r_j / deg(j)
+  for (std::size_t v = 0; v + 1 < topology.offsets.size(); ++v) {
+    const T degree = T(topology.offsets[v + 1] - topology.offsets[v]);
+    for (std::size_t c = 0; c < 3; ++c) shares[3 * v + c] = residual[3 * v + c] / degree;
+  }
   for (std::size_t v = 0; v + 1 < topology.offsets.size(); ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       T sum = -residual[3 * v + c];
       for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n) {
-        const std::int32_t j = topology.neighbors[n];
-        sum += residual[3 * j + c] / degree(j);
+        sum += shares[3 * topology.neighbors[n] + c];
       }
       d_m[3 * v + c] = 2 * scale * sum;
     }

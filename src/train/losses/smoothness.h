@@ -17,12 +17,13 @@ namespace tilegrad::train {
 template <class T>
 using Vec3 = std::array<T, 3>;
 
+// Inline by word: GCC 12 calls them otherwise.
 template <class T>
-Vec3<T> Cross(const Vec3<T>& a, const Vec3<T>& b) {
+inline Vec3<T> Cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 template <class T>
-T Dot(const Vec3<T>& a, const Vec3<T>& b) {
+inline T Dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
@@ -35,13 +36,13 @@ struct FaceNormal {
 };
 
 template <class T>
-Vec3<T> EdgeVector(std::span<const T> p, std::int32_t from, std::int32_t to) {
+inline Vec3<T> EdgeVector(std::span<const T> p, std::int32_t from, std::int32_t to) {
   return {p[3 * to] - p[3 * from], p[3 * to + 1] - p[3 * from + 1],
           p[3 * to + 2] - p[3 * from + 2]};
 }
 
 template <class T>
-FaceNormal<T> NormalOf(std::span<const T> p, const Face& face) {
+inline FaceNormal<T> NormalOf(std::span<const T> p, const Face& face) {
   const Vec3<T> n = Cross(EdgeVector(p, face[0], face[1]), EdgeVector(p, face[0], face[2]));
   const T length = std::sqrt(Dot(n, n));
   if (!(length > T(1e-20))) return {};
@@ -68,8 +69,8 @@ double SmoothnessForward(const Topology& topology, std::span<const Face> faces,
 // d_p += the adjoint of NormalOf for d_unit: with n = c / |c|, d_c = (d_unit - n (n . d_unit)) /
 // |c|, then the cross product's.
 template <class T>
-void NormalBackward(std::span<const T> p, const Face& face, const FaceNormal<T>& normal,
-                    const Vec3<T>& d_unit, std::span<T> d_p) {
+inline void NormalBackward(std::span<const T> p, const Face& face, const FaceNormal<T>& normal,
+                           const Vec3<T>& d_unit, std::span<T> d_p) {
   const T along = Dot(normal.unit, d_unit);
   Vec3<T> d_c;
   for (std::size_t c = 0; c < 3; ++c)
