@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads are an argument: every computation receives a Workers. The one home of
+// Threads are an argument: every computation receives a Workers. With side_loop.h the home of
 // oneTBB.
 #pragma once
 
