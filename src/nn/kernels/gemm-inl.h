@@ -395,6 +395,12 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
   }
 }
 
+// Row panels of A that one task packs: a small A is packed before others would have come.
+inline std::size_t PackedPanels(const GemmPlan& plan) {
+  constexpr std::size_t kAlone = 16384;  // floats
+  return plan.packed_a_size() < kAlone ? std::max<std::size_t>(1, plan.rows.count()) : 1;
+}
+
 inline void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
   const GemmPlan plan(problem, ItemsFor(problem, workers));
@@ -402,9 +408,11 @@ inline void GemmTarget(const GemmProblem<float>& problem, const KernelContext& c
   float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
   for (std::size_t pass = 0; pass < plan.passes.count(); ++pass) {
     const std::size_t depth = plan.passes.begin(pass), end = depth + plan.passes.size(pass);
-    context.workers.For(plan.rows.count(), [&](std::size_t panel, std::size_t) {
-      PackRowPanel(plan, panel, depth, end, packed_a);
-    });
+    ForChunks(&context.workers, plan.rows.count(), PackedPanels(plan),
+              [&](std::size_t first, std::size_t last) HWY_ATTR {
+                for (std::size_t panel = first; panel < last; ++panel)
+                  PackRowPanel(plan, panel, depth, end, packed_a);
+              });
     context.workers.For(plan.items(), [&](std::size_t item, std::size_t worker) {
       MultiplyItem(plan, item, depth, end, packed_a,
                    packed_a + a_size + worker * plan.worker_size());
