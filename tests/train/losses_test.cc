@@ -50,6 +50,19 @@ TEST_F(Losses, ColorIsThreeTimesThePlainMean) {
       1e-12);
 }
 
+// Four images side by side, then the two that are left, to the bit.
+TEST_F(Losses, ColorSumsTheDifferencesOfEachImageInOrder) {
+  const nn::Shape shape = {6, 3, 5, 7};
+  const auto truth = Random(shape, 0, 1, 3);
+  const std::vector<double> image = Uniform(630, 0, 1, 4);
+  double sum = 0;
+  for (std::size_t i = 0; i < 6; ++i)
+    sum += AbsoluteDifference<double>(truth.span<double>().subspan(105 * i, 105),
+                                      std::span(image).subspan(105 * i, 105));
+  EXPECT_EQ(Value([&](const nn::Var& a) { return ColorL1Loss(a, truth); }, shape, image),
+            3.0 / 630 * sum);
+}
+
 TEST_F(Losses, HuberGradientOnBothSidesOfItsBend) {
   const nn::Shape shape = {2, 3, 3, 2};
   const auto truth = Random(shape, 0, 0.4, 3);
