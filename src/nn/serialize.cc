@@ -8,12 +8,14 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 #include <tuple>
 #include <unordered_set>
 #include <utility>
 
 #include "base/error.h"
 #include "base/half.h"
+#include "base/json_text.h"
 #include "base/text.h"
 
 static_assert(std::endian::native == std::endian::little, "safetensors data is little endian");
@@ -157,11 +159,12 @@ Result<Header> ParseHeader(std::span<const std::uint8_t> bytes) {
         "safetensors: a header of {} bytes in a file of {}: cut short, or not a safetensors file",
         length, bytes.size());
   }
-  const auto* begin = bytes.data() + kLengthBytes;
-  Header header{Json::parse(begin, begin + length, nullptr, /*allow_exceptions=*/false), {}};
+  const char* begin = reinterpret_cast<const char*>(bytes.data()) + kLengthBytes;
+  const std::string_view text(begin, length);
+  Header header{ParseJsonOrDiscard(text), {}};
   if (!header.json.is_object()) return DataLoss("safetensors: the header is not a JSON object");
   EntryNames entries;
-  Json::sax_parse(begin, begin + length, &entries);
+  Json::sax_parse(text, &entries);
   header.names = std::move(entries.names);
   if (header.json.size() != header.names.size()) {
     return DataLoss("safetensors: the header has a name twice");
@@ -242,7 +245,7 @@ namespace {
 
 void AppendMember(const std::string& name, const std::string& json, std::string* text) {
   if (text->size() > 1) *text += ',';
-  *text += Json(name).dump() + ':' + json;
+  *text += DumpJson(Json(name)) + ':' + json;
 }
 
 // What the file holds of a tensor.
@@ -318,7 +321,7 @@ Result<EncodedFile> Encode(const TensorFile& file, StoredFloats floats) {
   TILEGRAD_TRY(CheckTexts(file));
   EncodedFile out;
   std::string text = "{";
-  if (!file.metadata.empty()) AppendMember(kMetadata, Json(file.metadata).dump(), &text);
+  if (!file.metadata.empty()) AppendMember(kMetadata, DumpJson(Json(file.metadata)), &text);
   std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
     TILEGRAD_ASSIGN(StoredTensor stored, StoredOf(t, floats));
