@@ -61,7 +61,7 @@ LoopMachine MachineOf(int workers, const ProfileRequest& request, const StepProf
   const double each = here.costs.bytes_per_second / here.cores;
   machine.bytes_per_second = each * workers;
   if (request.bytes_per_second > 0 && workers > here.cores)
-    machine.bytes_per_second = std::min(machine.bytes_per_second, request.bytes_per_second);
+    machine.bytes_per_second = request.bytes_per_second;
   return machine;
 }
 
