@@ -51,12 +51,15 @@ class ObjLines {
   bool NextLine(std::string_view& line) {
     if (rest_.empty()) return false;
     ++number_;
-    const auto end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+    std::size_t end = 0;
+    while (end < rest_.size() && rest_[end] != '\n' && rest_[end] != '\r') ++end;
     line = Trimmed(rest_.substr(0, end));
     rest_.remove_prefix(end);
-    if (!rest_.empty()) rest_.remove_prefix(rest_.starts_with("\r\n") ? 2 : 1);
+    if (!rest_.empty()) rest_.remove_prefix(IsWindowsEnd() ? 2 : 1);
     return true;
   }
+
+  bool IsWindowsEnd() const { return rest_.size() >= 2 && rest_[0] == '\r' && rest_[1] == '\n'; }
 
   std::string_view rest_;
   std::string joined_;
@@ -97,11 +100,13 @@ class ObjParser {
 
  private:
   Status Statement(std::string_view keyword, std::string_view rest) {
-    if (keyword == "v") return Vertex(rest);
+    // Most lines are of the first two.
+    const char letter = keyword.size() == 1 ? keyword[0] : '\0';
+    if (letter == 'v') return Vertex(rest);
+    if (letter == 'f') return Face(rest);
+    if (letter == 'l' || letter == 'p') return LineOrPoints(rest);
     if (keyword == "vt") return TextureCoordinate(rest);
     if (keyword == "vn") return Normal(rest);
-    if (keyword == "f") return Face(rest);
-    if (keyword == "l" || keyword == "p") return LineOrPoints(rest);
     if (keyword == "usemtl") {
       UseMaterial(WholeName(rest));
     } else if (keyword == "mtllib") {

@@ -56,21 +56,22 @@ inline Status CheckTextEncoding(std::string_view text, const std::string& place)
   return DataLoss("{}: text in UTF-16; save it as UTF-8", place);
 }
 
-inline constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
+// Space, \t, \n, \v, \f, \r.
+constexpr bool IsWhiteSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
+// Loops: find_first_of searches the set anew for each character, and words are short.
 inline std::string_view Trimmed(std::string_view text) {
-  const auto begin = text.find_first_not_of(kWhiteSpace);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kWhiteSpace) + 1 - begin);
+  while (!text.empty() && IsWhiteSpace(text.front())) text.remove_prefix(1);
+  while (!text.empty() && IsWhiteSpace(text.back())) text.remove_suffix(1);
+  return text;
 }
 
 // Takes the next run of characters other than white space off `rest`; empty at the end.
 inline std::string_view NextToken(std::string_view& rest) {
-  const auto begin = rest.find_first_not_of(kWhiteSpace);
-  if (begin == std::string_view::npos) return rest = {};
-  auto end = rest.find_first_of(kWhiteSpace, begin);
-  if (end == std::string_view::npos) end = rest.size();
-  const auto token = rest.substr(begin, end - begin);
+  while (!rest.empty() && IsWhiteSpace(rest.front())) rest.remove_prefix(1);
+  std::size_t end = 0;
+  while (end < rest.size() && !IsWhiteSpace(rest[end])) ++end;
+  const auto token = rest.substr(0, end);
   rest.remove_prefix(end);
   return token;
 }
@@ -79,13 +80,16 @@ inline std::string_view NextToken(std::string_view& rest) {
 // write them ("1.#QNAN"): as NaN. A leading '+' is fine.
 template <class T>
 bool ParseAnyNumber(std::string_view token, T& value) {
-  if constexpr (std::is_floating_point_v<T>) {
-    value = std::numeric_limits<T>::quiet_NaN();
-    if (token.find(".#") != std::string_view::npos) return true;
-  }
+  if constexpr (std::is_floating_point_v<T>) value = std::numeric_limits<T>::quiet_NaN();
   if (token.starts_with('+')) token.remove_prefix(1);
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  return error == std::errc() && end == token.data() + token.size();
+  if (error == std::errc() && end == token.data() + token.size()) return true;
+  if constexpr (std::is_floating_point_v<T>) {
+    if (token.find(".#") == std::string_view::npos) return false;
+    value = std::numeric_limits<T>::quiet_NaN();
+    return true;
+  }
+  return false;
 }
 
 // The same of a finite one.
