@@ -22,7 +22,7 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr zip_uint64_t kMaxEntryBytes = zip_uint64_t{1} << 30;
+constexpr zip_uint64_t kMaxEntryBytes = zip_uint64_t{4} << 30;
 
 // Finds a file below `folder`, ignoring case component by component.
 std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name) {

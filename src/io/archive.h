@@ -28,7 +28,8 @@ class FileSource {
 // Adds the name of each file that is read to `read`, if that is given.
 std::shared_ptr<FileSource> OpenFolder(const Path& folder, std::vector<Path>* read = nullptr);
 
-// Reading is thread-safe (a lock); one entry may be at most 1 GiB unpacked.
+// Reading is thread-safe (a lock); one entry may be at most 4 GiB unpacked:
+// N3MR's renders of tables have 2.3.
 Result<std::shared_ptr<FileSource>> OpenZip(const Path& path);
 
 // One entry of a zip in memory; `place` stands for the zip in messages.

@@ -76,6 +76,7 @@ class Nmr : public ModelSource {
       places_[{part.class_name, id}] = {parts_.size(), i};
     }
     parts_.push_back(std::move(part));
+    failures_.emplace_back();
     return {};
   }
   void Sort() { SortEntries(&entries_); }
@@ -121,14 +122,22 @@ class Nmr : public ModelSource {
   Result<std::shared_ptr<const Arrays>> Fetch(std::size_t part) const {
     const std::lock_guard lock(mutex_);
     if (cached_ != nullptr && cached_part_ == part) return cached_;
+    TILEGRAD_TRY(failures_[part]);
     cached_ = nullptr;
+    auto arrays = ReadArrays(part);
+    failures_[part] = arrays.status();
+    if (!arrays.ok()) return failures_[part];
+    cached_ = std::make_shared<const Arrays>(std::move(*arrays));
+    cached_part_ = part;
+    return cached_;
+  }
+
+  Result<Arrays> ReadArrays(std::size_t part) const {
     Arrays arrays;
     TILEGRAD_ASSIGN(arrays.images,
                     LoadOnlyArray(parts_[part].images, {kNmrViews, 4, kSize, kSize}));
     TILEGRAD_ASSIGN(arrays.voxels, LoadVoxels(parts_[part]));
-    cached_ = std::make_shared<const Arrays>(std::move(arrays));
-    cached_part_ = part;
-    return cached_;
+    return arrays;
   }
 
   std::vector<NmrPart> parts_;
@@ -138,6 +147,7 @@ class Nmr : public ModelSource {
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const Arrays> cached_;
   mutable std::size_t cached_part_ = 0;
+  mutable std::vector<Status> failures_;  // by part: a broken file is not read for each model
 };
 
 // "chair_train_images.npz" -> chair, train; nothing for other names.
