@@ -2,6 +2,7 @@
 #include "train/data/stream/textured_meshes.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <map>
 #include <mutex>
@@ -38,6 +39,33 @@ Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetInfo& info, const s
       info.source == kThirteen || FindInstalledSource(info.source.substr(0, info.source.find('+')));
   if (installed) return OpenInstalledSources(info.source);
   return std::unique_ptr<ModelSource>();
+}
+
+// The first of the pixels behind each of `to` ones along an axis of `from`; last, `from`.
+std::vector<int> Blocks(int from, int to) {
+  std::vector<int> first;
+  for (int i = 0; i <= to; ++i)
+    first.push_back(static_cast<int>(static_cast<std::int64_t>(i) * from / to));
+  return first;
+}
+
+struct PixelBlock {
+  int left, right, top, bottom;
+};
+
+void MeanOfBlock(const ImageU8& image, const PixelBlock& block, std::uint8_t* out) {
+  std::array<std::uint64_t, 4> sum = {};
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (int v = block.top; v < block.bottom; ++v) {
+    const std::uint8_t* at = image.at(block.left, v);
+    for (int u = block.left; u < block.right; ++u, at += channels) {
+      for (std::size_t c = 0; c < channels; ++c) sum[c] += at[c];
+    }
+  }
+  const auto count = static_cast<std::uint64_t>(block.bottom - block.top) *
+                     static_cast<std::uint64_t>(block.right - block.left);
+  for (std::size_t c = 0; c < channels; ++c)
+    out[c] = static_cast<std::uint8_t>((sum[c] + count / 2) / count);
 }
 
 class Loader {
@@ -167,24 +195,14 @@ ImageU8 ShrunkImage(const ImageU8& image, int side) {
     return std::max(1, static_cast<int>(static_cast<std::int64_t>(n) * side / longest));
   };
   ImageU8 out(shorter(image.width), shorter(image.height), image.channels);
-  // The first of the pixels behind pixel i of an axis, and the one behind its last.
-  const auto first = [](int i, int from, int to) {
-    return static_cast<int>(static_cast<std::int64_t>(i) * from / to);
-  };
+  const std::vector<int> rows = Blocks(image.height, out.height),
+                         columns = Blocks(image.width, out.width);
   for (int y = 0; y < out.height; ++y) {
-    const int top = first(y, image.height, out.height),
-              bottom = first(y + 1, image.height, out.height);
+    const auto row = static_cast<std::size_t>(y);
     for (int x = 0; x < out.width; ++x) {
-      const int left = first(x, image.width, out.width),
-                right = first(x + 1, image.width, out.width);
-      for (int c = 0; c < image.channels; ++c) {
-        std::int64_t sum = 0;
-        for (int v = top; v < bottom; ++v) {
-          for (int u = left; u < right; ++u) sum += image.at(u, v)[c];
-        }
-        const std::int64_t count = static_cast<std::int64_t>(bottom - top) * (right - left);
-        out.at(x, y)[c] = static_cast<std::uint8_t>((sum + count / 2) / count);
-      }
+      const auto column = static_cast<std::size_t>(x);
+      const PixelBlock block{columns[column], columns[column + 1], rows[row], rows[row + 1]};
+      MeanOfBlock(image, block, out.at(x, y));
     }
   }
   return out;
