@@ -8,9 +8,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <new>
 #include <system_error>
+
+#include "base/error.h"
 
 namespace tilegrad {
 namespace {
@@ -38,6 +42,21 @@ void* MapBytes(std::size_t size, std::size_t in_memory) {
 }
 
 }  // namespace
+
+Result<ScratchBytes> ScratchBytes::OfFile(const Path& file, std::size_t size) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  void* const bytes =
+      fd < 0 ? MAP_FAILED
+             : ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_NORESERVE, fd, 0);
+  const int error = errno;
+  if (fd >= 0) ::close(fd);
+  if (bytes == MAP_FAILED)
+    return IoError("{}: cannot be mapped: {}", file.string(), std::strerror(error));
+  ::madvise(bytes, size, MADV_RANDOM);  // read ahead, it would fill the memory with other pictures
+  ScratchBytes out;
+  out.bytes_ = {static_cast<std::uint8_t*>(bytes), size};
+  return out;
+}
 
 void ScratchBytes::Resize(std::size_t size) {
   Free();

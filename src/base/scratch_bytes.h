@@ -8,6 +8,8 @@
 #include <span>
 #include <utility>
 
+#include "base/file.h"
+
 namespace tilegrad {
 
 // Up to 1 GiB in memory. More are mapped from a file without a name in the folder of temporary
@@ -25,6 +27,9 @@ class ScratchBytes {
     return *this;
   }
   ~ScratchBytes() { Free(); }
+
+  // The first `size` bytes of a file, as it is while it is mapped; writes to them stay here.
+  static Result<ScratchBytes> OfFile(const Path& file, std::size_t size);
 
   // Zeros instead of what there was. std::bad_alloc if there is no memory either.
   void Resize(std::size_t size);

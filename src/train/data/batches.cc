@@ -2,11 +2,11 @@
 #include "train/data/batches.h"
 
 #include <algorithm>
-#include <mutex>
 #include <numeric>
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "train/data/picture_pack.h"
 
 namespace tilegrad::train {
 namespace {
@@ -30,27 +30,27 @@ Result<std::vector<Camera>> LoadStoreCameras(const Dataset& dataset,
 
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
                                   const Workers& workers, const ProgressSink& progress,
-                                  const StopFlag& stop) {
+                                  const StopFlag& stop, std::size_t in_memory) {
+  const PictureWork work{workers, progress, stop};
   ImageStore store;
   store.models = static_cast<int>(models.size());
   store.views = dataset.info().views;
   store.size = dataset.info().image_size;
-  const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
-  store.bytes.Resize(per_model * models.size());
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  std::vector<Status> failures(models.size());
   TILEGRAD_ASSIGN(store.cameras, LoadStoreCameras(dataset, models));
-  workers.For(models.size(), [&](std::size_t i, std::size_t) {
-    if (stop) return;
-    auto images = dataset.LoadImages(models[i]);
-    if (images.ok()) std::copy(images->begin(), images->end(), store.bytes.begin() + i * per_model);
-    failures[i] = images.status();
-    const std::scoped_lock lock(mutex);
-    if (progress) progress({"loading images", ++done, models.size(), ""});
-  });
-  if (stop) return Cancelled("stopped while loading the dataset");
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
+  if (per_model * models.size() > in_memory) {
+    TILEGRAD_ASSIGN(auto pack, OpenPicturePack(dataset, work));
+    if (pack) {
+      store.bytes = std::move(*pack);
+      store.rows = models;
+      return store;
+    }
+  }
+  store.bytes.Resize(per_model * models.size());
+  TILEGRAD_TRY(UnpackPictures(dataset, models, work, [&](std::size_t i, auto images) {
+    std::ranges::copy(images, store.bytes.begin() + i * per_model);
+    return Status();
+  }));
   return store;
 }
 

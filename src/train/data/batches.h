@@ -18,7 +18,8 @@ namespace tilegrad::train {
 
 // The images of some models: [models][views][4][size][size] bytes.
 struct ImageStore {
-  ScratchBytes bytes;
+  ScratchBytes bytes;           // of these models, or of more
+  std::vector<int> rows;        // where each is among them; empty: they are these
   std::vector<Camera> cameras;  // by view, the same for all models, or by model and view
   int models = 0, views = 0, size = 0;
 
@@ -30,7 +31,8 @@ struct ImageStore {
            static_cast<std::size_t>(view);
   }
   std::span<const std::uint8_t> Image(int model, int view) const {
-    return {bytes.data() + Place(model, view) * ImageBytes(), ImageBytes()};
+    const int row = rows.empty() ? model : rows[static_cast<std::size_t>(model)];
+    return {bytes.data() + Place(row, view) * ImageBytes(), ImageBytes()};
   }
   const Camera& CameraOf(int model, int view) const {
     return cameras[Place(model, view) % cameras.size()];
@@ -38,10 +40,11 @@ struct ImageStore {
 };
 
 // Loads the images of these models, in order; errors name the file. Stops between models when
-// `stop` is set.
+// `stop` is set. More than `in_memory` bytes are mapped from the dataset's picture_pack.h.
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
                                   const Workers& workers, const ProgressSink& progress,
-                                  const StopFlag& stop);
+                                  const StopFlag& stop,
+                                  std::size_t in_memory = ScratchBytes::kInMemory);
 
 // One object of a batch: the view that the network sees comes first, then the other views, all
 // distinct.

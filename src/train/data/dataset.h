@@ -7,6 +7,7 @@
 //   <folder>/rejected.jsonl            models that could not be used: id, class, file, reason
 //   <folder>/models/<class>/<id>.npz   ModelData: images, occupancy, points, mesh
 //   <folder>/contact_sheet.png         to look at
+//   <folder>/pictures.bin              of large sets, written by trainings (picture_pack.h)
 #pragma once
 
 #include <cstdint>

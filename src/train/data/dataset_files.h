@@ -30,6 +30,7 @@ Path DatasetInfoPath(const Path& folder);
 Path ModelsPath(const Path& folder);
 Path RejectedPath(const Path& folder);
 Path ContactSheetPath(const Path& folder);
+Path PicturesPath(const Path& folder);  // picture_pack.h
 Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id);
 // Takes away the files of a dataset; others in its folder stay.
 Status RemoveDataset(const Path& folder);

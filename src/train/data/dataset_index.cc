@@ -146,13 +146,15 @@ Path DatasetInfoPath(const Path& folder) { return folder / "dataset.json"; }
 Path ModelsPath(const Path& folder) { return folder / "models.jsonl"; }
 Path RejectedPath(const Path& folder) { return folder / "rejected.jsonl"; }
 Path ContactSheetPath(const Path& folder) { return folder / "contact_sheet.png"; }
+Path PicturesPath(const Path& folder) { return folder / "pictures.bin"; }
 Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id) {
   return folder / kModelFolder / class_name / (id + kModelEnding);
 }
 
 // What marks the folder as ours last.
 Status RemoveDataset(const Path& folder) {
-  std::vector<Path> files = {ModelsPath(folder), RejectedPath(folder), ContactSheetPath(folder)};
+  std::vector<Path> files = {ModelsPath(folder), RejectedPath(folder), ContactSheetPath(folder),
+                             PicturesPath(folder)};
   std::error_code error;
   for (std::filesystem::recursive_directory_iterator at(folder / kModelFolder, error), end;
        !error && at != end; at.increment(error)) {

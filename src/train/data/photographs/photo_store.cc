@@ -87,7 +87,7 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
   for (const int i : photographs)
     store.photos_.push_back(&set.photographs[static_cast<std::size_t>(i)]);
   store.windows_.resize(photographs.size());
-  store.bytes_.resize(photographs.size() * store.stored_bytes());
+  store.bytes_.Resize(photographs.size() * store.stored_bytes());
   std::vector<Status> failures(photographs.size());
   std::mutex mutex;
   std::uint64_t done = 0;

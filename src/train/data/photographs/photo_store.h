@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "base/rng.h"
+#include "base/scratch_bytes.h"
 #include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
@@ -49,7 +50,8 @@ class PhotoStore {
  public:
   // Reads and crops the pictures of `photographs` (indices into set.photographs, whose store they
   // share). A pixel beyond a picture's edge is white, as CMR's. Memory: 1.44 size^2 * 4 bytes a
-  // photograph. Errors name the file: one that cannot be read, or whose size is not its mask's.
+  // photograph, on disk where they are many (scratch_bytes.h). Errors name the file: one that
+  // cannot be read, or whose size is not its mask's.
   static Result<PhotoStore> Load(const PhotographSet& set, const std::vector<int>& photographs,
                                  const CropRule& rule, int size, const Workers& workers,
                                  const ProgressSink& progress, const StopFlag& stop);
@@ -75,7 +77,7 @@ class PhotoStore {
   int size_ = 0, stored_ = 0;
   std::vector<const Photograph*> photos_;
   std::vector<PhotoWindow> windows_;  // what is stored
-  std::vector<std::uint8_t> bytes_;   // [photo][4][stored][stored], RGB and mask
+  ScratchBytes bytes_;                // [photo][4][stored][stored], RGB and mask
 };
 
 }  // namespace tilegrad::train

@@ -21,7 +21,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train::task_test {
+namespace tilegrad::train::gan_task_test {
 
 const ProgressSink kSilent = [](const Progress&) {};
 
@@ -396,4 +396,4 @@ TEST(GanWatch, OneObjectAgainAndAgainHasNoSpread) {
   EXPECT_GT(collapsed->distance, alike->distance);
 }
 
-}  // namespace tilegrad::train::task_test
+}  // namespace tilegrad::train::gan_task_test
