@@ -117,8 +117,7 @@ Status CheckEffects(const DatasetOptions& options) {
     return InvalidArgument("--input: --source procedural reads no files; use --source folder");
   if (options.build.up != UpAxis::kY && (name == "procedural" || pictures))
     return InvalidArgument("--up: --source {} reads no mesh files", name);
-  if (options.build.up != UpAxis::kY && name != "folder" && name != "shapenet" &&
-      name != "sweethome3d")
+  if (options.build.up != UpAxis::kY && name != "folder" && name != "sweethome3d")
     return InvalidArgument("--up: --source {} has a fixed up axis", name);
   if (options.shares && ((pictures && name != "dibr") || listed)) {
     return InvalidArgument("--test-share, --validation-share: {} has a fixed split",

@@ -238,6 +238,7 @@ std::optional<std::string> FindByUri(const FileSource& source, const std::string
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out) {
   if (!image.ok()) {
     out.warnings.push_back(fmt::format("texture left out: {}", image.status().message()));
+    out.lost_appearance.push_back(image.status());
     return -1;
   }
   out.mesh.textures.push_back({image_name, ToColor(std::move(image).value())});
@@ -249,6 +250,7 @@ int AddTextureFile(const FileSource& source, const std::optional<std::string>& f
   if (!file) {
     out.warnings.push_back(
         fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
+    out.lost_appearance.push_back(NotFound("{}: no such texture", image_name));
     return -1;
   }
   // Not by name: an image inside the mesh may have the same one.

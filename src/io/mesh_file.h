@@ -39,7 +39,10 @@ struct MeshFilePart {
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
               // transforms applied, polygons split, normals unit, colours in [0, 1]
-  std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
+  std::vector<std::string> warnings;  // what was missing or dropped, and its substitute
+  // Of images and material libraries that the file names: why each is missing, or cannot be read.
+  // They are warnings, too.
+  std::vector<Status> lost_appearance;
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
   MeshFileTables tables;
   std::vector<MeshFilePart> parts;  // ascending; AC3D only

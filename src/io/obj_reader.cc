@@ -17,9 +17,9 @@ namespace {
 // The materials of all libraries of a file, by name.
 class ObjLibraries {
  public:
-  ObjLibraries(const FileSource& source, const std::string& obj_name,
-               std::vector<std::string>& warnings)
-      : source_(source), obj_name_(obj_name), warnings_(warnings) {}
+  // Warnings and losses go to `out`.
+  ObjLibraries(const FileSource& source, const std::string& obj_name, LoadedMesh& out)
+      : source_(source), obj_name_(obj_name), out_(out) {}
 
   // What follows mtllib: names, between spaces or quotes, or one that contains spaces.
   Status Read(std::string_view names) {
@@ -94,7 +94,7 @@ class ObjLibraries {
     TILEGRAD_ASSIGN(MtlLibrary library, ParseMtl(TextOf(bytes), place));
     for (MtlMaterial& material : library.materials) Define(std::move(material));
     if (!library.not_read.empty()) {
-      warnings_.push_back(
+      out_.warnings.push_back(
           fmt::format("{}: statements that are not read: {}", file, ShortList(library.not_read)));
     }
     return {};
@@ -106,7 +106,7 @@ class ObjLibraries {
       commented_.try_emplace(bare, material);
     const auto [found, added] = materials_.try_emplace(material.name, material);
     if (added || found->second == material) return;
-    warnings_.push_back(fmt::format(
+    out_.warnings.push_back(fmt::format(
         "material \"{}\" is defined more than once; the last one is used", found->first));
     found->second = std::move(material);
   }
@@ -115,14 +115,16 @@ class ObjLibraries {
   Status ReadFallback(const std::string& missing) {
     const std::string own = Path(obj_name_).stem().string() + ".mtl";
     const auto file = Find(own);
-    warnings_.push_back(fmt::format("material library \"{}\" not found{}", missing,
-                                    file ? "; " + own + " is read instead" : ""));
-    return file ? ReadFile(*file) : Status();
+    out_.warnings.push_back(fmt::format("material library \"{}\" not found{}", missing,
+                                        file ? "; " + own + " is read instead" : ""));
+    if (file) return ReadFile(*file);
+    out_.lost_appearance.push_back(NotFound("{}: no such material library", missing));
+    return {};
   }
 
   const FileSource& source_;
   const std::string& obj_name_;
-  std::vector<std::string>& warnings_;
+  LoadedMesh& out_;
   std::map<std::string, MtlMaterial> materials_;
   std::map<std::string, MtlMaterial> commented_;  // by names without their comments
   std::set<std::string> read_;
@@ -137,7 +139,7 @@ class ObjAssembly {
     out_.warnings = std::move(from_.warnings);
     out_.exact = std::move(from_.positions);
     out_.mesh.colors = std::move(from_.colors);
-    ObjLibraries libraries(source_, name_, out_.warnings);
+    ObjLibraries libraries(source_, name_, out_);
     for (const std::string& names : from_.libraries) TILEGRAD_TRY(libraries.Read(names));
     std::size_t first = 0;
     for (const ObjPolygon& polygon : from_.polygons) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models that lie in folders, one file each: any tree class/file, and ShapeNetCore.
+// Models that lie in folders, one file each: any tree class/file.
 #include <algorithm>
 #include <cctype>
 #include <set>
@@ -9,27 +9,19 @@
 #include "base/text.h"
 #include "io/mesh_file.h"
 #include "train/data/sources/model_source.h"
-#include "train/data/sources/split_list.h"
 
 namespace tilegrad::train {
 namespace {
 
 class FileModels : public ModelSource {
  public:
-  FileModels(std::string name, std::string credit, std::vector<SourceEntry> entries,
-             std::vector<IgnoredFile> ignored, std::string input = {})
-      : name_(std::move(name)),
-        credit_(std::move(credit)),
-        input_(std::move(input)),
-        entries_(std::move(entries)),
-        ignored_(std::move(ignored)) {
+  FileModels(std::vector<SourceEntry> entries, std::vector<IgnoredFile> ignored)
+      : entries_(std::move(entries)), ignored_(std::move(ignored)) {
     SortEntries(&entries_);
   }
   std::vector<IgnoredFile> ignored() const override { return ignored_; }
-  std::string input() const override { return input_; }
-  std::string name() const override { return name_; }
-  bool published() const override { return name_ == "shapenet"; }
-  std::vector<std::string> credits() const override { return {credit_}; }
+  std::string name() const override { return "folder"; }
+  std::vector<std::string> credits() const override { return {"Models of the user."}; }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(entries_[entry].file)));
@@ -37,7 +29,6 @@ class FileModels : public ModelSource {
   }
 
  private:
-  std::string name_, credit_, input_;
   std::vector<SourceEntry> entries_;
   std::vector<IgnoredFile> ignored_;
 };
@@ -125,44 +116,8 @@ Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
                         : fmt::format("; of what is there, {} {}{}", list.ignored[0].file,
                                       list.ignored[0].reason, ignored == 1 ? "" : ", and so on"));
   }
-  return std::unique_ptr<ModelSource>(std::make_unique<FileModels>(
-      "folder", "Models of the user.", std::move(list.entries), std::move(list.ignored)));
-}
-
-Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list) {
-  std::vector<SourceEntry> entries;
-  std::vector<IgnoredFile> ignored;
-  TILEGRAD_ASSIGN(const auto synsets, ListFolder(folder));
-  for (const Path& synset : synsets) {
-    const std::string id = synset.filename().string(), class_name = SynsetName(id);
-    if (class_name == id || !IsFolder(synset)) continue;
-    TILEGRAD_ASSIGN(const auto models, ListFolder(synset));
-    if (std::none_of(models.begin(), models.end(), IsFolder))
-      ignored.push_back({synset.string(), "holds no model: no class"});
-    for (const Path& model : models) {
-      const std::string name = model.filename().string();
-      const Listing listing = list.Of(id, name);
-      if (!IsFolder(model) || !listing.used) continue;
-      const Path v1 = model / "model.obj", v2 = model / "models" / "model_normalized.obj";
-      entries.push_back({class_name,
-                         SafeFileName(name),
-                         name,
-                         "ShapeNet terms of use",
-                         "",
-                         (PathExists(v1) ? v1 : v2).string(),
-                         listing.split,
-                         {}});
-    }
-  }
-  if (entries.empty()) {
-    return NotFound(
-        "{}: no models{}; expected <synset>/<model>/model.obj or "
-        "<synset>/<model>/models/model_normalized.obj",
-        folder.string(), list.empty() ? "" : " that the list names");
-  }
-  return std::unique_ptr<ModelSource>(std::make_unique<FileModels>(
-      "shapenet", "3D models: ShapeNetCore (Chang et al. 2015).", std::move(entries),
-      std::move(ignored), std::filesystem::absolute(folder).string()));
+  return std::unique_ptr<ModelSource>(
+      std::make_unique<FileModels>(std::move(list.entries), std::move(list.ignored)));
 }
 
 }  // namespace tilegrad::train

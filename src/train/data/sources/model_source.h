@@ -84,9 +84,8 @@ std::unique_ptr<ModelSource> CombineSources(std::string name,
 // folder within one.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
-// ShapeNetCore: folder/<synset>/<model>/models/model_normalized.obj (v2) or
-// folder/<synset>/<model>/model.obj (v1), axes as the files have them (y up), of the paper's 13
-// synsets; other folders are not looked at. A model without a file is an entry that cannot be
+// ShapeNetCore, version 1 or 2 (shapenet.cc), of the paper's 13 synsets; other folders are not
+// looked at. A model without a file, a texture or a material library is an entry that cannot be
 // loaded. With a list (split_list.h) only the models that it lists are used.
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list);
 

@@ -86,6 +86,31 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   EXPECT_NE(summary->ignored[1].file.find("notes.txt"), std::string::npos);
 }
 
+// Models that nobody published are used without their textures.
+TEST_F(SourcesTest, BrokenModelsOfAFolderCostThemselves) {
+  const std::string painted = std::string("mtllib m.mtl\nvt 0 0\nusemtl m\n") +
+                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n";
+  Write("set/none/faces.obj", "v 0 0 0\n");
+  Write("set/nan/vertex.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  for (const std::string name : {"missing", "cut"}) {
+    Write("set/" + name + "/m.obj", painted);
+    Write("set/" + name + "/m.mtl", "newmtl m\nmap_Kd m.png\n");
+  }
+  Write("set/cut/m.png", "\x89PNG\r\n\x1a\n");
+  std::filesystem::create_directory(folder_ / "set/empty");
+  BuildOptions options;
+  options.image_size = 8;
+  const StopFlag stop = false;
+  const auto source = Ok(FolderSource(folder_ / "set"));
+  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}, stop));
+  EXPECT_EQ(summary->models.size(), 2u);
+  ExpectIn(summary->broken.Summary(), "(none/faces)", "(nan/vertex)");
+  ASSERT_EQ(summary->warnings.size(), 2u);
+  ExpectIn(summary->warnings[0].file + summary->warnings[0].text, "cut/m.obj", "m.png");
+  ExpectIn(summary->warnings[1].file + summary->warnings[1].text, "missing/m.obj", "m.png");
+  ExpectIn(summary->ignored.back().file + summary->ignored.back().reason, "set/empty", "no model");
+}
+
 TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   Write("set/loose.obj", kTetrahedron);
   Write("set/deep/inner/a.obj", kTetrahedron);
