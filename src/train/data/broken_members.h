@@ -19,6 +19,7 @@ class BrokenMembers {
   void Add(const std::string& name, const std::string& reason) {
     members_.emplace_back(name, reason);
   }
+  std::size_t count() const { return members_.size(); }
   // InvalidArgument where more than kMostShare of `total` are broken, unless `allow`: how many, the
   // first of them, and that --allow-broken goes on without them.
   Status Check(std::size_t total, bool allow) const;

@@ -139,7 +139,7 @@ Result<WeakPerspective> ReadCamera(const MatPlace& anno, std::size_t index) {
 
 class CmrReader {
  public:
-  explicit CmrReader(Layout layout) : layout_(std::move(layout)) {}
+  CmrReader(Layout layout, BrokenMembers* broken) : layout_(std::move(layout)), broken_(broken) {}
 
   Result<PhotographSet> Read(const Path& folder) {
     set_.folder = folder;
@@ -169,7 +169,8 @@ class CmrReader {
     if (count == 0 || count > kMostKeypoints)
       return InvalidArgument("{}: {} keypoints", perm.where(), count);
     TILEGRAD_ASSIGN(const auto numbers, perm.Numbers(count));
-    for (const double n : numbers) set_.mirror.push_back(static_cast<int>(n) - 1);
+    for (const double n : numbers)
+      set_.mirror.push_back(static_cast<int>(std::clamp(n, 0.0, double(kMostKeypoints) + 1)) - 1);
     for (std::size_t k = 0; k < count; ++k) {
       const int m = set_.mirror[k];
       if (m < 0 || m >= static_cast<int>(count) ||
@@ -217,8 +218,12 @@ class CmrReader {
       return InvalidArgument("{} has {}, but {} has {}", anno_file.string(),
                              Count(images.places(), "picture"), sfm_file.string(),
                              Count(cameras.places(), "camera"));
-    for (std::size_t i = 0; i < images.places(); ++i)
-      TILEGRAD_TRY(ReadOne(images, cameras, i, split));
+    for (std::size_t i = 0; i < images.places(); ++i) {
+      const Status read = ReadOne(images, cameras, i, split);
+      if (!read.ok() && broken_ == nullptr) return read;
+      if (!read.ok())
+        broken_->Add(fmt::format("{}({})", anno_file.filename().string(), i + 1), read.message());
+    }
     if (split == Split::kTrain) TILEGRAD_TRY(ReadMeanShape(sfm));
     return {};
   }
@@ -265,16 +270,17 @@ class CmrReader {
   }
 
   Layout layout_;
+  BrokenMembers* broken_;  // null: broken photographs are errors
   PhotographSet set_;
 };
 
 }  // namespace
 
-Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder) {
+Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder, BrokenMembers* broken) {
   std::optional<Layout> layout = FindCub(folder);
   if (!layout) layout = FindPascal(folder);
   if (!layout) return std::optional<PhotographSet>();
-  TILEGRAD_ASSIGN(PhotographSet set, CmrReader(std::move(*layout)).Read(folder));
+  TILEGRAD_ASSIGN(PhotographSet set, CmrReader(std::move(*layout), broken).Read(folder));
   return std::optional(std::move(set));
 }
 

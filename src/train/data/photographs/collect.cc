@@ -14,6 +14,7 @@ Status TakePictures(const CollectionJob& job, const Path& images, const MemberWo
                     PhotographSet* set, CollectionSummary* summary) {
   std::vector<std::string> names;
   for (const Photograph& photo : set->photographs) names.push_back(photo.id);
+  const std::size_t total = names.size() + summary->broken.count();
   std::vector<char> good(names.size(), 0);
   const auto take = [&](std::size_t i, std::size_t) -> Status {
     const Photograph& photo = set->photographs[i];
@@ -25,7 +26,7 @@ Status TakePictures(const CollectionJob& job, const Path& images, const MemberWo
                            photo.mask.width, photo.mask.height);
   };
   TILEGRAD_TRY(TakeMembers(names, work, take, &summary->broken));
-  TILEGRAD_TRY(summary->broken.Check(names.size(), job.allow_broken));
+  TILEGRAD_TRY(summary->broken.Check(total, job.allow_broken));
   std::vector<Photograph> kept;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (good[i]) kept.push_back(std::move(set->photographs[i]));
@@ -39,12 +40,14 @@ Result<PhotographSet> CollectSet(const CollectionJob& job, const Path& folder,
   const bool pascal = job.source == "pascal3d";
   const Path images = folder / (pascal ? "Images" : "images");
   std::optional<PhotographSet> set;
+  BrokenMembers broken;
   if (job.masks.empty()) {
-    TILEGRAD_ASSIGN(set, OpenCmrLayout(job.input));
+    TILEGRAD_ASSIGN(set, OpenCmrLayout(job.input, &broken));
   }
   const bool other =
       set && (set->source != job.source || (pascal && set->class_name != job.class_name));
   if (set && !other) {
+    summary->broken = std::move(broken);
     TILEGRAD_TRY(TakePictures(job, images, work, &*set, summary));
     return std::move(*set);
   }

@@ -60,7 +60,7 @@ class Pascal3dReader {
 
   Result<std::vector<AnnotatedPhoto>> Read(const MemberWork& work) {
     for (const char* part : {"imagenet", "pascal"}) TILEGRAD_TRY(List(part));
-    TILEGRAD_ASSIGN(cad_, ReadCadModels(root_, job_.class_name));
+    TILEGRAD_ASSIGN(cad_, ReadCadModels(root_, job_.class_name, &summary_->broken));
     for (int w = 0; w < work.workers.count(); ++w)
       masks_.push_back(std::make_unique<Pascal3dMasks>(root_, job_.masks, cad_));
     std::vector<std::string> names;
@@ -71,7 +71,7 @@ class Pascal3dReader {
         names, work,
         [&](std::size_t i, std::size_t worker) { return ReadOne(i, worker, &found[i]); },
         &summary_->broken));
-    TILEGRAD_TRY(summary_->broken.Check(files_.size(), job_.allow_broken));
+    TILEGRAD_TRY(summary_->broken.Check(files_.size() + cad_.size(), job_.allow_broken));
     std::vector<AnnotatedPhoto> out;
     for (auto& some : found) std::ranges::move(some, std::back_inserter(out));
     return out;

@@ -40,17 +40,22 @@ Result<Mesh> ReadCadModel(const io::MatPlace& models, std::size_t index) {
   for (std::size_t i = 0; i < points; ++i)
     out.positions.push_back({static_cast<float>(v[i]), static_cast<float>(v[2 * points + i]),
                              static_cast<float>(-v[points + i])});
+  if (!std::ranges::all_of(f,
+                           [&](double corner) { return corner >= 1 && corner <= double(points); }))
+    return InvalidArgument("{}: corners beyond its {} vertices", faces.where(), points);
   for (std::size_t i = 0; i < triangles; ++i)
     out.faces.push_back({static_cast<std::int32_t>(f[i]) - 1,
                          static_cast<std::int32_t>(f[triangles + i]) - 1,
                          static_cast<std::int32_t>(f[2 * triangles + i]) - 1});
+  if (out.faces.empty()) return InvalidArgument("{}: no triangles in it", faces.where());
   TILEGRAD_TRY(Validate(out).Within(faces.where()));
   return out;
 }
 
 }  // namespace
 
-Result<std::vector<Mesh>> ReadCadModels(const Path& root, const std::string& class_name) {
+Result<std::vector<Mesh>> ReadCadModels(const Path& root, const std::string& class_name,
+                                        BrokenMembers* broken) {
   std::vector<Mesh> out;
   const Path file = root / "CAD" / (class_name + ".mat");
   if (!PathExists(file)) return out;
@@ -58,8 +63,10 @@ Result<std::vector<Mesh>> ReadCadModels(const Path& root, const std::string& cla
   TILEGRAD_ASSIGN(const io::MatPlace models, io::MatPlace::Variable(mat, class_name));
   TILEGRAD_TRY(models.ExpectStruct());
   for (std::size_t i = 0; i < models.places(); ++i) {
-    TILEGRAD_ASSIGN(Mesh mesh, ReadCadModel(models, i));
-    out.push_back(std::move(mesh));
+    auto mesh = ReadCadModel(models, i);
+    if (!mesh.ok())
+      broken->Add(fmt::format("CAD/{}.mat({})", class_name, i + 1), mesh.status().message());
+    out.push_back(mesh.ok() ? std::move(*mesh) : Mesh());
   }
   return out;
 }
@@ -81,7 +88,10 @@ Result<MaskOrigin> Pascal3dMasks::Find(const MaskRequest& request, PhotoMask* ma
   const Path voc = root_ / "PASCAL/VOCdevkit/VOC2012/SegmentationObject" / (stem + ".png");
   TILEGRAD_ASSIGN(const bool found, FromImage(voc, request, true, mask));
   if (found) return MaskOrigin::kVoc;
-  if (request.object.cad < 1 || request.object.cad > std::ssize(cad_)) return MaskOrigin::kNone;
+  const int cad = request.object.cad;
+  const bool whole =
+      cad >= 1 && cad <= std::ssize(cad_) && !cad_[static_cast<std::size_t>(cad) - 1].faces.empty();
+  if (!whole) return MaskOrigin::kNone;
   TILEGRAD_TRY(FromCad(request, mask));
   return IsEmpty(*mask) ? MaskOrigin::kNone : MaskOrigin::kCad;
 }

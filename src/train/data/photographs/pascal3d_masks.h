@@ -8,6 +8,7 @@
 
 #include "render/picture/picture.h"
 #include "scene/mesh.h"
+#include "train/data/broken_members.h"
 #include "train/data/photographs/pascal3d_record.h"
 
 namespace tilegrad::train {
@@ -23,8 +24,10 @@ enum class MaskOrigin {
 inline constexpr std::array<const char*, 4> kMaskOrigins = {
     "of the masks folder", "of PASCAL VOC", "drawn from CAD models", "without a mask"};
 
-// CAD/<class>.mat in the project's world (CameraOfViewpoint). None where there is no such file.
-Result<std::vector<Mesh>> ReadCadModels(const Path& root, const std::string& class_name);
+// CAD/<class>.mat in the project's world (CameraOfViewpoint). None where there is no such file; one
+// that is broken has no faces.
+Result<std::vector<Mesh>> ReadCadModels(const Path& root, const std::string& class_name,
+                                        BrokenMembers* broken);
 
 struct MaskRequest {
   const Pascal3dObject& object;

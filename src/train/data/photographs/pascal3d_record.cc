@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/pascal3d_record.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
@@ -10,6 +11,8 @@ namespace tilegrad::train {
 namespace {
 
 using io::MatPlace;
+
+constexpr double kMostCad = 1e6;  // models of a class; damaged files may say anything
 
 // Many fields are there for some objects only, or empty.
 double NumberOr(const MatPlace& record, std::size_t index, const char* name, double otherwise) {
@@ -57,7 +60,7 @@ std::optional<MatPlace> StructField(const MatPlace& record, std::size_t index, c
 Result<Pascal3dObject> ReadObject(const MatPlace& objects, std::size_t index) {
   Pascal3dObject out;
   out.number = static_cast<int>(index) + 1;
-  out.cad = static_cast<int>(NumberOr(objects, index, "cad_index", 0));
+  out.cad = static_cast<int>(std::clamp(NumberOr(objects, index, "cad_index", 0), 0.0, kMostCad));
   for (const char* flaw : {"truncated", "occluded", "difficult"})
     out.whole = out.whole && NumberOr(objects, index, flaw, 0) == 0;
   TILEGRAD_ASSIGN(const MatPlace bbox, objects.Field(index, "bbox"));

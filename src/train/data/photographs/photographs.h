@@ -25,6 +25,7 @@
 #include "base/file.h"
 #include "scene/image.h"
 #include "scene/weak_perspective.h"
+#include "train/data/broken_members.h"
 #include "train/data/dataset.h"
 
 namespace tilegrad::train {
@@ -85,8 +86,10 @@ Result<PhotographSet> OpenPhotographs(const Path& folder);
 // Errors: boxes, keypoints and cameras that are far from any picture.
 Status CheckPhotograph(const Photograph& photo);
 
-// The forms alone; nothing if the folder is not of that form.
-Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder);
+// The forms alone; nothing if the folder is not of that form. With `broken`, photographs whose
+// annotation makes no sense go there instead of ending it.
+Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder,
+                                                   BrokenMembers* broken = nullptr);
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder);
 
 // CUB's fifteen keypoints.

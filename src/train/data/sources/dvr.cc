@@ -10,6 +10,7 @@
 // p = camera_mat world_mat scale_mat p_object, with OpenCV's axes; p.xy / p.z is in [-1, 1] from
 // the upper left corner of the picture to its lower right. The object's longest side is that of the
 // unit cube around the origin, y up. scale_mat may be missing.
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -23,6 +24,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kDvrHalfExtent = 0.5;
+constexpr double kFarthestPoint = 1;  // that a point of an object of this size may be
 
 // `name` of the file as a 4 x 4 matrix; a file of three rows gets the last.
 Result<Mat4Array> DvrMatrix(const io::NpzArrays& arrays, const std::string& name) {
@@ -73,6 +75,9 @@ Status ReadDvrPoints(const Path& file, ModelData* truth) {
   TILEGRAD_ASSIGN(const std::vector<double> numbers, NumbersOf(array, "points"));
   if (array.shape.size() != 2 || array.shape[1] != 3 || numbers.empty())
     return DataLoss("{}: \"points\" must be [N,3]", file.string());
+  if (!std::ranges::all_of(numbers, [](double x) { return std::abs(x) <= kFarthestPoint; }))
+    return DataLoss("{}: a point that is not within {:g} of the origin", file.string(),
+                    kFarthestPoint);
   std::vector<glm::vec3> all;
   for (std::size_t i = 0; i < numbers.size(); i += 3)
     all.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "scene/weak_perspective_ref.h"
 #include "support/temp_folder.h"
 #include "train/config.h"
@@ -118,7 +120,7 @@ TEST_F(CollectTest, BrokenMembersOfPascal3dCostThemselves) {
   std::filesystem::remove(images / "n02814533_103.JPEG");
   CutFile(set.root() / "Annotations/car_imagenet/n02814533_105.mat");
   CollectionJob job{"pascal3d", folder_ / "p3d"};
-  ExpectMessage(Collect(job, "cars").status(), "3 of 18", "--allow-broken", "n02814533_101.mat");
+  ExpectMessage(Collect(job, "cars").status(), "3 of 20", "--allow-broken", "n02814533_101.mat");
   job.allow_broken = true;
   const auto made = Collect(job, "cars");
   ASSERT_TRUE(made.ok()) << made.status().message();
@@ -129,6 +131,36 @@ TEST_F(CollectTest, BrokenMembersOfPascal3dCostThemselves) {
   ExpectTrains("cars");
   job.class_name = "boat";
   ExpectMessage(Collect(job, "boats").status(), "no usable photograph of class boat");
+}
+
+// The first CAD model is nobody's; the second is everybody's.
+TEST_F(CollectTest, BrokenCadModelsOfPascal3dCostThemselves) {
+  const Pascal3dMiniature set(folder_ / "p3d", 12, 4);
+  const Path file = set.root() / "CAD/car.mat";
+  io::MatVariables cad = io::LoadMat(file).value().variables;
+  std::vector<io::MatArray>& fields = cad[0].second.elements;  // vertices, faces, ...
+  CollectionJob job{"pascal3d", folder_ / "p3d"};
+  const auto expect_one_broken = [&](const std::string& reason) {
+    ASSERT_TRUE(io::SaveMat(file, cad).ok());
+    ExpectMessage(Collect(job, "cars").status(), "1 of 20", "CAD/car.mat(1)", reason);
+  };
+  const io::MatArray whole = fields[1];
+  fields[1] = io::MatArray::Numbers({0, 3}, {});
+  expect_one_broken("no triangles");
+  fields[1] = io::MatArray::Numbers({1, 3}, std::vector<double>{1, 2, 1e300});
+  expect_one_broken("beyond its 3 vertices");
+  fields[1] = whole;
+  fields[0] = io::MatArray::Numbers({3, 3}, std::vector<double>(9, NAN));
+  expect_one_broken("not finite");
+  job.allow_broken = true;
+  const auto made = Collect(job, "cars");
+  ASSERT_TRUE(made.ok()) << made.status().message();
+  EXPECT_EQ(made->photographs, (std::array<int, 3>{13, 0, 5}));
+  fields[2] = fields[0];
+  ASSERT_TRUE(io::SaveMat(file, cad).ok());
+  const auto masked = Collect(job, "cars");  // by PASCAL VOC alone
+  ASSERT_TRUE(masked.ok()) << masked.status().message();
+  EXPECT_EQ(masked->notes.at("objects without a mask"), 16);
 }
 
 TEST_F(CollectTest, TakesMasksOfAFolder) {
@@ -176,6 +208,18 @@ TEST_F(CollectTest, BrokenPicturesOfCubCostThemselves) {
     EXPECT_GE(Iou(drawn, photo.mask), 0.98) << photo.id;
   }
   ExpectTrains("birds");
+  // An annotation that makes no sense.
+  const Path annotations = folder_ / "cub/cachedir/cub/data/test_cub_cleaned.mat";
+  io::MatVariables images = io::LoadMat(annotations).value().variables;
+  std::vector<io::MatArray>& fields = images[0].second.elements;
+  const auto mask = std::ranges::find(images[0].second.fields, "mask");
+  ASSERT_NE(mask, images[0].second.fields.end());
+  fields[static_cast<std::size_t>(mask - images[0].second.fields.begin())] =
+      io::MatArray::Mask(2, 2, {0, 0, 0, 0});
+  ASSERT_TRUE(io::SaveMat(annotations, images).ok());
+  job.allow_broken = false;
+  ExpectMessage(Collect(job, "birds").status(), "3 of 16", "test_cub_cleaned.mat(1)", "empty");
+  ExpectMessage(OpenPhotographs(folder_ / "cub").status(), "the mask is empty");
   ExpectMessage(Collect({"cub", folder_}, "none").status(), "train_cub_cleaned.mat");
 }
 

@@ -3,6 +3,8 @@
 // rule. The mesh that a set was rendered from, through the dataset's cameras, meets its masks.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "io/binvox.h"
 #include "io/npz.h"
 #include "render/picture/mesh_pictures.h"
@@ -233,6 +235,31 @@ TEST_F(BrokenMembersOfSets, Dibr) {
   std::filesystem::remove(Set() / models[7].synset / models[7].id / "7.npy");
   std::filesystem::create_directories(Set() / "04256520");
   ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "7.png", "7.npy");
+}
+
+// Meshes and points of renders are only for scores, but they are the model's.
+TEST_F(BrokenMembersOfSets, MeshesOfDibr) {
+  const auto models = MiniatureModels(0.45f);
+  WriteDibr(Set(), models);
+  const auto mesh = [&](int m) {
+    const auto& model = models[static_cast<std::size_t>(m)];
+    return "set/" + model.synset + "/" + model.id + "/model-0.45.obj";
+  };
+  Write(mesh(1), "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  Write(mesh(7), "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  std::filesystem::create_directories(Set() / "04256520");
+  ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "no triangles", "finite");
+}
+
+TEST_F(BrokenMembersOfSets, PointsOfDvr) {
+  const auto models = MiniatureModels(0.5f);
+  WriteDvr(Set(), models);
+  std::filesystem::create_directories(Set() / "04256520");
+  const std::pair<std::size_t, std::vector<float>> points[] = {{1, {0, NAN, 0}}, {7, {0, 0, 7e9f}}};
+  for (const auto& [m, point] : points)
+    Ok(io::SaveNpz(Set() / models[m].synset / models[m].id / "pointcloud.npz",
+                   {{"points", io::MakeNpy<float>({1, 3}, point)}}));
+  ExpectTwoBroken(Ok(DvrSource(Set(), {}, 64)).value(), "not within", "not within");
 }
 
 // Pictures of nothing, and a class without models.
