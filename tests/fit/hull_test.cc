@@ -121,6 +121,25 @@ TEST_F(Hull, HasNoMoreCellsThanImagesResolve) {
   EXPECT_LT(*std::max_element(grid->size.begin(), grid->size.end()), 2 * 16 / 0.5 + 9);
 }
 
+// No faces hold no handle: a ring has one, a box none.
+TEST_F(Hull, HasLargerCellsWhereItHasTooManyHandles) {
+  const Workers workers(2);
+  HullOptions no_faces;
+  no_faces.most_faces = 0;
+  const FitInput ring = Views(Torus(0.3f, 0.12f, 24, 12), 64);
+  const auto fine = HullMesh(ring, {}, workers), few = HullMesh(ring, no_faces, workers);
+  const double cell = CarveOptions().cell_pixels;
+  const auto coarse = HullMesh(ring, {.carve = {.cell_pixels = 2 * cell}}, workers);
+  ASSERT_TRUE(fine.ok() && few.ok() && coarse.ok());
+  EXPECT_EQ(few->positions, coarse->positions);
+  EXPECT_EQ(few->faces, coarse->faces);
+  EXPECT_NE(few->positions, fine->positions);
+  const FitInput box = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
+  const auto plain = HullMesh(box, {}, workers), none = HullMesh(box, no_faces, workers);
+  ASSERT_TRUE(plain.ok() && none.ok());
+  EXPECT_EQ(plain->positions, none->positions);
+}
+
 TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {
   const FitInput input = Views(Torus(0.3f, 0.12f, 24, 12), 64);
   const auto one = HullMesh(input, {}, Workers(1)), many = HullMesh(input, {}, Workers(5));

@@ -18,6 +18,10 @@ constexpr double kSpeckCells = 8;  // cells' volumes: parts of less are left out
 // the grid left without shrinking.
 constexpr float kShrink = 0.5f, kGrow = -0.53f;
 constexpr int kSmoothings = 3;
+// Leaves make hulls of thousands of handles, finer than what pixels show. Collapses remove none and
+// end at about so many faces for each (a hedge: 4,552 handles, 56,770 faces).
+constexpr std::size_t kFacesPerHandle = 12;
+constexpr double kCoarser = 2;  // cells where that is too many, by the side of those asked for
 
 void SmoothOnce(const Topology& topology, float factor, std::vector<glm::vec3>* positions) {
   const std::vector<glm::vec3> before(*positions);
@@ -79,16 +83,50 @@ void DropSpecks(double volume, Mesh* mesh) {
   });
 }
 
+// Of a closed manifold, its parts' genus: (2 parts - V + E - F) / 2, and E = 3 F / 2. No collapse
+// changes it.
+std::size_t Handles(const Mesh& mesh) {
+  std::vector<bool> used(mesh.positions.size(), false);
+  for (const Face& f : mesh.faces) {
+    for (const std::int32_t v : f) used[static_cast<std::size_t>(v)] = true;
+  }
+  const std::vector<std::int32_t> parts = PartsOf(mesh);
+  std::size_t vertices = 0, count = 0;
+  for (std::size_t v = 0; v < used.size(); ++v) {
+    if (!used[v]) continue;
+    ++vertices;
+    count += parts[v] == static_cast<std::int32_t>(v);
+  }
+  return (2 * count + mesh.faces.size() / 2 - vertices) / 2;
+}
+
+struct CarvedMesh {
+  Mesh mesh;
+  double cell = 0;  // world units
+};
+
+Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
+                             const Workers& workers, const Watch& watch) {
+  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options, workers, watch));
+  CarvedMesh out{LevelSet(grid), static_cast<double>(grid.cell)};
+  DropSpecks(kSpeckCells * std::pow(out.cell, 3), &out.mesh);
+  return out;
+}
+
 }  // namespace
 
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
                       const Watch& watch) {
-  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options.carve, workers, watch));
-  Mesh mesh = LevelSet(grid);
-  DropSpecks(kSpeckCells * std::pow(static_cast<double>(grid.cell), 3), &mesh);
+  CarveOptions carve = options.carve;
+  TILEGRAD_ASSIGN(CarvedMesh carved, CarveMesh(input, carve, workers, watch));
+  if (Handles(carved.mesh) > options.most_faces / kFacesPerHandle) {
+    carve.cell_pixels *= kCoarser;
+    TILEGRAD_ASSIGN(carved, CarveMesh(input, carve, workers, watch));
+  }
+  Mesh& mesh = carved.mesh;
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
-  const double pixel = static_cast<double>(grid.cell) / options.carve.cell_pixels;
+  const double pixel = carved.cell / carve.cell_pixels;
   const double patch = options.patch_pixels * pixel;
   const auto faces = static_cast<std::uint64_t>(mesh.faces.size());
   const auto told = [&watch, faces](std::size_t left) {

@@ -12,8 +12,9 @@ struct HullOptions {
   // Pixels of an image where the object is: how far the surface may move to have fewer faces, and
   // the longest edge.
   double error_pixels = 0.25, longest_pixels = 16;
-  double patch_pixels = 1.5;        // side of the patch that may move as far (scene/simplify.h)
-  std::size_t most_faces = 40'000;  // `error_pixels` yields to it
+  double patch_pixels = 1.5;  // side of the patch that may move as far (scene/simplify.h)
+  // `error_pixels` yields to it; a surface too ragged for so few is carved anew with larger cells.
+  std::size_t most_faces = 40'000;
 };
 
 // A closed manifold of any genus and number of parts, but for specks of less than a few cells.
