@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "base/error.h"
+#include "fit/hull/hollows.h"
 #include "scene/simplify.h"
 #include "scene/topology.h"
 
@@ -107,7 +108,8 @@ struct CarvedMesh {
 
 Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
                              const Workers& workers, const Watch& watch) {
-  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options, workers, watch));
+  TILEGRAD_ASSIGN(ScalarGrid grid, Carve(input, options, workers, watch));
+  TILEGRAD_TRY(CarveHollows(input, workers, watch, &grid));
   CarvedMesh out{LevelSet(grid), static_cast<double>(grid.cell)};
   DropSpecks(kSpeckCells * std::pow(out.cell, 3), &out.mesh);
   return out;

@@ -17,7 +17,8 @@ struct HullOptions {
   std::size_t most_faces = 40'000;
 };
 
-// A closed manifold of any genus and number of parts, but for specks of less than a few cells.
+// A closed manifold of any genus and number of parts, but for specks of less than a few cells; the
+// hull less the hollows that colours show (hollows.h).
 // Errors: as Carve.
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
                       const Watch& watch = {});

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/hull/hollows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fit/hull/carve.h"
+#include "fit/hull/cell_distance.h"
+#include "fit/make_views.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+#include "train/metrics/metrics.h"
+
+namespace tilegrad::train::hollows_test {
+
+TEST(CellDistance, IsThatToTheNearestEmptyCell) {
+  constexpr std::array<int, 3> kCells = {7, 9, 6};
+  const auto at = [&](int i, int j, int k) {
+    return static_cast<std::size_t>((i * kCells[1] + j) * kCells[2] + k);
+  };
+  std::vector<std::uint8_t> full(7 * 9 * 6, 1);
+  full[at(2, 7, 3)] = full[at(5, 4, 2)] = 0;
+  const auto empty = [&](int i, int j, int k) {
+    return i < 0 || j < 0 || k < 0 || i >= kCells[0] || j >= kCells[1] || k >= kCells[2] ||
+           full[at(i, j, k)] == 0;
+  };
+  const std::vector<float> found = DistanceToEmpty(full, kCells, Workers(2));
+  for (int i = 0; i < kCells[0]; ++i)
+    for (int j = 0; j < kCells[1]; ++j)
+      for (int k = 0; k < kCells[2]; ++k) {
+        double least = 1e9;
+        for (int x = -1; x <= kCells[0]; ++x)
+          for (int y = -1; y <= kCells[1]; ++y)
+            for (int z = -1; z <= kCells[2]; ++z)
+              if (empty(x, y, z)) least = std::min(least, std::hypot(x - i, y - j, z - k));
+        EXPECT_NEAR(found[at(i, j, k)], least, 1e-5) << i << ", " << j << ", " << k;
+      }
+}
+
+class Hollows : public TempFolderTest {
+ protected:
+  FitInput Views(const Mesh& mesh) {
+    const Status made = MakeViews(mesh, {.views = 24, .held_out = 0, .size = 128},
+                                  folder_ / "views", OutputGuard(true), {}, stop_);
+    EXPECT_TRUE(made.ok()) << made.message();
+    auto input = ReadFitFolder(folder_ / "views", 0);
+    EXPECT_TRUE(input.ok()) << input.status().message();
+    return std::move(*input);
+  }
+  // The hull, and what is left of it.
+  struct Grids {
+    ScalarGrid hull, hollow;
+  };
+  static Grids Carved(const FitInput& input, int workers = 2) {
+    auto grid = Carve(input, {}, Workers(workers));
+    EXPECT_TRUE(grid.ok()) << grid.status().message();
+    Grids out{*grid, *grid};
+    const Status found = CarveHollows(input, Workers(workers), {}, &out.hollow);
+    EXPECT_TRUE(found.ok()) << found.message();
+    return out;
+  }
+  static double Iou(const Mesh& truth, const ScalarGrid& grid) {
+    return VoxelIou(*Voxelize(truth, 32), *Voxelize(LevelSet(grid), 32));
+  }
+  StopFlag stop_ = false;
+};
+
+constexpr glm::vec3 kSize = {0.9f, 0.5f, 0.7f};
+constexpr float kWall = 0.05f;
+
+void AddBox(glm::vec3 low, glm::vec3 high, glm::vec4 color, Mesh* mesh) {
+  Mesh box = Box(0.5f * (low + high), high - low);
+  SetColor(box, color);
+  Append(*mesh, box);
+}
+
+// Without a lid; each side has a colour of its own, or all are grey.
+Mesh OpenBox(bool colored) {
+  const auto color = [&](glm::vec4 c) { return colored ? c : glm::vec4(0.7f, 0.7f, 0.7f, 1); };
+  const glm::vec3 h = 0.5f * kSize;
+  Mesh mesh;
+  AddBox(-h, {h.x, -h.y + kWall, h.z}, color({0.9f, 0.8f, 0.2f, 1}), &mesh);
+  AddBox(-h, {-h.x + kWall, h.y, h.z}, color({0.8f, 0.2f, 0.2f, 1}), &mesh);
+  AddBox({h.x - kWall, -h.y, -h.z}, h, color({0.2f, 0.3f, 0.8f, 1}), &mesh);
+  AddBox(-h, {h.x, h.y, -h.z + kWall}, color({0.2f, 0.7f, 0.3f, 1}), &mesh);
+  AddBox({-h.x, -h.y, h.z - kWall}, h, color({0.9f, 0.9f, 0.9f, 1}), &mesh);
+  return mesh;
+}
+
+TEST_F(Hollows, OfAnOpenBoxAreCarved) {
+  const Mesh truth = OpenBox(true);
+  const Grids grids = Carved(Views(truth));
+  EXPECT_LT(Iou(truth, grids.hull), 0.5);
+  EXPECT_GT(Iou(truth, grids.hollow), 0.8);
+}
+
+// Only the shading of the sides and their edges tell.
+TEST_F(Hollows, OfAGreyBoxAreCarvedWhereShadingTells) {
+  const Mesh truth = OpenBox(false);
+  const Grids grids = Carved(Views(truth));
+  EXPECT_GT(Iou(truth, grids.hollow), 0.7);
+}
+
+TEST_F(Hollows, AreNotInAClosedBox) {
+  Mesh box = OpenBox(true);
+  AddBox({-0.45f, 0.2f, -0.35f}, {0.45f, 0.25f, 0.35f}, {0.5f, 0.3f, 0.6f, 1}, &box);
+  const Grids grids = Carved(Views(box));
+  EXPECT_EQ(grids.hull.values, grids.hollow.values);
+}
+
+TEST_F(Hollows, AreTheSameForAnyNumberOfWorkers) {
+  const FitInput input = Views(OpenBox(true));
+  EXPECT_EQ(Carved(input, 1).hollow.values, Carved(input, 5).hollow.values);
+}
+
+}  // namespace tilegrad::train::hollows_test
