@@ -28,7 +28,7 @@ constexpr float kFloors[] = {0, 0.08f, 0.15f, 0.22f, 0.3f, 0.45f, 0.6f, 0.75f, 0
 constexpr float kTapers[] = {0, 0.15f, 0.3f, 0.6f, 1};
 constexpr float kReaches[] = {4, 2, 8, 16};
 constexpr HollowShape kWidest = {.wall = 1.5f, .reach = 10};
-constexpr int kRounds = 2;
+constexpr int kSweeps = 2;
 // Of numbers whose scores differ by less than this share of the gain, the first in its list: the
 // floor of a cup of one colour gives no evidence, and is then as thick as the walls.
 constexpr double kTie = 0.02;
@@ -41,6 +41,8 @@ constexpr float kDoubtfulColumn = 0.015f, kDoubtfulShare = 0.35f;
 constexpr int kColumnReach = 2;   // cells around a column that its mean is over
 constexpr int kColumnMargin = 3;  // cells that are added around columns in doubt
 
+// Heights of flat lids, shares of the rim's.
+constexpr float kLids[] = {0.95f, 1};
 // What convinces.
 constexpr double kMostLeft = 0.7, kLeastGain = 0.004;
 constexpr std::size_t kLeastPixels = 60;
@@ -129,9 +131,15 @@ class HollowSearch {
     }
     if (!rim.has_value()) return std::nullopt;
     const Lookers lookers = LookersInto(rim->Hollow(kWidest));
-    ScalarGrid hollow = rim->Hollow(Refined(*rim, lookers, best.shape));
+    HollowShape shape = Refined(*rim, lookers, best.shape);
+    ScalarGrid hollow = rim->Hollow(shape);
     FillUnproven(lookers, &hollow);
-    if (!KeepConvincing(lookers, &hollow)) return std::nullopt;
+    std::vector<ScalarGrid> lids;
+    for (const float height : kLids) {
+      shape.floor = height;
+      lids.push_back(rim->Hollow(shape));
+    }
+    if (!KeepConvincing(lookers, lids, &hollow)) return std::nullopt;
     hull_ = Less(hull_, hollow);
     views_.Look(seeing_, hull_, workers_);
     agreement_ = views_.Agree(seeing_, workers_);
@@ -280,7 +288,7 @@ class HollowSearch {
       const auto first = std::ranges::find_if(scores, [&](double s) { return s <= enough; });
       shape.*number = values[static_cast<std::size_t>(first - scores.begin())];
     };
-    for (int i = 0; i < kRounds; ++i) {
+    for (int i = 0; i < kSweeps; ++i) {
       const HollowShape before = shape;
       sweep(&HollowShape::wall, kWalls);
       sweep(&HollowShape::floor, kFloors);
@@ -332,21 +340,38 @@ class HollowSearch {
     hollow->values[cell] = std::min(hollow->values[cell], -0.5f * hollow->cell);
   }
 
-  // Leaves the parts for which colours speak; false if there is none.
-  bool KeepConvincing(const Lookers& lookers, ScalarGrid* hollow) {
-    const Insight seen = LookThrough(lookers, *hollow, 1);
+  // Differences of colours through a hollow; those on the hull where its inside is not known.
+  std::vector<float> DifferencesThrough(const Lookers& lookers, const ScalarGrid& hollow) {
+    const auto seen = LookThrough(lookers, hollow, 1).agreement;
+    std::vector<float> out = lookers.before;
+    for (std::size_t i = 0; i < out.size(); ++i)
+      if (seen[i].known) out[i] = seen[i].difference;
+    return out;
+  }
+
+  // Leaves the parts for which colours speak; false if there is none. Beside the hull itself, what
+  // a part must be better than is a lid that is flat, at the rim or just below: below a lid of one
+  // colour any hollow agrees, and what it gains is that the lid no longer bulges.
+  bool KeepConvincing(const Lookers& lookers, std::span<const ScalarGrid> lids,
+                      ScalarGrid* hollow) {
     const std::vector<int> parts = PartsOf(*hollow);
-    const int count = *std::ranges::max_element(parts);
-    std::vector<Evidence> evidence(static_cast<std::size_t>(count) + 1);
-    for (std::size_t i = 0; i < lookers.pixels.size(); ++i) {
-      const auto part = static_cast<std::size_t>(PartBehind(lookers.pixels[i], parts));
-      const auto& now = seen.agreement[i];
-      evidence[part].Add(lookers.before[i], now.known ? now.difference : lookers.before[i]);
-    }
-    evidence[0] = {};
+    const auto count = static_cast<std::size_t>(*std::ranges::max_element(parts)) + 1;
+    std::vector<char> convinces(count, 1);
+    convinces[0] = 0;
+    const std::vector<float> after = DifferencesThrough(lookers, *hollow);
+    const auto compare = [&](const std::vector<float>& before) {
+      std::vector<Evidence> evidence(count);
+      for (std::size_t i = 0; i < after.size(); ++i)
+        evidence[static_cast<std::size_t>(PartBehind(lookers.pixels[i], parts))].Add(before[i],
+                                                                                     after[i]);
+      for (std::size_t part = 0; part < count; ++part)
+        if (!evidence[part].convinces()) convinces[part] = 0;
+    };
+    compare(lookers.before);
+    for (const ScalarGrid& lid : lids) compare(DifferencesThrough(lookers, lid));
     for (std::size_t i = 0; i < parts.size(); ++i)
-      if (!evidence[static_cast<std::size_t>(parts[i])].convinces()) Close(i, hollow);
-    return std::ranges::any_of(evidence, [](const Evidence& e) { return e.convinces(); });
+      if (!convinces[static_cast<std::size_t>(parts[i])]) Close(i, hollow);
+    return std::ranges::find(convinces, 1) != convinces.end();
   }
 
   // The part of a hollow that a pixel looks into; 0: none.

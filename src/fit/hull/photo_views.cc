@@ -28,31 +28,31 @@ Camera Scaled(Camera camera, float factor) {
   return camera;
 }
 
-glm::vec3 RowOf(const Camera& camera, int i) {
+glm::vec3 CameraAxis(const Camera& camera, int i) {
   const float* r = camera.rotation + 3 * i;
   return {r[0], r[1], r[2]};
 }
 
 // To the world's axes.
-glm::vec3 Turned(const Camera& camera, glm::vec3 p) {
-  return RowOf(camera, 0) * p.x + RowOf(camera, 1) * p.y + RowOf(camera, 2) * p.z;
+glm::vec3 InWorld(const Camera& camera, glm::vec3 p) {
+  return CameraAxis(camera, 0) * p.x + CameraAxis(camera, 1) * p.y + CameraAxis(camera, 2) * p.z;
 }
 
-glm::vec3 EyeOf(const Camera& camera) {
+glm::vec3 CameraCentre(const Camera& camera) {
   const float* t = camera.translation;
-  return -Turned(camera, {t[0], t[1], t[2]});
+  return -InWorld(camera, {t[0], t[1], t[2]});
 }
 
 // Pixels, pixels, depth.
-glm::vec3 Project(const Camera& camera, glm::vec3 p) {
+glm::vec3 ProjectInto(const Camera& camera, glm::vec3 p) {
   const float* t = camera.translation;
-  const float depth = -(glm::dot(RowOf(camera, 2), p) + t[2]);
-  return {camera.cx + camera.fx * (glm::dot(RowOf(camera, 0), p) + t[0]) / depth,
-          camera.cy - camera.fy * (glm::dot(RowOf(camera, 1), p) + t[1]) / depth, depth};
+  const float depth = -(glm::dot(CameraAxis(camera, 2), p) + t[2]);
+  return {camera.cx + camera.fx * (glm::dot(CameraAxis(camera, 0), p) + t[0]) / depth,
+          camera.cy - camera.fy * (glm::dot(CameraAxis(camera, 1), p) + t[1]) / depth, depth};
 }
 
 // The depths between which a ray is in the grid; empty if first > second.
-std::pair<float, float> Within(const ScalarGrid& grid, glm::vec3 eye, glm::vec3 along) {
+std::pair<float, float> DepthsWithin(const ScalarGrid& grid, glm::vec3 eye, glm::vec3 along) {
   const glm::vec3 high =
       grid.low + grid.cell * glm::vec3(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);
   const glm::vec3 a = (grid.low - eye) / along, b = (high - eye) / along;
@@ -90,7 +90,7 @@ PhotoViews::PhotoViews(const FitInput& input, const ScalarGrid& solid, const Wor
     const auto v = static_cast<std::size_t>(input.training[i]);
     View& view = views_[i];
     view.camera = Scaled(input.cameras[v], factor);
-    view.eye = EyeOf(view.camera);
+    view.eye = CameraCentre(view.camera);
     view.color = std::span(images_.color).subspan(3 * v * plane, 3 * plane);
     view.alpha = std::span(images_.alpha).subspan(v * plane, plane);
     view.depth.assign(plane, HUGE_VALF);
@@ -159,14 +159,14 @@ glm::vec3 PhotoViews::Along(const View& view, std::uint32_t at) const {
   const auto width = static_cast<std::uint32_t>(images_.width);
   const float x = static_cast<float>(at % width) + 0.5f, y = static_cast<float>(at / width) + 0.5f;
   const Camera& c = view.camera;
-  return Turned(c, {(x - c.cx) / c.fx, -(y - c.cy) / c.fy, -1});
+  return InWorld(c, {(x - c.cx) / c.fx, -(y - c.cy) / c.fy, -1});
 }
 
 // The first depth beyond `from` at which the ray is in the solid.
 float PhotoViews::March(const View& view, std::uint32_t at, float from,
                         const ScalarGrid& solid) const {
   const glm::vec3 along = Along(view, at);
-  const auto [near, far] = Within(solid, view.eye, along);
+  const auto [near, far] = DepthsWithin(solid, view.eye, along);
   const float step = kStepCells * solid.cell / glm::length(along);
   float before = -solid.cell;
   for (float depth = std::max(near, from); depth <= far; depth += step) {
@@ -178,7 +178,7 @@ float PhotoViews::March(const View& view, std::uint32_t at, float from,
 }
 
 bool PhotoViews::Sees(const View& view, glm::vec3 point, glm::vec3* color) const {
-  const glm::vec3 at = Project(view.camera, point);
+  const glm::vec3 at = ProjectInto(view.camera, point);
   const float x = at.x - 0.5f, y = at.y - 0.5f;
   if (!(at.z > 0 && x >= 0 && y >= 0 && x < static_cast<float>(images_.width - 1) &&
         y < static_cast<float>(images_.height - 1)))
