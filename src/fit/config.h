@@ -56,7 +56,7 @@ struct FitConfig {
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
-  // area: -1: 0.3 from a hull, else 0; falls with rates.
+  // area: -1: 0.3 from a hull without hollows, else 0; falls with rates.
   RegularizerWeights regularizers = {.area = -1};
   // Share of the steps until cameras move: those that are nearly right wait for shape and texture.
   // 0 where the start is the object's own shape.

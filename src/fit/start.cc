@@ -75,10 +75,17 @@ Result<int> UnwrapRagged(int side, Mesh* mesh) {
   }
 }
 
-Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watch& watch) {
+// Where a scene without a given mesh comes from.
+struct Origin {
+  bool hull = false, hollow = false;
+  std::string note;  // what is in doubt, and why there is no hull where one was tried
+};
+
+Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watch& watch,
+                           Origin* origin) {
   HullOptions options;
   options.carve.tolerance = job.config.mask_tolerance;
-  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers, watch));
+  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers, watch, &origin->hollow));
   int size = job.config.texture_size;
   if (!job.config.vertex_colors) {
     TILEGRAD_TRY(watch.At({"placing the texture", 0, 0, ""}));
@@ -90,22 +97,21 @@ Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watc
   return scene;
 }
 
-// `note` gets what is in doubt, and why there is no hull where one was tried.
 Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, const Watch& watch,
-                               bool* from_hull, std::string* note) {
+                               Origin* origin) {
   const FitConfig& config = job.config;
   TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(job.input));
-  *note = sphere.doubt;
-  *from_hull = config.start == StartShape::kHull;
-  if (*from_hull) return HullScene(job, workers, watch);
+  origin->note = sphere.doubt;
+  origin->hull = config.start == StartShape::kHull;
+  if (origin->hull) return HullScene(job, workers, watch, origin);
   const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
   if (config.start == StartShape::kAuto && job.input.masked && known_cameras &&
       job.input.training.size() >= kLeastHullViews && sphere.doubt.empty()) {
-    auto hull = HullScene(job, workers, watch);
-    *from_hull = hull.ok();
+    auto hull = HullScene(job, workers, watch, origin);
+    origin->hull = hull.ok();
     if (hull.ok() || hull.status().code() == StatusCode::kCancelled) return hull;
-    *note = fmt::format("the fit starts from a sphere, because there is no hull: {}",
-                        hull.status().message());
+    origin->note = fmt::format("the fit starts from a sphere, because there is no hull: {}",
+                               hull.status().message());
   }
   return SphereScene(job, sphere);
 }
@@ -245,12 +251,15 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Wat
     return InvalidArgument("the images have no masks, which `tilegrad fit` would look for first");
   }
   FitStart start;
-  bool from_hull = false;
-  TILEGRAD_ASSIGN(start.scene, job.start.has_value()
-                                   ? MeshScene(job)
-                                   : TemplateScene(job, workers, watch, &from_hull, &start.note));
+  Origin origin;
+  TILEGRAD_ASSIGN(start.scene, job.start.has_value() ? MeshScene(job)
+                                                     : TemplateScene(job, workers, watch, &origin));
+  start.note = origin.note;
+  start.config = job.config;
+  // A smaller area closes a hollow: the lid is smaller than what is below it.
+  if (origin.hollow && start.config.regularizers.area < 0) start.config.regularizers.area = 0;
   start.config =
-      ResolveDefaults(job.config, from_hull, {job.input.images.width, job.input.images.height});
+      ResolveDefaults(start.config, origin.hull, {job.input.images.width, job.input.images.height});
   SetCameras(job, &start.scene);
   SetLight(start.config, &start.scene);
   const bool blank = !job.start.has_value() || !HasColors(*job.start);

@@ -43,8 +43,8 @@ TEST(CellDistance, IsThatToTheNearestEmptyCell) {
 class Hollows : public TempFolderTest {
  protected:
   FitInput Views(const Mesh& mesh) {
-    const Status made = MakeViews(mesh, {.views = 24, .held_out = 0, .size = 128},
-                                  folder_ / "views", OutputGuard(true), {}, stop_);
+    const Status made = MakeViews(mesh, {.views = 24, .held_out = 0, .size = 96}, folder_ / "views",
+                                  OutputGuard(true), {}, stop_);
     EXPECT_TRUE(made.ok()) << made.message();
     auto input = ReadFitFolder(folder_ / "views", 0);
     EXPECT_TRUE(input.ok()) << input.status().message();
@@ -58,8 +58,9 @@ class Hollows : public TempFolderTest {
     auto grid = Carve(input, {}, Workers(workers));
     EXPECT_TRUE(grid.ok()) << grid.status().message();
     Grids out{*grid, *grid};
-    const Status found = CarveHollows(input, Workers(workers), {}, &out.hollow);
-    EXPECT_TRUE(found.ok()) << found.message();
+    const auto found = CarveHollows(input, Workers(workers), {}, &out.hollow);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    EXPECT_EQ(*found, out.hull.values != out.hollow.values);
     return out;
   }
   static double Iou(const Mesh& truth, const ScalarGrid& grid) {

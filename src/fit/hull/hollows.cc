@@ -419,19 +419,21 @@ class HollowSearch {
 
 }  // namespace
 
-Status CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
-                    ScalarGrid* hull) {
+Result<bool> CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
+                          ScalarGrid* hull) {
   const Progress now = {"looking for hollows", 0, 0, ""};
   TILEGRAD_TRY(watch.At(now));
   const int longest = std::max({hull->size[0], hull->size[1], hull->size[2]});
   HollowSearch search(input, EveryNth(*hull, (longest + kMostCells - 1) / kMostCells), workers);
+  bool found = false;
   for (int i = 0; i < kMostHollows; ++i) {
     TILEGRAD_TRY(watch.At(now));
     const auto hollow = search.Next();
     if (!hollow.has_value()) break;
     Subtract(*hollow, workers, hull);
+    found = true;
   }
-  return {};
+  return found;
 }
 
 }  // namespace tilegrad::train

@@ -16,8 +16,8 @@ namespace tilegrad::train {
 // no three views agree to see through. It must leave at most 0.7 of the difference of its lid, and
 // 0.004 less (colours in [0, 1]); otherwise the hull keeps its bits. What is below a lid of one
 // colour, or of colours that change with the view, stays full. A pure function of its input for any
-// number of workers. kCancelled.
-Status CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
-                    ScalarGrid* hull);
+// number of workers. Returns whether there is a hollow, or kCancelled.
+Result<bool> CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
+                          ScalarGrid* hull);
 
 }  // namespace tilegrad::train

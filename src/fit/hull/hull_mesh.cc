@@ -104,13 +104,14 @@ std::size_t Handles(const Mesh& mesh) {
 struct CarvedMesh {
   Mesh mesh;
   double cell = 0;  // world units
+  bool hollow = false;
 };
 
 Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
                              const Workers& workers, const Watch& watch) {
   TILEGRAD_ASSIGN(ScalarGrid grid, Carve(input, options, workers, watch));
-  TILEGRAD_TRY(CarveHollows(input, workers, watch, &grid));
-  CarvedMesh out{LevelSet(grid), static_cast<double>(grid.cell)};
+  TILEGRAD_ASSIGN(const bool hollow, CarveHollows(input, workers, watch, &grid));
+  CarvedMesh out{LevelSet(grid), static_cast<double>(grid.cell), hollow};
   DropSpecks(kSpeckCells * std::pow(out.cell, 3), &out.mesh);
   return out;
 }
@@ -118,13 +119,14 @@ Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
 }  // namespace
 
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
-                      const Watch& watch) {
+                      const Watch& watch, bool* hollow) {
   CarveOptions carve = options.carve;
   TILEGRAD_ASSIGN(CarvedMesh carved, CarveMesh(input, carve, workers, watch));
   if (Handles(carved.mesh) > options.most_faces / kFacesPerHandle) {
     carve.cell_pixels *= kCoarser;
     TILEGRAD_ASSIGN(carved, CarveMesh(input, carve, workers, watch));
   }
+  if (hollow != nullptr) *hollow = carved.hollow;
   Mesh& mesh = carved.mesh;
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
