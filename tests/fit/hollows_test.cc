@@ -10,6 +10,7 @@
 #include "fit/hull/carve.h"
 #include "fit/hull/cell_distance.h"
 #include "fit/make_views.h"
+#include "fit/run.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/metrics/metrics.h"
@@ -110,6 +111,18 @@ TEST_F(Hollows, AreNotInAClosedBox) {
   AddBox({-0.45f, 0.2f, -0.35f}, {0.45f, 0.25f, 0.35f}, {0.5f, 0.3f, 0.6f, 1}, &box);
   const Grids grids = Carved(Views(box));
   EXPECT_EQ(grids.hull.values, grids.hollow.values);
+}
+
+// The area's pull would close them.
+TEST_F(Hollows, TurnTheDefaultWeightOfTheAreaOff) {
+  FitJob job;
+  job.config.vertex_colors = true;
+  job.input = Views(OpenBox(true));
+  const auto open = PrepareFit(job, Workers(2));
+  ASSERT_TRUE(open.ok()) << open.status().message();
+  EXPECT_EQ(open->config.regularizers.area, 0);
+  job.config.regularizers.area = 0.2;
+  EXPECT_EQ(PrepareFit(job, Workers(2))->config.regularizers.area, 0.2);
 }
 
 TEST_F(Hollows, AreTheSameForAnyNumberOfWorkers) {
