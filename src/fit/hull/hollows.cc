@@ -44,7 +44,8 @@ constexpr int kColumnMargin = 3;  // cells that are added around columns in doub
 // Heights of flat lids, shares of the rim's.
 constexpr float kLids[] = {0.95f, 1};
 // What convinces.
-constexpr double kMostLeft = 0.7, kLeastGain = 0.004;
+constexpr double kMostOfHull = 0.7, kMostOfLid = 0.85;  // of the difference on either
+constexpr double kLeastGain = 0.004;
 constexpr std::size_t kLeastPixels = 60;
 
 constexpr float kTolerated = 0.004f;  // what the rays through a cell may lose, mean
@@ -91,8 +92,8 @@ struct Evidence {
     after += static_cast<double>(is);
     ++pixels;
   }
-  bool convinces() const {
-    return pixels >= kLeastPixels && after < kMostLeft * before &&
+  bool convinces(double most_left) const {
+    return pixels >= kLeastPixels && after < most_left * before &&
            before - after > kLeastGain * static_cast<double>(pixels);
   }
 };
@@ -359,16 +360,16 @@ class HollowSearch {
     std::vector<char> convinces(count, 1);
     convinces[0] = 0;
     const std::vector<float> after = DifferencesThrough(lookers, *hollow);
-    const auto compare = [&](const std::vector<float>& before) {
+    const auto compare = [&](const std::vector<float>& before, double most_left) {
       std::vector<Evidence> evidence(count);
       for (std::size_t i = 0; i < after.size(); ++i)
         evidence[static_cast<std::size_t>(PartBehind(lookers.pixels[i], parts))].Add(before[i],
                                                                                      after[i]);
       for (std::size_t part = 0; part < count; ++part)
-        if (!evidence[part].convinces()) convinces[part] = 0;
+        if (!evidence[part].convinces(most_left)) convinces[part] = 0;
     };
-    compare(lookers.before);
-    for (const ScalarGrid& lid : lids) compare(DifferencesThrough(lookers, lid));
+    compare(lookers.before, kMostOfHull);
+    for (const ScalarGrid& lid : lids) compare(DifferencesThrough(lookers, lid), kMostOfLid);
     for (std::size_t i = 0; i < parts.size(); ++i)
       if (!convinces[static_cast<std::size_t>(parts[i])]) Close(i, hollow);
     return std::ranges::find(convinces, 1) != convinces.end();

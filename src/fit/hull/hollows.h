@@ -12,11 +12,12 @@ namespace tilegrad::train {
 // Takes hollows that open upwards (+y) out of a hull (Carve). In a picture that looks into a
 // hollow, the lid that the hull has over it shows colours on which the views disagree. Shapes of a
 // few numbers (hollow_shape.h) are proposed below every lid; that with the least difference of
-// colours between each view and the others, seen through the hollow, is taken, less the cells that
-// no three views agree to see through. It must leave at most 0.7 of the difference of its lid, and
-// 0.004 less (colours in [0, 1]); otherwise the hull keeps its bits. What is below a lid of one
-// colour, or of colours that change with the view, stays full. A pure function of its input for any
-// number of workers. Returns whether there is a hollow, or kCancelled.
+// colours between each view and the others, seen through the hollow, is taken, less the cells
+// through which views agree less than on the lid. It must leave at most 0.7 of the difference of
+// its lid and 0.85 of that of a flat one, and 0.004 less than either (colours in [0, 1]); otherwise
+// the hull keeps its bits. What is below a lid of one colour, or of colours that change with the
+// view, stays full. A pure function of its input for any number of workers. Returns whether there
+// is a hollow, or kCancelled.
 Result<bool> CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
                           ScalarGrid* hull);
 
