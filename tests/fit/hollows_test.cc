@@ -121,8 +121,6 @@ TEST_F(Hollows, TurnTheDefaultWeightOfTheAreaOff) {
   const auto open = PrepareFit(job, Workers(2));
   ASSERT_TRUE(open.ok()) << open.status().message();
   EXPECT_EQ(open->config.regularizers.area, 0);
-  job.config.regularizers.area = 0.2;
-  EXPECT_EQ(PrepareFit(job, Workers(2))->config.regularizers.area, 0.2);
 }
 
 TEST_F(Hollows, AreTheSameForAnyNumberOfWorkers) {
