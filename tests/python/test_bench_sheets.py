@@ -39,8 +39,8 @@ class BenchSheets(FolderTest):
                          4 * white + [51] * 2 + white + [52] * 2 + 4 * white + [13] * 2)
         self.assertRaisesRegex(ValueError, "different objects", sheet.beside,
                                [summaries[0], summaries[0][:1]], layout)
-        self.assertRaisesRegex(ValueError, "no 3 columns", sheet.cells, summaries[0],
-                               sheet.Layout(3, (0,), (1,), (2,), 1))
+        self.assertRaisesRegex(ValueError, "no 5 columns", sheet.cells, summaries[0],
+                               sheet.Layout(5, (0,), (1,), (2,), 1))
 
     def test_of_runs(self) -> None:
         sheet = sheets()
