@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes from images, by a network that `tilegrad train` has trained.
 
-    predictor = Predictor("runs/demo")                     # or Predictor(): weights that come along
+    predictor = Predictor("runs/demo")                     # or Predictor(): installed weights
     mesh = predictor.predict(load_image("chair.png"))      # a cut-out: RGBA
     save_mesh("chair.glb", mesh)
 """
@@ -27,7 +27,7 @@ class Predictor:
     process it is loaded again at the first call, with one thread.
 
     path: a run folder, whose newest whole checkpoint is taken, one checkpoint, a file of weights, or
-        the name of weights that come along. None: those of them for cut-outs.
+        the name of installed weights. None: the installed ones for cut-outs.
     threads: as of `tilegrad.Renderer`; the result does not depend on it.
     OSError, ValueError: name the file and what is wrong.
     """

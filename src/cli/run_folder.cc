@@ -124,8 +124,8 @@ Result<Path> ChooseRun(const std::string& given, const char* otherwise) {
   if (otherwise == nullptr) return none;
   auto weights = train::WeightsNamed(otherwise);
   if (!weights.ok()) return NotFound("{}; {}", none.message(), weights.status().message());
-  PrintRemark("{}: using the weights \"{}\" that come along; --run chooses others\n",
-              weights->string(), otherwise);
+  PrintRemark("{}: using the installed weights \"{}\"; --run chooses others\n", weights->string(),
+              otherwise);
   return weights;
 }
 

@@ -38,7 +38,7 @@ Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const Out
 Status CheckIsRun(const Path& folder);
 // What --run says it takes where weights do as well as a run.
 inline constexpr const char* kRunOrWeights =
-    "run folder, checkpoint, file of weights or name of weights that come along";
+    "run folder, checkpoint, file of weights or name of installed weights";
 // `given`, a path or the name of weights. If that is empty: the run below runs/ whose last
 // checkpoint is the newest; if there is none, the weights of the name `otherwise`. A note on the
 // terminal says which. An error if there is neither.

@@ -30,13 +30,12 @@ Path WeightsFolder() {
 Status NoWeights(const std::string& name) {
   const std::vector<std::string> names = NamedWeights();
   if (!names.empty())
-    return NotFound("there are no weights \"{}\"; those that come along are {}", name,
-                    fmt::join(names, ", "));
+    return NotFound("no weights \"{}\" are installed; there are {}", name, fmt::join(names, ", "));
   const Path folder = WeightsFolder();
   const std::string place =
       folder.empty() ? std::string(kWeightsPlace) + " above the program" : folder.string();
   return NotFound(
-      "no weights come along with this tilegrad (none in {}); name a run of tilegrad train, or set "
+      "no weights are installed (none in {}); name a run of tilegrad train, or set "
       "{} to a folder that has {}{}",
       place, kWeightsVariable, name, kWeightsEnding);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weights that come along: networks that the program, the Python module and their installation
-// bring with them, so that both predict without a training. A file NAME.safetensors for each, as
+// Installed weights: networks in a folder that the program and the Python module find by
+// themselves, so that both predict without a training. A file NAME.safetensors for each, as
 // `tilegrad export` writes it (run/checkpoint.h: WriteWeights).
 //
 //   share/tilegrad/weights    in the folder of the program or module, or in one above it

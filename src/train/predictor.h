@@ -22,7 +22,7 @@ namespace tilegrad::train {
 class Predictor {
  public:
   // `path`: a run folder (its newest whole checkpoint is taken), one checkpoint, a file of weights
-  // or the name of weights that come along. Errors name the file and what is wrong.
+  // or the name of installed weights. Errors name the file and what is wrong.
   static Result<Predictor> Load(const Path& path, const Workers& workers);
 
   // A file of what predicts, with those credits of its training data and CarriedFiles of its run:

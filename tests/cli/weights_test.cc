@@ -142,7 +142,7 @@ TEST_F(Weights, ComeAlongByName) {
   ExpectDone("predict --run furniture" + to, Alone());
   const Bytes named = ReadFile(folder_ / "out/view_predicted.glb").value();
   ExpectIn(ExpectDone("predict --force" + to, Alone()),
-           "using the weights \"furniture\" that come along");
+           "using the installed weights \"furniture\"");
   EXPECT_EQ(ReadFile(folder_ / "out/view_predicted.glb").value(), named);
   ExpectIn(ExpectDone("sample --count 2 --out " + In("s"), Alone()), "\"car-generator\"");
   EXPECT_TRUE(Exists("s/sample_002.glb"));
@@ -161,13 +161,13 @@ TEST_F(Weights, ThatAreMissingAreToldOf) {
   const Outcome other = RunProgram("predict --run cars" + to, Alone());
   EXPECT_EQ(other.exit_code, 3);
   ExpectIn(other.output, "cars: no run or file has that path",
-           "those that come along are car-generator, furniture");
+           "there are car-generator, furniture");
   const std::string nowhere = "cd " + folder_.string() + " && TILEGRAD_WEIGHTS=" + In("none") + " ";
   for (const char* command : {"predict", "sample"}) {
     const Outcome none =
         RunProgram(command + (std::string(command) == "predict" ? to : " --out x"), nowhere);
     EXPECT_EQ(none.exit_code, 3);
-    ExpectIn(none.output, "no run with a checkpoint below runs/", "no weights come along",
+    ExpectIn(none.output, "no run with a checkpoint below runs/", "no weights are installed",
              In("none"));
   }
 }

@@ -121,7 +121,7 @@ class Predict(FolderTest):
         expected = self._python(files.Predictor(run()).predict(image, refine=0))
         for predictor in (files.Predictor(), files.Predictor("furniture")):
             self.assertEqual(self._python(predictor.predict(image, refine=0)), expected)
-        self.assertRaisesRegex(FileNotFoundError, "come along are furniture", files.Predictor,
+        self.assertRaisesRegex(FileNotFoundError, "there are furniture", files.Predictor,
                                "cars")
 
     def test_grey_images_with_alpha_are_cut_outs(self) -> None:
