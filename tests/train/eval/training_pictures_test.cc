@@ -57,7 +57,10 @@ class TrainingPicturesTest : public TempFolderTest {
     info.recipe = "0000000000000000";
     info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
     info.views = kViews;
-    ImageStore store{.bytes = {}, .cameras = {}, .models = models, .views = kViews, .size = kSize};
+    ImageStore store;
+    store.models = models;
+    store.views = kViews;
+    store.size = kSize;
     Bytes bytes;
     std::vector<ModelInfo> infos;
     for (int m = 0; m < models; ++m) {
