@@ -159,7 +159,8 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   const Path folder = train::RunFolderOf(run), file = folder / "run.json";
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
   if (IsFile(folder))
-    return NotFound("{}: a file of weights names no dataset; name it with --data", run.string());
+    return NotFound("{}: not a run folder; a file of weights names no dataset: name it with --data",
+                    run.string());
   if (!PathExists(file)) {
     return NotFound("{}: not a run folder of tilegrad train: there is no run.json in it",
                     folder.string());

@@ -196,7 +196,7 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^Imf.*"), {"src/io/exr_"}},
       {std::regex("^webp/.*"), {"src/io/webp_"}},
       {std::regex("^mpi\\.h$"), {"src/train/ranks/mpi_transport.cc"}},
-      {std::regex("^dlfcn\\.h$"), {"src/train/ranks/launch.cc"}},
+      {std::regex("^(dlfcn|link)\\.h$"), {"src/base/own_binary.cc", "src/train/ranks/launch.cc"}},
       {std::regex("^Eigen/.*"), {"src/train/dense.cc", "src/fit/diffusion.cc"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/", "src/fit/"}},
       {std::regex("^CLI/.*"), {"src/cli/command_line.cc"}},
