@@ -14,10 +14,10 @@ namespace tilegrad::train {
 // few numbers (hollow_shape.h) are proposed below every lid; that with the least difference of
 // colours between each view and the others, seen through the hollow, is taken, less the cells
 // through which views agree less than on the lid. It must leave at most 0.7 of the difference of
-// its lid and 0.85 of that of a flat one, and 0.004 less than either (colours in [0, 1]); otherwise
-// the hull keeps its bits. What is below a lid of one colour, or of colours that change with the
-// view, stays full. A pure function of its input for any number of workers. Returns whether there
-// is a hollow, or kCancelled.
+// its lid and 0.85 of that of a flat one, 0.004 less than either (colours in [0, 1]), and be a
+// twentieth of the hull; otherwise the hull keeps its bits. What is below a lid of one colour, or
+// of colours that change with the view, stays full. A pure function of its input for any number of
+// workers. Returns whether there is a hollow, or kCancelled.
 Result<bool> CarveHollows(const FitInput& input, const Workers& workers, const Watch& watch,
                           ScalarGrid* hull);
 

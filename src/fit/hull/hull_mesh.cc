@@ -14,8 +14,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kLargeHollow = 0.05;  // share of the hull
-constexpr double kSpeckCells = 8;      // cells' volumes: parts of less are left out
+constexpr double kSpeckCells = 8;  // cells' volumes: parts of less are left out
 // Taubin's two steps (A signal processing approach to fair surface design, 1995), which smooth what
 // the grid left without shrinking.
 constexpr float kShrink = 0.5f, kGrow = -0.53f;
@@ -108,16 +107,10 @@ struct CarvedMesh {
   bool hollow = false;
 };
 
-double Inside(const ScalarGrid& grid) {
-  return static_cast<double>(std::ranges::count_if(grid.values, [](float v) { return v > 0; }));
-}
-
 Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
                              const Workers& workers, const Watch& watch) {
   TILEGRAD_ASSIGN(ScalarGrid grid, Carve(input, options, workers, watch));
-  const double hull = Inside(grid);
-  TILEGRAD_ASSIGN(const bool found, CarveHollows(input, workers, watch, &grid));
-  const bool hollow = found && hull - Inside(grid) > kLargeHollow * hull;
+  TILEGRAD_ASSIGN(const bool hollow, CarveHollows(input, workers, watch, &grid));
   CarvedMesh out{LevelSet(grid), static_cast<double>(grid.cell), hollow};
   DropSpecks(kSpeckCells * std::pow(out.cell, 3), &out.mesh);
   return out;

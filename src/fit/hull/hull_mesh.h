@@ -18,8 +18,8 @@ struct HullOptions {
 };
 
 // A closed manifold of any genus and number of parts, but for specks of less than a few cells; the
-// hull less the hollows that colours show (hollows.h); `hollow` gets whether they are a twentieth
-// of the hull or more. Errors: as Carve.
+// hull less the hollows that colours show (hollows.h); `hollow` gets whether there are any.
+// Errors: as Carve.
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
                       const Watch& watch = {}, bool* hollow = nullptr);
 
