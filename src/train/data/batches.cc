@@ -31,7 +31,7 @@ Result<std::vector<Camera>> LoadStoreCameras(const Dataset& dataset,
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
                                   const Workers& workers, const ProgressSink& progress,
                                   const StopFlag& stop, std::size_t in_memory) {
-  const PictureWork work{workers, progress, stop};
+  const Watch watch{progress, &stop};
   ImageStore store;
   store.models = static_cast<int>(models.size());
   store.views = dataset.info().views;
@@ -39,7 +39,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
   TILEGRAD_ASSIGN(store.cameras, LoadStoreCameras(dataset, models));
   const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
   if (per_model * models.size() > in_memory) {
-    TILEGRAD_ASSIGN(auto pack, OpenPicturePack(dataset, work));
+    TILEGRAD_ASSIGN(auto pack, OpenPicturePack(dataset, workers, watch));
     if (pack) {
       store.bytes = std::move(*pack);
       store.rows = models;
@@ -47,7 +47,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
     }
   }
   store.bytes.Resize(per_model * models.size());
-  TILEGRAD_TRY(UnpackPictures(dataset, models, work, [&](std::size_t i, auto images) {
+  TILEGRAD_TRY(UnpackPictures(dataset, models, workers, watch, [&](std::size_t i, auto images) {
     std::ranges::copy(images, store.bytes.begin() + i * per_model);
     return Status();
   }));

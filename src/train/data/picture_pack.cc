@@ -54,11 +54,11 @@ bool EndsWith(const Path& file, std::size_t size, const std::string& line) {
   return in.read(found.data(), static_cast<std::streamsize>(found.size())) && found == line;
 }
 
-Status WritePack(const Dataset& dataset, const std::string& line, const PictureWork& work,
-                 PartsFile* file) {
+Status WritePack(const Dataset& dataset, const std::string& line, const Workers& workers,
+                 const Watch& watch, PartsFile* file) {
   const std::size_t each = BytesOfModel(dataset.info());
   const std::vector<int> all = AllModels(dataset);
-  TILEGRAD_TRY(UnpackPictures(dataset, all, work, [&](std::size_t m, auto images) {
+  TILEGRAD_TRY(UnpackPictures(dataset, all, workers, watch, [&](std::size_t m, auto images) {
     return file->Write(m * each, images);
   }));
   const auto* const end = reinterpret_cast<const std::uint8_t*>(line.data());
@@ -69,29 +69,29 @@ Status WritePack(const Dataset& dataset, const std::string& line, const PictureW
 }  // namespace
 
 Status UnpackPictures(const Dataset& dataset, const std::vector<int>& models,
-                      const PictureWork& work,
+                      const Workers& workers, const Watch& watch,
                       FunctionRef<Status(std::size_t, std::span<const std::uint8_t>)> take) {
   std::vector<Status> failures(models.size());
   std::mutex mutex;
   std::uint64_t done = 0;
-  work.workers.For(models.size(), [&](std::size_t i, std::size_t) {
-    if (work.stop) return;
+  workers.For(models.size(), [&](std::size_t i, std::size_t) {
+    if (watch.stopped()) return;
     const auto images = dataset.LoadImages(models[i]);
     failures[i] = images.ok() ? take(i, *images) : images.status();
     const std::scoped_lock lock(mutex);
-    if (work.progress) work.progress({"loading images", ++done, models.size(), ""});
+    if (watch.progress) watch.progress({"loading images", ++done, models.size(), ""});
   });
-  if (work.stop) return Cancelled("stopped while loading the dataset");
+  if (watch.stopped()) return Cancelled("stopped while loading the dataset");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
   return {};
 }
 
-Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset,
-                                                    const PictureWork& work) {
+Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset, const Workers& workers,
+                                                    const Watch& watch) {
   const Path file = PicturesPath(dataset.folder());
   const std::size_t size = dataset.models().size() * BytesOfModel(dataset.info());
-  TILEGRAD_ASSIGN(const std::string line, LastLine(dataset, work.workers));
-  for (; !work.stop; std::this_thread::sleep_for(kPause)) {
+  TILEGRAD_ASSIGN(const std::string line, LastLine(dataset, workers));
+  for (; !watch.stopped(); std::this_thread::sleep_for(kPause)) {
     if (EndsWith(file, size, line)) {
       TILEGRAD_ASSIGN(ScratchBytes mapped, ScratchBytes::OfFile(file, size));
       return std::optional(std::move(mapped));
@@ -101,7 +101,7 @@ Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset,
     RemoveTemporariesOf(file);
     auto created = PartsFile::Create(file, size + line.size());
     if (!created.ok()) return std::optional<ScratchBytes>();
-    TILEGRAD_TRY(WritePack(dataset, line, work, &*created));
+    TILEGRAD_TRY(WritePack(dataset, line, workers, watch, &*created));
   }
   return Cancelled("stopped while loading the dataset");
 }

@@ -3,8 +3,7 @@
 // and minutes to unpack at each start.
 //
 //   <dataset>/pictures.bin   [models][views][4][size][size] bytes in the order of models.jsonl,
-//   then
-//                            a line with the format and a checksum over the model files
+//                            then a line with the format and a checksum over the model files
 //
 // It stands for the model files as long as that line does; the next training writes another.
 #pragma once
@@ -20,22 +19,16 @@
 
 namespace tilegrad::train {
 
-struct PictureWork {
-  const Workers& workers;
-  const ProgressSink& progress;
-  const StopFlag& stop;
-};
-
-// take(i, the images of models[i]), from any thread. Errors: kCancelled when `stop` is set; of a
+// take(i, the images of models[i]), from any thread. Errors: kCancelled; of a
 // model file, which is named; of `take`.
 Status UnpackPictures(const Dataset& dataset, const std::vector<int>& models,
-                      const PictureWork& work,
+                      const Workers& workers, const Watch& watch,
                       FunctionRef<Status(std::size_t, std::span<const std::uint8_t>)> take);
 
 // The file's pictures, mapped; it is written first if it is missing, or of other model files. One
 // process writes at a time, and the others wait for it. Nothing where the folder may not be written
 // to, or the disk is too full. Errors: as above.
-Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset,
-                                                    const PictureWork& work);
+Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset, const Workers& workers,
+                                                    const Watch& watch);
 
 }  // namespace tilegrad::train
