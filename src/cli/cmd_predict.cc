@@ -401,7 +401,7 @@ void AddPredict(CommandList* list) {
                "images of an object: cut out (RGBA), on a plain background, or with --mask",
                {Required{}});
   command->Add("--run", &options->run,
-               fmt::format("{} [the newest run below runs/, else {}]", kRunOrWeights,
+               fmt::format("{} [the newest run below runs/, else {} if installed]", kRunOrWeights,
                            train::kCutoutWeights));
   command->Add("--out", &options->out,
                "folder for NAME_predicted.glb, NAME_turntable.png and NAME_turntable.webp (an "

@@ -238,7 +238,7 @@ void AddSample(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "sample", "Generate textured 3D objects with a trained generator", RunSampling);
   command->Add("--run", &options->run,
-               fmt::format("{} [the newest run below runs/, else {}]", kRunOrWeights,
+               fmt::format("{} [the newest run below runs/, else {} if installed]", kRunOrWeights,
                            train::kGeneratorWeights));
   command->Add("--count", &options->count, "objects", {Range{1, 999}});
   command->Add("--out", &options->out,
