@@ -25,32 +25,6 @@ template_level = 1
 steps = 1
 batch = 2
 )";
-constexpr const char* kGan = R"(name = "gan"
-[task]
-kind = "gan"
-[network]
-noise = 4
-shape_noise = 2
-hidden = 8
-template_level = 1
-texture_size = 16
-texture_base = 2
-texture_most = 4
-output_deviation = 0.1
-[critic]
-views = 1
-base = 2
-halvings = 2
-[stages]
-shape = 1
-[textures]
-count = 8
-[score]
-count = 8
-[schedule]
-steps = 2
-batch = 2
-)";
 
 // One run for all tests.
 class Sample : public ProgramTest {
@@ -59,7 +33,7 @@ class Sample : public ProgramTest {
     runs_ = Path(testing::TempDir()) / ("tilegrad_sample_runs_" + std::to_string(::getpid()));
     std::filesystem::create_directories(runs_);
     ASSERT_TRUE(WriteTextAtomic(runs_ / "textured.toml", kTextured).ok());
-    ASSERT_TRUE(WriteTextAtomic(runs_ / "gan.toml", kGan).ok());
+    ASSERT_TRUE(WriteTextAtomic(runs_ / "gan.toml", kTwoStepGan).ok());
     const std::string data = " --data " + Run("d");
     ExpectDone("dataset --source procedural --per-class 4 --size 16 --views 2 --out " + Run("d"));
     ExpectDone("train --config " + Run("textured.toml") + data + " --out " + Run("t"));

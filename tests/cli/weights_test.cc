@@ -14,30 +14,6 @@ namespace tilegrad::weights_test {
 
 using Json = nlohmann::json;
 
-constexpr const char* kGan = R"(name = "gan"
-[task]
-kind = "gan"
-[network]
-noise = 4
-shape_noise = 2
-hidden = 8
-template_level = 1
-texture_size = 16
-texture_base = 2
-texture_most = 4
-[critic]
-views = 1
-base = 2
-halvings = 2
-[stages]
-shape = 2
-[score]
-count = 8
-[schedule]
-steps = 2
-batch = 2
-)";
-
 // Data, a run of each kind and their weights, for all tests.
 class Weights : public ProgramTest {
  protected:
@@ -46,9 +22,9 @@ class Weights : public ProgramTest {
     std::filesystem::create_directories(shared_ / "weights");
     MakeData(Shared("d"));
     MakeRun(Shared("d"), Shared("image"));
-    ASSERT_TRUE(WriteTextAtomic(shared_ / "gan.toml", kGan).ok());
+    ASSERT_TRUE(WriteTextAtomic(shared_ / "gan.toml", kTwoStepGan).ok());
     ExpectDone("train --config " + Shared("gan.toml") + " --data " + Shared("d") + " --out " +
-               Shared("gan"));
+               Shared("gan") + " --set stages.shape=2");
     Export("image", "weights/furniture.safetensors", " --half");
     Export("gan", "weights/car-generator.safetensors", " --half");
     Export("image", "full.safetensors");

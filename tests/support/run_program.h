@@ -30,6 +30,34 @@ inline Outcome RunProgram(const std::string& arguments, const std::string& befor
   return outcome;
 }
 
+// A GAN of two steps, one of shapes and one of textures, which need a run (textures.run).
+inline constexpr const char* kTwoStepGan = R"(name = "gan"
+[task]
+kind = "gan"
+[network]
+noise = 4
+shape_noise = 2
+hidden = 8
+template_level = 1
+texture_size = 16
+texture_base = 2
+texture_most = 4
+output_deviation = 0.1
+[critic]
+views = 1
+base = 2
+halvings = 2
+[stages]
+shape = 1
+[textures]
+count = 8
+[score]
+count = 8
+[schedule]
+steps = 2
+batch = 2
+)";
+
 // A fixture that calls the program, with a folder of its own.
 class ProgramTest : public TempFolderTest {
  protected:
