@@ -38,7 +38,7 @@ class Sample : public ProgramTest {
     ExpectDone("dataset --source procedural --per-class 4 --size 16 --views 2 --out " + Run("d"));
     ExpectDone("train --config " + Run("textured.toml") + data + " --out " + Run("t"));
     ExpectDone("train --config " + Run("gan.toml") + data + " --out " + Run("g") +
-               " --set textures.run=" + Run("t"));
+               " --set stages.shape=1 --set textures.run=" + Run("t"));
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(runs_); }
 

@@ -24,7 +24,7 @@ class Weights : public ProgramTest {
     MakeRun(Shared("d"), Shared("image"));
     ASSERT_TRUE(WriteTextAtomic(shared_ / "gan.toml", kTwoStepGan).ok());
     ExpectDone("train --config " + Shared("gan.toml") + " --data " + Shared("d") + " --out " +
-               Shared("gan") + " --set stages.shape=2");
+               Shared("gan"));
     Export("image", "weights/furniture.safetensors", " --half");
     Export("gan", "weights/car-generator.safetensors", " --half");
     Export("image", "full.safetensors");

@@ -30,7 +30,7 @@ inline Outcome RunProgram(const std::string& arguments, const std::string& befor
   return outcome;
 }
 
-// A GAN of two steps, one of shapes and one of textures, which need a run (textures.run).
+// A GAN of two steps, of shapes alone.
 inline constexpr const char* kTwoStepGan = R"(name = "gan"
 [task]
 kind = "gan"
@@ -48,7 +48,7 @@ views = 1
 base = 2
 halvings = 2
 [stages]
-shape = 1
+shape = 2
 [textures]
 count = 8
 [score]
