@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Faces that come projected (render/projected) and lists of the nearest faces
-// (compat/pytorch3d/layered_raster.h), float and double, one worker, against every face for every
+// (compat/pytorch3d_raster.h), float and double, one worker, against every face for every
 // pixel in the same process. Counter: pixels a second.
 #include <benchmark/benchmark.h>
 
@@ -9,8 +9,7 @@
 
 #include "compat/kaolin/face_visibility_ref.h"
 #include "compat/kaolin/projected_raster.h"
-#include "compat/kaolin/projected_soft_mask.h"
-#include "compat/pytorch3d/layered_raster.h"
+#include "compat/pytorch3d_raster.h"
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
 

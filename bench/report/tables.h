@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "report/measurements.h"
-#include "train/report/log_plot.h"
+#include "train/report/html.h"
 
 namespace tilegrad::bench {
 

@@ -12,8 +12,8 @@
 #include <string>
 
 #include "raster/bench_scenes.h"
+#include "rivals/face_corners.h"
 #include "rivals/n3mr_ref.h"
-#include "rivals/projection.h"
 #include "rivals/renderer.h"
 #include "rivals/softras_ref.h"
 

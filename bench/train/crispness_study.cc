@@ -14,8 +14,8 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/metrics/frechet.h"
-#include "train/metrics/high_pass.h"
+#include "train/metrics/metrics.h"
+#include "train/metrics/set_scores.h"
 #include "train/predictor.h"
 #include "train/tasks/classify/perceptual_network.h"
 #include "train/tasks/textured_image/held_out_views.h"

@@ -11,8 +11,8 @@
 
 #include "nn/nn.h"
 #include "train/models/classifier.h"
+#include "train/tasks/classify/model.h"
 #include "train/tasks/classify/perceptual_network.h"
-#include "train/tasks/classify/pictures.h"
 
 namespace tilegrad::train {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
-#include "io/glb_writer.h"
 #include "io/mesh_file.h"
 #include "render/picture/mesh_scene.h"
 

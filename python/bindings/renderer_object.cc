@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <string_view>
 #include <type_traits>
-#include <utility>
 
 namespace tilegrad::python {
 namespace {

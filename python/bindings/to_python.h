@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/escape_text.h"
 #include "base/read_budget.h"
+#include "base/text.h"
 #include "bindings/arrays.h"
 
 namespace tilegrad::python {

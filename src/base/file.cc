@@ -16,7 +16,6 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/read_budget.h"
-#include "base/shortage.h"
 
 namespace tilegrad {
 namespace {

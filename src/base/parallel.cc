@@ -7,12 +7,8 @@
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <exception>
-#include <mutex>
-#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>

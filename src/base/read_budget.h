@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "tilegrad/status.h"
@@ -41,6 +42,27 @@ class ReadBudget {
   Result<std::size_t> limit_;
   std::size_t taken_ = 0;
   Status refused_;
+};
+
+// Refusals of the system for lack of resources: file handles, memory, processes. They say nothing
+// about the file being read, which must be reported neither as damaged nor as missing.
+
+// Whether an errno is such a refusal.
+bool IsShortage(int error);
+// Remembers it, for watches, if it is one. Thread-safe.
+void NoteShortage(int error);
+
+// Readers put substitutes in place of what they cannot get (a texture, a material library), and
+// libraries call all that fails corrupt. Their callers watch for a refusal in the meantime; one
+// in another thread only makes both try again.
+class ShortageWatch {
+ public:
+  ShortageWatch();
+  // An error, "place: the system refused ...", if there was a shortage since.
+  Status Check(const std::string& place) const;
+
+ private:
+  std::uint64_t before_;
 };
 
 }  // namespace tilegrad

@@ -28,7 +28,7 @@ namespace {
 
 // A bright sky above, some more from +z.
 constexpr std::array<float, 9> kSky = {2.5f, -0.6f, 0.4f, 0, 0, 0, 0, 0, 0};
-// The same in the axes of a mesh whose z or x is up (scene/up_axis.h).
+// The same in the axes of a mesh whose z or x is up (scene/mesh.h).
 constexpr std::array<float, 9> kSkyOfZ = {2.5f, 0.4f, 0.6f, 0, 0, 0, 0, 0, 0};
 constexpr std::array<float, 9> kSkyOfX = {2.5f, 0, 0.4f, -0.6f, 0, 0, 0, 0, 0};
 

@@ -12,14 +12,13 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "io/mesh_file.h"
 #include "io/webp_animation.h"
 #include "render/picture/composite.h"
 #include "train/named_weights.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/scores.h"
-#include "train/tasks/gan/sheet.h"
 
 namespace tilegrad::cli {
 namespace {

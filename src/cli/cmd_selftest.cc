@@ -14,7 +14,7 @@
 #include "cli/run_folder.h"
 #include "proof/selftest/check.h"
 #include "tilegrad/version.h"
-#include "train/run/header.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -10,7 +10,6 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "base/escape_text.h"
 #include "base/progress.h"
 #include "base/text.h"
 #include "tilegrad/status.h"

@@ -6,7 +6,7 @@
 
 #include "cli/command.h"
 #include "io/mesh_file.h"
-#include "scene/up_axis.h"
+#include "scene/mesh.h"
 
 namespace tilegrad::cli {
 

@@ -12,7 +12,7 @@
 #include "io/exr_file.h"
 #include "io/image_file.h"
 #include "io/npz.h"
-#include "scene/srgb.h"
+#include "scene/image.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include "io/camera_file.h"
 #include "io/mesh_file.h"
 #include "render/picture/picture.h"
-#include "scene/up_axis.h"
+#include "scene/mesh.h"
 
 namespace tilegrad::cli {
 

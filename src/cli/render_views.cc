@@ -9,7 +9,8 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/render_job.h"
-#include "scene/framing.h"
+#include "scene/camera.h"
+#include "scene/mesh.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "render/checks.h"
+#include "render/validate.h"
 
 namespace tilegrad::compat {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "fit/colmap_frames.h"
-#include "io/picture_names.h"
+#include "io/image_file.h"
 
 namespace tilegrad::train {
 namespace {

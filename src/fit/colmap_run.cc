@@ -16,7 +16,7 @@
 
 #include "base/error.h"
 #include "io/camera_file.h"
-#include "io/picture_names.h"
+#include "io/image_file.h"
 
 namespace tilegrad::train {
 namespace {

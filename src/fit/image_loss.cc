@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "train/losses/color_l1.h"
+#include "train/losses/feature_l1.h"
 #include "train/losses/iou.h"
 
 namespace tilegrad::train {

@@ -15,7 +15,6 @@
 #include "fit/image_loss.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
-#include "scene/up_axis.h"
 
 namespace tilegrad::train {
 

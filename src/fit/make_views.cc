@@ -10,9 +10,9 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "fit/transforms.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
-#include "render/picture/mesh_pictures.h"
+#include "io/mesh_file.h"
+#include "render/picture/mesh_scene.h"
 #include "train/data/build/glass.h"
 
 namespace tilegrad::train {

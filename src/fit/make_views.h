@@ -18,7 +18,7 @@ struct ViewsOptions {
 };
 
 // Removes glass, scales the mesh's largest half-extent to 0.45 and its middle to the origin, lights
-// it as datasets do (render/picture/mesh_pictures.h), and writes
+// it as datasets do (render/picture/mesh_scene.h), and writes
 //   <folder>/images/000.png, ...       RGBA, straight alpha
 //   <folder>/transforms_train.json, transforms_test.json
 //   <folder>/truth.glb                 the mesh as it was rendered

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
-#include "io/glb_writer.h"
+#include "io/mesh_file.h"
 #include "scene/light_frame.h"
 
 namespace tilegrad::train {

@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "fit/scene.h"
 #include "scene/shapes.h"
-#include "scene/sphere_uv.h"
 
 namespace tilegrad::train {
 namespace {

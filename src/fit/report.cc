@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page about a fit: one file that needs nothing else.
+#include "train/report/report.h"
+
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -9,7 +11,6 @@
 #include "base/text.h"
 #include "fit/run.h"
 #include "train/report/html.h"
-#include "train/report/page_data.h"
 #include "train/run/log.h"
 
 namespace tilegrad::train {

@@ -11,7 +11,7 @@
 #include "render/scene_fields.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
-#include "train/ops/render_op.h"
+#include "train/models/render_op.h"
 
 namespace tilegrad::train {
 
@@ -100,7 +100,7 @@ class FitRenderer {
 // A mesh with its first texture or its vertex colours, and back. Materials' factors are multiplied
 // into colours. An error says what a FitScene cannot hold: several textures, say.
 Result<FitScene> SceneOfMesh(const Mesh& mesh);
-// The sphere's longitude and latitude (scene/sphere_uv.h) as texture coordinates of a scene that
+// The sphere's longitude and latitude (scene/shapes.h) as texture coordinates of a scene that
 // has its faces; corners of a vertex share one where they are on the same side of the seam.
 void SetSphereUv(const Mesh& sphere, FitScene* scene);
 // Its normals are smooth; it is unlit unless the scene has light of its own.

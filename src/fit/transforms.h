@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images and their cameras, as the folders that a fit reads name them (io/nerf_frames.h,
+// Images and their cameras, as the folders that a fit reads name them (io/camera_file.h,
 // fit/colmap_frames.h, fit/bare_frames.h).
 #pragma once
 
 #include <vector>
 
 #include "base/file.h"
-#include "io/nerf_frames.h"
+#include "io/camera_file.h"
 
 namespace tilegrad::train {
 

@@ -13,10 +13,8 @@
 #include <mutex>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "base/hash.h"
 #include "base/read_budget.h"
-#include "base/shortage.h"
 #include "base/text.h"
 
 namespace tilegrad::io {

@@ -13,7 +13,6 @@
 #include "io/archive.h"
 #include "io/image_file.h"
 #include "io/imported_scene.h"
-#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
 #include "scene/shapes.h"

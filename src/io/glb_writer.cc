@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/glb_writer.h"
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
@@ -13,8 +10,9 @@
 #include "base/error.h"
 #include "base/json_text.h"
 #include "io/image_file.h"
-#include "io/mesh_colors.h"
-#include "scene/srgb.h"
+#include "io/mesh_file.h"
+#include "io/mesh_readers.h"
+#include "scene/image.h"
 
 namespace tilegrad::io {
 namespace {

@@ -15,7 +15,6 @@
 #include "base/text.h"
 #include "io/gltf_model.h"
 #include "io/image_file.h"
-#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
 

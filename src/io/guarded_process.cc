@@ -24,13 +24,12 @@
 #include <cstring>
 #include <fstream>
 #include <new>
-#include <optional>
 #include <span>
 #include <utility>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "base/sanitizers.h"
-#include "base/shortage.h"
 
 namespace tilegrad::io {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/image_check.h"
-
 #include <zlib.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "io/image_readers.h"
 
 namespace tilegrad::io {
 namespace {

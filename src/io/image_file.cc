@@ -11,11 +11,9 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
-#include "base/shortage.h"
+#include "base/text.h"
 #include "io/guarded_process.h"
-#include "io/image_check.h"
-#include "io/plain_images.h"
-#include "io/webp_reader.h"
+#include "io/image_readers.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -258,6 +256,43 @@ Result<Bytes> EncodePng(const ImageU8& image) {
 Status SavePng(const Path& path, const ImageU8& image) {
   TILEGRAD_ASSIGN(const Bytes bytes, EncodePng(image));
   return WriteFileAtomic(path, bytes);
+}
+
+namespace {
+
+constexpr std::string_view kReadEndings[] = {".png", ".jpg", ".jpeg", ".webp"};
+constexpr std::string_view kOtherEndings[] = {".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp",
+                                              ".gif",  ".tga",  ".jp2",  ".jxl", ".jfif", ".psd",
+                                              ".exr",  ".hdr",  ".ppm",  ".pgm", ".dng",  ".cr2",
+                                              ".cr3",  ".nef",  ".arw",  ".raf", ".orf"};
+
+}  // namespace
+
+std::string PictureNames::DescribeOthers() const {
+  constexpr std::size_t kNamed = 5;
+  if (others.empty()) return "";
+  std::string names;
+  for (std::size_t i = 0; i < std::min(others.size(), kNamed); ++i)
+    names += (i == 0 ? "" : ", ") + others[i].string();
+  return fmt::format("{} not in PNG, JPEG or WebP: {}{}", Count(others.size(), "picture"), names,
+                     others.size() > kNamed ? ", ..." : "");
+}
+
+PictureNames PicturesIn(const Path& folder) {
+  PictureNames out;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error)) {
+    if (!IsFile(at->path())) continue;
+    const std::string ending = LowerCase(at->path().extension().string());
+    if (std::ranges::find(kReadEndings, ending) != std::end(kReadEndings))
+      out.read.push_back(at->path().filename());
+    if (std::ranges::find(kOtherEndings, ending) != std::end(kOtherEndings))
+      out.others.push_back(at->path().filename());
+  }
+  std::ranges::sort(out.read);
+  std::ranges::sort(out.others);
+  return out;
 }
 
 }  // namespace tilegrad::io

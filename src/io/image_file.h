@@ -5,6 +5,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "base/file.h"
 #include "scene/image.h"
@@ -41,5 +42,19 @@ ImageU8 ToColor(ImageU8 image);
 // 1 to 4 channels, 8 bits. SavePng appears whole or not at all.
 Result<Bytes> EncodePng(const ImageU8& image);
 Status SavePng(const Path& path, const ImageU8& image);
+
+// Pictures that are looked for in a folder, rather than named.
+
+// By the endings of their names; sorted.
+struct PictureNames {
+  std::vector<Path> read;    // PNG, JPEG and WebP
+  std::vector<Path> others;  // formats that cameras and programs write, and that are not read
+
+  // "2 pictures not in PNG, JPEG or WebP: a.heic, b.tif"; empty where there are none.
+  std::string DescribeOthers() const;
+};
+
+// Empty if there is no such folder.
+PictureNames PicturesIn(const Path& folder);
 
 }  // namespace tilegrad::io

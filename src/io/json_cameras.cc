@@ -16,7 +16,6 @@
 #include "base/json_text.h"
 #include "base/text.h"
 #include "io/camera_file.h"
-#include "io/nerf_frames.h"
 #include "scene/camera.h"
 
 namespace tilegrad::io {

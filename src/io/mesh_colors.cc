@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/mesh_colors.h"
-
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 #include <span>
 
 #include "base/error.h"
-#include "scene/srgb.h"
+#include "io/mesh_readers.h"
+#include "scene/image.h"
 
 namespace tilegrad::io {
 namespace {

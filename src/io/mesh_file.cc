@@ -9,17 +9,13 @@
 #include <set>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "base/read_budget.h"
-#include "base/shortage.h"
 #include "base/text.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
-#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
 #include "scene/shapes.h"
-#include "scene/triangulate.h"
 
 namespace tilegrad::io {
 namespace {

@@ -2,17 +2,13 @@
 #include "io/obj_statements.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <unordered_map>
 #include <utility>
 
 #include "base/error.h"
 #include "base/text.h"
-#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
 

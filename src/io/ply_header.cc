@@ -2,8 +2,6 @@
 #include "io/ply_header.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 
 #include "base/error.h"
 #include "base/text.h"

@@ -2,15 +2,45 @@
 // Internal to io: the header of a PLY file.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "io/stored_number.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::io {
+
+// Internal to io: numbers as binary files store them.
+
+enum class StoredType { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
+
+struct StoredTypeRow {
+  std::size_t size;                // bytes
+  double (*load)(const void* at);  // little-endian, anywhere in memory
+};
+
+template <class T>
+double LoadStored(const void* at) {
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return static_cast<double>(value);
+}
+template <class... T>
+constexpr std::array<StoredTypeRow, sizeof...(T)> StoredRowsOf() {
+  return {{{sizeof(T), &LoadStored<T>}...}};
+}
+
+inline const StoredTypeRow& RowOf(StoredType type) {
+  static constexpr auto kRows =
+      StoredRowsOf<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t,
+                   std::uint32_t, std::int64_t, std::uint64_t, float, double>();
+  return kRows[static_cast<std::size_t>(type)];
+}
 
 struct PlyProperty {
   std::string name;

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/mesh_colors.h"
 #include "io/mesh_file.h"
 #include "io/mesh_readers.h"
 #include "io/ply_header.h"

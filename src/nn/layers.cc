@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/ops.h"
-#include "nn/tensor.h"
-
 namespace tilegrad::nn {
 namespace {
 

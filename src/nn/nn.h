@@ -4,13 +4,11 @@
 
 // IWYU pragma: begin_exports
 #include "nn/context.h"
-#include "nn/features.h"
-#include "nn/gan.h"
 #include "nn/layers.h"
+#include "nn/networks.h"
 #include "nn/ops.h"
 #include "nn/optim.h"
 #include "nn/serialize.h"
 #include "nn/tape.h"
 #include "nn/tensor.h"
-#include "nn/unet.h"
 // IWYU pragma: end_exports

@@ -182,7 +182,7 @@ enum class ResizeMode {
 // x [n, c, h, w] -> [n, c, size.height, size.width].
 Var Resize(const Var& x, ImageSize size, ResizeMode mode);
 
-// ops/pool.cc: means and maxima over windows of images [n, c, h, w] -> [n, c, (h + 2 padding -
+// ops/conv.cc: means and maxima over windows of images [n, c, h, w] -> [n, c, (h + 2 padding -
 // kernel) / stride
 // + 1, ...].
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include "base/error.h"
 #include "nn/ops.h"

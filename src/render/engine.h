@@ -11,7 +11,6 @@
 #include "render/gradient_targets.h"
 #include "render/pipeline/pipeline.h"
 #include "render/shading/inputs.h"
-#include "render/shading/merge.h"
 #include "render/shading/plan.h"
 #include "render/shading/stage.h"
 #include "tilegrad/status.h"

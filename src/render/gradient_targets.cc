@@ -7,7 +7,7 @@
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "render/checks.h"
+#include "render/validate.h"
 
 namespace tilegrad {
 namespace {

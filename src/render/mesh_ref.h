@@ -15,7 +15,7 @@
 #include "raster/near_clip.h"
 #include "raster/project_ref.h"
 #include "raster/soft_mask/soft_mask_ref.h"
-#include "render/alpha/paper_bin.h"
+#include "render/pipeline/paper_bin.h"
 #include "render/pipeline/records.h"
 
 namespace tilegrad {

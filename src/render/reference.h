@@ -16,10 +16,9 @@
 #include "raster/visibility_ref.h"
 #include "render/frame_images.h"
 #include "render/mesh_ref.h"
-#include "render/shading/direction_scale.h"
 #include "render/shading/pixel_ref.h"
 #include "render/shading/plan.h"
-#include "render/shading/uv_level.h"
+#include "render/shading/run.h"
 #include "shade/mesh_normals_ref.h"
 
 namespace tilegrad {

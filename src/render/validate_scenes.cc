@@ -4,12 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "render/checks.h"
 #include "render/scene_fields.h"
 #include "render/validate.h"
 #include "shade/normalize.h"

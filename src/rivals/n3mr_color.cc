@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rivals/n3mr_color.h"
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-
-#include "rivals/n3mr.h"
-#include "rivals/n3mr_reduce.h"
 #include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {

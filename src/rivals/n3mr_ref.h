@@ -10,8 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "rivals/n3mr_options.h"
-#include "rivals/n3mr_reduce.h"
+#include "rivals/n3mr.h"
 #include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {

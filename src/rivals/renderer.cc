@@ -3,15 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <type_traits>
 
 #include "base/aligned.h"
 #include "base/error.h"
-#include "base/parallel.h"
-#include "rivals/n3mr_color.h"
-#include "rivals/projection.h"
-#include "rivals/softras_color.h"
+#include "rivals/face_corners.h"
 #include "rivals/softras_color_ref.h"
 
 namespace tilegrad::rivals {

@@ -6,6 +6,11 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
+#include <iterator>
+
+#include "base/error.h"
+#include "scene/camera_conventions.h"
+#include "scene/camera_ref.h"
 
 namespace tilegrad {
 namespace {
@@ -71,3 +76,113 @@ TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
 }  // namespace tilegrad
+
+namespace tilegrad::inline v0 {
+namespace {
+
+constexpr double kLeastLength = 1e-6;
+
+template <class T, class U>
+CameraParametersT<T> ParametersCast(const CameraParametersT<U>& p) {
+  CameraParametersT<T> out;
+  const auto cast = [](U x) { return static_cast<T>(x); };
+  std::transform(std::begin(p.rotation), std::end(p.rotation), out.rotation, cast);
+  std::transform(std::begin(p.translation), std::end(p.translation), out.translation, cast);
+  out.fx = static_cast<T>(p.fx);
+  out.fy = static_cast<T>(p.fy);
+  out.cx = static_cast<T>(p.cx);
+  out.cy = static_cast<T>(p.cy);
+  return out;
+}
+
+// The part of b across a, over |b|, is the sine of the angle between them.
+Status CheckIndependent(const CameraParametersT<double>& p) {
+  const auto g = camera_ref::Orthogonalize(p.rotation);
+  const double a = std::sqrt(camera_ref::Dot(g.a, g.a)), b = std::sqrt(camera_ref::Dot(g.b, g.b));
+  const double across = std::sqrt(camera_ref::Dot(g.u, g.u));
+  if (a >= kLeastLength && b >= kLeastLength && across >= kLeastLength * b) return {};
+  return InvalidArgument(
+      "the six numbers of the rotation, ({}, {}, {}) and ({}, {}, {}), are too short or parallel: "
+      "they give no rotation",
+      g.a[0], g.a[1], g.a[2], g.b[0], g.b[1], g.b[2]);
+}
+
+Status CheckLens(const Lens& lens) {
+  if (!(lens.fov_y > 0 && lens.fov_y < 180)) {
+    return InvalidArgument("lens.fov_y is {}, must be in (0, 180) degrees", lens.fov_y);
+  }
+  if (lens.width >= 1 && lens.height >= 1) return {};
+  return InvalidArgument("lens is for {} x {} pixels, must be at least 1 x 1", lens.width,
+                         lens.height);
+}
+
+Status CheckOrbit(const Orbit& orbit) {
+  if (!std::isfinite(orbit.azimuth) || !std::isfinite(orbit.elevation)) {
+    return InvalidArgument("orbit has azimuth {} and elevation {}, must be finite", orbit.azimuth,
+                           orbit.elevation);
+  }
+  if (orbit.distance > 0 && std::isfinite(orbit.distance)) return {};
+  return InvalidArgument("orbit.distance is {}, must be finite and > 0", orbit.distance);
+}
+
+template <class T>
+Result<CameraT<T>> MakeChecked(const CameraParametersT<T>& parameters, T near_plane) {
+  const auto p = ParametersCast<double>(parameters);
+  if (!std::all_of(std::begin(p.rotation), std::end(p.rotation),
+                   [](double x) { return std::isfinite(x); })) {
+    return InvalidArgument("a number of the camera's rotation is not finite");
+  }
+  TILEGRAD_TRY(CheckIndependent(p));
+  const Camera64 camera = CameraFromParametersRef(p, static_cast<double>(near_plane));
+  TILEGRAD_TRY(Validate(camera));
+  return CameraCast<T>(camera);
+}
+
+}  // namespace
+
+template <class T>
+Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit) {
+  return GuardedResult<CameraT<T>>([&]() -> Result<CameraT<T>> {
+    TILEGRAD_TRY(CheckLens(lens));
+    TILEGRAD_TRY(CheckOrbit(orbit));
+    return OrbitCamera<T>(lens, orbit.azimuth, orbit.elevation, orbit.distance);
+  });
+}
+
+template <class T>
+CameraParametersT<T> ParametersOf(const CameraT<T>& camera) {
+  CameraParametersT<T> p;
+  std::copy_n(camera.rotation, 6, p.rotation);
+  std::copy_n(camera.translation, 3, p.translation);
+  p.fx = camera.fx;
+  p.fy = camera.fy;
+  p.cx = camera.cx;
+  p.cy = camera.cy;
+  return p;
+}
+
+template <class T>
+Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
+                                        std::type_identity_t<T> near_plane) {
+  return GuardedResult<CameraT<T>>([&] { return MakeChecked<T>(parameters, near_plane); });
+}
+
+template <class T>
+CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
+                              const std::type_identity_t<CameraT<T>>& d_camera) {
+  CameraParametersT<double> d;
+  CameraFromParametersAdjointRef(ParametersCast<double>(parameters), CameraCast<double>(d_camera),
+                                 &d);
+  return ParametersCast<T>(d);
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                     \
+  template Result<CameraT<T>> MakeCamera<T>(const Lens&, const Orbit&);             \
+  template CameraParametersT<T> ParametersOf(const CameraT<T>&);                    \
+  template Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>&, T); \
+  template CameraParametersT<T> PullBack(const CameraParametersT<T>&, const CameraT<T>&);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad::inline v0

@@ -2,6 +2,9 @@
 // Cameras of the public interface, made and converted.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "tilegrad/camera.h"
 
 namespace tilegrad {

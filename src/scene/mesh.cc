@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <numeric>
 
 #include "base/error.h"
 
@@ -141,6 +144,211 @@ bool KeepFaces(const std::vector<char>& keep, Mesh* mesh) {
 void SetUnlit(Mesh& mesh, const std::string& name) {
   if (mesh.materials.empty()) mesh.materials = {{.name = name, .base_color = glm::vec4(1)}};
   for (Material& material : mesh.materials) material.unlit = true;
+}
+
+namespace {
+
+// turn(row) of each row of the rotation.
+template <class Turn>
+Camera WithRows(Camera camera, Turn turn) {
+  for (float* row : {camera.rotation, camera.rotation + 3, camera.rotation + 6}) {
+    const glm::vec3 turned = turn(glm::vec3(row[0], row[1], row[2]));
+    std::copy_n(&turned[0], 3, row);
+  }
+  return camera;
+}
+
+}  // namespace
+
+glm::vec3 Upright(UpAxis up, glm::vec3 v) {
+  if (up == UpAxis::kZ) return {v.x, v.z, -v.y};
+  if (up == UpAxis::kX) return {-v.y, v.x, v.z};
+  return v;
+}
+
+std::optional<UpAxis> UpAxisNamed(std::string_view name) {
+  if (name == "y" || name == "Y") return UpAxis::kY;
+  if (name == "z" || name == "Z") return UpAxis::kZ;
+  if (name == "x" || name == "X") return UpAxis::kX;
+  return std::nullopt;
+}
+
+void TurnUpright(UpAxis up, Mesh* mesh) {
+  if (up == UpAxis::kY) return;
+  for (auto* vectors : {&mesh->positions, &mesh->normals, &mesh->corner_normals})
+    for (glm::vec3& v : *vectors) v = Upright(up, v);
+}
+
+// The rows of a rotation are directions in the world.
+Camera UprightCamera(UpAxis up, Camera camera) {
+  return WithRows(camera, [&](glm::vec3 row) { return Upright(up, row); });
+}
+
+// A row r of the rotation meets Upright(v) as the row R^T r meets v.
+Camera CameraOfFile(UpAxis up, Camera camera) {
+  return WithRows(camera, [&](glm::vec3 r) {
+    if (up == UpAxis::kZ) return glm::vec3(r.x, -r.z, r.y);
+    return up == UpAxis::kX ? glm::vec3(r.y, -r.x, r.z) : r;
+  });
+}
+
+namespace {
+
+constexpr std::size_t kMaxEarCorners = 256;
+
+// Newell's method: the sum over all sides, which is robust for polygons that are not quite planar.
+glm::dvec3 PolygonNormal(std::span<const glm::vec3> corners) {
+  glm::dvec3 sum(0);
+  const glm::dvec3 origin(corners[0]);
+  for (std::size_t i = 0; i + 1 < corners.size(); ++i)
+    sum += glm::cross(glm::dvec3(corners[i]) - origin, glm::dvec3(corners[i + 1]) - origin);
+  return sum;
+}
+
+// Seen along the normal's largest component, from the side where the polygon is counter-clockwise.
+std::vector<glm::dvec2> Flatten(std::span<const glm::vec3> corners) {
+  const glm::dvec3 n = PolygonNormal(corners), a = glm::abs(n);
+  const int drop = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+  const int u = (drop + 1) % 3, v = (drop + 2) % 3;
+  const double sign = n[drop] < 0 ? -1 : 1;
+  std::vector<glm::dvec2> flat;
+  for (const glm::vec3& p : corners) flat.emplace_back(sign * p[u], p[v]);
+  return flat;
+}
+
+double Cross(glm::dvec2 a, glm::dvec2 b, glm::dvec2 c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+class EarClipper {
+ public:
+  explicit EarClipper(std::span<const glm::vec3> corners)
+      : points_(Flatten(corners)), left_(corners.size()) {
+    std::iota(left_.begin(), left_.end(), 0);
+  }
+
+  void Run(std::vector<Face>& triangles) {
+    while (left_.size() >= 3) {
+      const std::size_t tip = FindEar();
+      triangles.push_back({At(tip - 1), At(tip), At(tip + 1)});
+      left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(tip % left_.size()));
+    }
+  }
+
+ private:
+  std::int32_t At(std::size_t i) const { return left_[i % left_.size()]; }
+
+  // From 1 on, so that a convex polygon becomes the fan about corner 0. 1 where there is no ear.
+  std::size_t FindEar() const {
+    for (std::size_t tip = 1; tip <= left_.size(); ++tip) {
+      if (IsEar(tip)) return tip;
+    }
+    return 1;
+  }
+
+  bool IsEar(std::size_t tip) const {
+    const glm::dvec2 a = points_[At(tip - 1)], b = points_[At(tip)], c = points_[At(tip + 1)];
+    if (Cross(a, b, c) <= 0) return false;
+    return std::none_of(left_.begin(), left_.end(), [&](std::int32_t i) {
+      const glm::dvec2 p = points_[i];
+      if (p == a || p == b || p == c) return false;
+      return Cross(a, b, p) >= 0 && Cross(b, c, p) >= 0 && Cross(c, a, p) >= 0;
+    });
+  }
+
+  std::vector<glm::dvec2> points_;
+  std::vector<std::int32_t> left_;  // corners not yet clipped, in order
+};
+
+}  // namespace
+
+void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& triangles) {
+  triangles.clear();
+  const std::size_t n = corners.size();
+  if (n > 3 && n <= kMaxEarCorners) return EarClipper(corners).Run(triangles);
+  for (std::int32_t k = 2; k < static_cast<std::int32_t>(n); ++k)
+    triangles.push_back({0, k - 1, k});
+}
+
+namespace {
+
+// The distance that the eye needs along one view, and how far the mesh reaches towards it.
+struct Reach {
+  double distance = 0, towards_eye = -1e300;
+};
+
+// A vertex at (x, y, z) of the camera's axes, from the middle, is seen from distance d at
+// fx |x| / (d - z) pixels from the centre.
+Reach ReachOf(const Mesh& mesh, const Camera& camera, glm::dvec3 middle, const Framing& framing) {
+  const double half_x = 0.5 * framing.lens.width * (1 - framing.margin) / camera.fx;
+  const double half_y = 0.5 * framing.lens.height * (1 - framing.margin) / camera.fy;
+  const float* r = camera.rotation;
+  Reach reach;
+  for (const Face& face : mesh.faces) {
+    for (const std::int32_t v : face) {
+      const glm::dvec3 p = glm::dvec3(mesh.positions[v]) - middle;
+      const double x = glm::dot(p, glm::dvec3(r[0], r[1], r[2]));
+      const double y = glm::dot(p, glm::dvec3(r[3], r[4], r[5]));
+      const double z = glm::dot(p, glm::dvec3(r[6], r[7], r[8]));
+      reach.distance =
+          std::max(reach.distance, z + std::max(std::abs(x) / half_x, std::abs(y) / half_y));
+      reach.towards_eye = std::max(reach.towards_eye, z);
+    }
+  }
+  return reach;
+}
+
+Camera MovedTo(Camera camera, glm::dvec3 middle, double distance) {
+  const float* r = camera.rotation;
+  const glm::dvec3 eye = middle + distance * glm::dvec3(r[6], r[7], r[8]);
+  for (int i = 0; i < 3; ++i) {
+    camera.translation[i] =
+        static_cast<float>(-glm::dot(glm::dvec3(r[3 * i], r[3 * i + 1], r[3 * i + 2]), eye));
+  }
+  return camera;
+}
+
+Status Check(const Framing& framing, double extent) {
+  const Lens& lens = framing.lens;
+  if (!(lens.fov_y > 0 && lens.fov_y < 180))
+    return InvalidArgument("a field of view of {} degrees; it must be between 0 and 180",
+                           lens.fov_y);
+  if (lens.width < 1 || lens.height < 1)
+    return InvalidArgument("an image of {} x {} pixels", lens.width, lens.height);
+  if (!(framing.margin >= 0 && framing.margin < 1))
+    return InvalidArgument("a margin of {}; it must be in [0, 1)", framing.margin);
+  if (!(framing.distance >= 0) || !std::isfinite(framing.distance))
+    return InvalidArgument("a camera distance of {}; it must be 0 or above", framing.distance);
+  if (!(extent > 0)) return InvalidArgument("the mesh has no extent, so no camera can frame it");
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<Camera>> FrameMesh(const Mesh& mesh, const Framing& framing,
+                                      std::span<const ViewAngle> views) {
+  const Bounds bounds = MeshBounds(mesh);
+  const glm::dvec3 low(bounds.low), high(bounds.high), middle = 0.5 * (low + high);
+  const double extent = glm::length(high - low);
+  TILEGRAD_TRY(Check(framing, extent));
+  std::vector<Camera> cameras;
+  Reach all;
+  for (const ViewAngle& view : views) {
+    cameras.push_back(OrbitCamera(framing.lens, view.azimuth, view.elevation, 1));
+    const Reach reach = ReachOf(mesh, cameras.back(), middle, framing);
+    all.distance = std::max(all.distance, reach.distance);
+    all.towards_eye = std::max(all.towards_eye, reach.towards_eye);
+  }
+  // Otherwise the eye would touch a line that points towards it.
+  const double distance = framing.distance > 0
+                              ? framing.distance
+                              : std::max(all.distance, all.towards_eye + 0.1 * extent);
+  for (Camera& camera : cameras) {
+    camera = MovedTo(camera, middle, distance);
+    camera.near_plane =
+        static_cast<float>(std::max(1e-4 * distance, 0.5 * (distance - all.towards_eye)));
+  }
+  return cameras;
 }
 
 }  // namespace tilegrad

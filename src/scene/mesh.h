@@ -6,9 +6,13 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "scene/camera.h"
 #include "scene/image.h"
 #include "tilegrad/status.h"
 
@@ -82,5 +86,53 @@ bool KeepFaces(const std::vector<char>& keep, Mesh* mesh);
 // The colours hold their light already, as those that were learned from images do: materials become
 // unlit, so that no viewer shades them again. A mesh without materials gets a white one, `name`.
 void SetUnlit(Mesh& mesh, const std::string& name);
+
+// Meshes whose up is not +y: programs for building and printing have z up, some have x. The mesh is
+// turned so that this axis is +y, as glTF has it: (x, y, z) becomes (x, z, -y) for z, so that what
+// faces -y, the front in such programs, faces +z, where default cameras stand; (-y, x, z) for x.
+
+enum class UpAxis { kY, kZ, kX };
+
+// "y", "z", "x", in upper case, too; nothing for other words.
+std::optional<UpAxis> UpAxisNamed(std::string_view name);
+
+// A place or a direction; exact, as all of these.
+glm::vec3 Upright(UpAxis up, glm::vec3 v);
+
+// Positions and normals.
+void TurnUpright(UpAxis up, Mesh* mesh);
+
+// The camera that sees of a mesh turned upright what `camera` sees of the one as its file has it.
+Camera UprightCamera(UpAxis up, Camera camera);
+
+// And back: the camera that sees of a mesh as its file has it what `camera` sees of the one turned
+// upright.
+Camera CameraOfFile(UpAxis up, Camera camera);
+
+// Splits a simple polygon, convex or not, planar or nearly so, into n - 2 triangles with the
+// polygon's orientation, by clipping ears. Sets `triangles` to indices into `corners`; fewer than
+// three corners give none. A convex polygon becomes the fan about its corner 0, and so does what
+// has no ear left (a polygon that crosses itself or has no area) and one of more than 256 corners,
+// since the search for ears takes cubic time at worst.
+void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& triangles);
+
+// Default cameras that see a whole mesh.
+
+// Degrees; as OrbitCamera's: azimuth 90 stands on +z, elevation 90 above.
+struct ViewAngle {
+  double azimuth = 60, elevation = 20;
+};
+
+struct Framing {
+  Lens lens;
+  double margin = 0.05;  // share of the half image left free on each side, [0, 1)
+  double distance = 0;   // of the eye from the middle, world units; 0: as near as all views allow
+};
+
+// Cameras that look at the middle of the mesh's bounding box, all from one distance. With the
+// default distance every used vertex is inside of every image. `mesh` is valid and has a face. An
+// error if it has no extent, or for a lens or margin out of range.
+Result<std::vector<Camera>> FrameMesh(const Mesh& mesh, const Framing& framing,
+                                      std::span<const ViewAngle> views);
 
 }  // namespace tilegrad

@@ -2,6 +2,12 @@
 #include "scene/topology.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <numbers>
+#include <numeric>
 #include <tuple>
 
 namespace tilegrad {
@@ -64,6 +70,131 @@ Topology BuildTopology(std::span<const Face> faces, std::size_t vertices) {
   CollectEdges(SortedSides(faces), out);
   CollectNeighbors(vertices, out);
   return out;
+}
+
+namespace {
+
+using Index = std::size_t;
+
+// Vertices by their place: the first one that stands there.
+std::vector<Index> FirstAtPlace(const std::vector<glm::vec3>& positions) {
+  std::map<std::tuple<float, float, float>, Index> first;
+  std::vector<Index> out;
+  for (Index v = 0; v < positions.size(); ++v) {
+    const glm::vec3& p = positions[v];
+    out.push_back(first.try_emplace({p.x, p.y, p.z}, v).first->second);
+  }
+  return out;
+}
+
+// Unit; 0 of a face without area.
+std::vector<glm::dvec3> FaceNormals(const Mesh& mesh) {
+  std::vector<glm::dvec3> out;
+  for (const Face& face : mesh.faces) {
+    const auto at = [&](int k) { return glm::dvec3(mesh.positions[static_cast<Index>(face[k])]); };
+    const glm::dvec3 n = glm::cross(at(1) - at(0), at(2) - at(0));
+    const double length = glm::length(n);
+    out.push_back(length > 0 ? n / length : glm::dvec3(0));
+  }
+  return out;
+}
+
+// Corners that are joined, by union-find: the least of each group stands for it.
+class CornerGroups {
+ public:
+  explicit CornerGroups(Index count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+  Index Of(Index i) {
+    while (parent_[i] != i) {
+      parent_[i] = parent_[parent_[i]];
+      i = parent_[i];
+    }
+    return i;
+  }
+  void Join(Index a, Index b) {
+    const auto [low, high] = std::minmax({Of(a), Of(b)});
+    parent_[high] = low;
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+// A face's side, by its ends in the order of their places' numbers.
+struct FaceSide {
+  std::array<Index, 2> places, corners;
+  bool operator<(const FaceSide& o) const {
+    return std::tie(places, corners) < std::tie(o.places, o.corners);
+  }
+};
+
+std::vector<FaceSide> SortedSides(const Mesh& mesh) {
+  const std::vector<Index> place = FirstAtPlace(mesh.positions);
+  std::vector<FaceSide> out;
+  for (Index f = 0; f < mesh.faces.size(); ++f) {
+    for (Index k = 0; k < 3; ++k) {
+      FaceSide side;
+      side.corners = {3 * f + k, 3 * f + (k + 1) % 3};
+      for (Index end = 0; end < 2; ++end) {
+        const Index corner = side.corners[end];
+        side.places[end] = place[static_cast<Index>(mesh.faces[f][corner - 3 * f])];
+      }
+      if (side.places[0] == side.places[1]) continue;
+      if (side.places[0] > side.places[1]) {
+        std::swap(side.places[0], side.places[1]);
+        std::swap(side.corners[0], side.corners[1]);
+      }
+      out.push_back(side);
+    }
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Of all pairs of faces at an edge, at both of its ends.
+CornerGroups JoinSmoothSides(const Mesh& mesh, double degrees) {
+  const double least = std::cos(degrees * std::numbers::pi / 180);
+  const std::vector<glm::dvec3> normals = FaceNormals(mesh);
+  const std::vector<FaceSide> sides = SortedSides(mesh);
+  CornerGroups groups(3 * mesh.faces.size());
+  for (Index i = 0; i < sides.size(); ++i) {
+    for (Index j = i + 1; j < sides.size() && sides[j].places == sides[i].places; ++j) {
+      const glm::dvec3 &a = normals[sides[i].corners[0] / 3], &b = normals[sides[j].corners[0] / 3];
+      if (!(glm::dot(a, b) > least)) continue;
+      for (Index end = 0; end < 2; ++end) groups.Join(sides[i].corners[end], sides[j].corners[end]);
+    }
+  }
+  return groups;
+}
+
+void ColorsToCorners(Mesh* mesh) {
+  if (mesh->colors.empty()) return;
+  for (const Face& face : mesh->faces) {
+    for (const std::int32_t v : face)
+      mesh->corner_colors.push_back(mesh->colors[static_cast<Index>(v)]);
+  }
+  mesh->colors.clear();
+}
+
+}  // namespace
+
+void SplitAtCreases(double degrees, Mesh* mesh) {
+  CornerGroups groups = JoinSmoothSides(*mesh, degrees);
+  ColorsToCorners(mesh);
+  mesh->normals.clear();
+  std::vector<glm::vec3> positions;
+  std::vector<std::int32_t> vertex_of(3 * mesh->faces.size());  // of the corner that leads a group
+  for (Index c = 0; c < vertex_of.size(); ++c) {
+    std::int32_t& vertex = mesh->faces[c / 3][c % 3];
+    const Index leader = groups.Of(c);
+    if (leader == c) {
+      vertex_of[c] = static_cast<std::int32_t>(positions.size());
+      positions.push_back(mesh->positions[static_cast<Index>(vertex)]);
+    }
+    vertex = vertex_of[leader];
+  }
+  mesh->positions = std::move(positions);
 }
 
 }  // namespace tilegrad

@@ -6,7 +6,7 @@
 //   kind = "single_image"       if it is not there: this one
 //   ...                         the task's own keys: Task::Fields
 //   [schedule]
-//   steps = 3000                see run/schedule.h
+//   steps = 3000                see run/run.h
 #pragma once
 
 #include <memory>

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "train/ranks/gradient_sums.h"
-#include "train/run/header.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::train {

@@ -25,7 +25,6 @@
 #include <iomanip>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <span>
 #include <sstream>
 #include <string>

@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <thread>
 
+#include "base/aligned.h"
 #include "base/file.h"
 #include "base/read_budget.h"
 #include "support/temp_folder.h"
@@ -165,6 +168,46 @@ TEST_F(ReadBudgetTest, FilesCount) {
   const auto second = ReadText(file);
   EXPECT_EQ(second.status().code(), StatusCode::kResourceExhausted);
   ExpectMessage(second.status(), file.string());
+}
+
+class ScratchBytesTest : public TempFolderTest {
+ protected:
+  ScratchBytesTest() { ::setenv("TMPDIR", folder_.c_str(), 1); }
+  ~ScratchBytesTest() override { ::unsetenv("TMPDIR"); }
+  bool Mapped() const {
+    std::ifstream maps("/proc/self/maps");
+    const std::string text{std::istreambuf_iterator<char>(maps), {}};
+    return text.find(folder_.string() + "/tilegrad-") != std::string::npos;
+  }
+};
+
+void ExpectHolds(ScratchBytes& bytes) {
+  EXPECT_TRUE(std::all_of(bytes.begin(), bytes.end(), [](auto b) { return b == 0; }));
+  bytes[bytes.size() - 1] = 7;
+  ScratchBytes moved;
+  moved = std::move(bytes);
+  EXPECT_EQ(moved[moved.size() - 1], 7);
+}
+
+TEST_F(ScratchBytesTest, ManyAreAFileWithoutAName) {
+  {
+    ScratchBytes bytes(1000);
+    bytes.Resize(1000);
+    EXPECT_FALSE(Mapped());
+    bytes.Resize(100000);
+    EXPECT_TRUE(Mapped());
+    EXPECT_TRUE(std::filesystem::is_empty(folder_));
+    ExpectHolds(bytes);
+  }
+  EXPECT_FALSE(Mapped());
+}
+
+TEST_F(ScratchBytesTest, WithoutAFolderTheyAreInMemory) {
+  ::setenv("TMPDIR", (folder_ / "none").c_str(), 1);
+  ScratchBytes bytes(1000);
+  bytes.Resize(100000);
+  EXPECT_FALSE(Mapped());
+  ExpectHolds(bytes);
 }
 
 }  // namespace tilegrad::output_guard_test

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/escape_text.h"
 #include "base/json_text.h"
 #include "base/rng.h"
 #include "base/whole_number.h"

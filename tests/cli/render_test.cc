@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "io/camera_file.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "io/mesh_file.h"
 #include "io/npz.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"

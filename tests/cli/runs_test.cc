@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/glb_writer.h"
+#include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
 

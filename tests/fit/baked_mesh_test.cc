@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "fit/scene.h"
-#include "io/glb_writer.h"
 #include "io/mesh_file.h"
 #include "render/picture/picture.h"
 #include "scene/shapes.h"

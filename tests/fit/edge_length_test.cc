@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/losses/edge_length.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "base/rng.h"
 #include "fit/diffusion.h"
 #include "scene/shapes.h"
+#include "train/losses/area.h"
 
 namespace tilegrad::train::edge_length_test {
 

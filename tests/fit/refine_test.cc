@@ -8,9 +8,8 @@
 
 #include "fit/find_camera.h"
 #include "fit/input.h"
-#include "render/picture/mesh_pictures.h"
+#include "render/picture/mesh_scene.h"
 #include "scene/shapes.h"
-#include "scene/sphere_uv.h"
 
 namespace tilegrad::train::refine_test {
 

@@ -5,7 +5,7 @@
 
 #include "base/read_budget.h"
 #include "fuzz/target.h"
-#include "io/mesh_readers.h"
+#include "io/mesh_file.h"
 #include "io/mesh_samples.h"
 
 namespace tilegrad::fuzz::assimp_targets {

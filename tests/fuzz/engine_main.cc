@@ -2,7 +2,6 @@
 // libFuzzer's side of one target: TILEGRAD_FUZZ_TARGET is its name.
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 
 #include "fuzz/target.h"

@@ -4,7 +4,6 @@
 
 #include "base/read_budget.h"
 #include "fuzz/target.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "io/imported_scene.h"
 #include "io/mesh_file.h"

@@ -6,8 +6,6 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "io/glb_writer.h"
-#include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"

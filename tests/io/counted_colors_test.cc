@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "io/mesh_file.h"
-#include "scene/srgb.h"
+#include "scene/image.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::counted_colors_test {

@@ -18,8 +18,8 @@
 #include <thread>
 
 #include "base/parallel.h"
+#include "base/read_budget.h"
 #include "base/sanitizers.h"
-#include "base/shortage.h"
 #include "support/forked.h"
 #include "support/temp_folder.h"
 

@@ -9,7 +9,6 @@
 
 #include "base/read_budget.h"
 #include "io/exr_file.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "io/npz.h"

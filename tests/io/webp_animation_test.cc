@@ -10,7 +10,6 @@
 #include <memory>
 
 #include "io/image_file.h"
-#include "io/webp_reader.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io::webp_animation_test {

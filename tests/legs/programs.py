@@ -11,7 +11,7 @@ import pathlib
 import re
 import sys
 
-# As CMake writes them: add_test(io_sgi "BUILD/tests/io_test" "--gtest_filter=..." ...). An emulator may stand before the program.
+# As CMake writes them: add_test(io_obj "BUILD/tests/io_test" "--gtest_filter=..." ...). An emulator may stand before the program.
 # (ctest's own list leaves out programs that are not built yet.)
 TEST = re.compile(r'^add_test\((?:\[=*\[)?(\w+)(?:\]=*\])? .*?"([^"]*_test)" "(--gtest_filter=[^"]*)"', re.MULTILINE)
 

@@ -11,7 +11,7 @@
 
 #include "base/aligned.h"
 #include "base/rng.h"
-#include "nn/address_arena.h"
+#include "nn/memory.h"
 #include "nn/nn.h"
 
 namespace tilegrad::nn::tape_test {

@@ -134,7 +134,7 @@ def triangle():
 class RasterizeMeshes(unittest.TestCase):
     def test_numbers_by_hand(self):
         """What each option changes, at one pixel under a triangle of sides 1; all else of it is
-        tests/compat/pytorch3d/'s."""
+        tests/compat/pytorch3d_raster_test.cc's."""
         corners = triangle()
 
         def pixel(height=1, width=1, **options):

@@ -14,11 +14,11 @@
 
 #include "base/rng.h"
 #include "raster/project_ref.h"
+#include "scene/camera.h"
 #include "scene/camera_ref.h"
-#include "scene/framing.h"
 #include "scene/lens_distortion.h"
+#include "scene/mesh.h"
 #include "scene/shapes.h"
-#include "scene/up_axis.h"
 #include "scene/weak_perspective_ref.h"
 #include "support/expect.h"
 #include "support/temp_folder.h"

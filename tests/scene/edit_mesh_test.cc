@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/edit_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,11 +8,9 @@
 #include <numbers>
 
 #include "base/rng.h"
-#include "scene/creases.h"
 #include "scene/level_set.h"
 #include "scene/shapes.h"
 #include "scene/simplify.h"
-#include "scene/sphere_uv.h"
 #include "scene/topology.h"
 #include "scene/unwrap.h"
 #include "support/expect.h"

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "scene/camera.h"
+#include "scene/mesh.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
-#include "scene/triangulate.h"
 
 namespace tilegrad::scene_test {
 

@@ -13,7 +13,7 @@
 
 #include "base/rng.h"
 #include "nn/nn.h"
-#include "train/run/step_values.h"
+#include "train/run/log.h"
 
 namespace tilegrad::train {
 

@@ -10,10 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "io/mesh_file.h"
 #include "scene/shapes.h"
-#include "scene/sphere_uv.h"
 #include "support/temp_folder.h"
 #include "train/report/html.h"
 

@@ -13,7 +13,6 @@
 #include "tiny_run.h"
 #include "train/eval/evaluation.h"
 #include "train/report/html.h"
-#include "train/report/page_data.h"
 #include "train/tasks/held_out.h"
 #include "train/trainer.h"
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "bindings/calls.h"
-#include "compat/nvdiffrast/mip.h"
 #include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::python {

@@ -2,12 +2,11 @@
 #include "compat/kaolin/projected_raster.h"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "compat/kaolin/face_visibility.h"
 #include "raster/conventions.h"
-#include "render/checks.h"
+#include "render/validate.h"
 
 namespace tilegrad::compat::kaolin {
 namespace {

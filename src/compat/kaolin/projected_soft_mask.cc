@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compat/kaolin/projected_soft_mask.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,9 +6,10 @@
 #include <vector>
 
 #include "base/error.h"
+#include "compat/kaolin/projected_raster.h"
 #include "raster/soft_mask/soft_mask.h"
-#include "render/alpha/paper_bin.h"
-#include "render/checks.h"
+#include "render/pipeline/paper_bin.h"
+#include "render/validate.h"
 
 namespace tilegrad::compat::kaolin {
 namespace {

@@ -3,15 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <optional>
-#include <vector>
 
 #include "base/error.h"
 #include "base/scalar.h"
-#include "compat/nvdiffrast/band_sums.h"
-#include "compat/nvdiffrast/clip_mesh.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {

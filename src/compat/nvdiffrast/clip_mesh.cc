@@ -30,4 +30,73 @@ Status CheckFaceIds(std::span<const T> rast, std::size_t faces) {
 template Status CheckFaceIds(std::span<const float>, std::size_t);
 template Status CheckFaceIds(std::span<const double>, std::size_t);
 
+BandSums::BandSums(std::size_t rows, std::size_t channels, std::size_t bands,
+                   const Workers& workers)
+    : rows_(rows),
+      channels_(channels),
+      bands_(bands),
+      slots_(static_cast<std::size_t>(workers.count())) {}
+
+BandSums::Adder::Adder(BandSums* sums, std::size_t band, std::size_t worker)
+    : rows_(sums->bands_[band].rows), sums_(sums->bands_[band].sums), channels_(sums->channels_) {
+  AlignedVector<std::int32_t>& slots = sums->slots_[worker];
+  if (slots.empty()) slots.resize(sums->rows_);
+  slots_ = slots.data();
+}
+
+BandSums::Adder::~Adder() {
+  for (const std::size_t row : rows_) slots_[row] = 0;
+}
+
+void BandSums::Adder::Clear() {
+  for (const std::size_t row : rows_) slots_[row] = 0;
+  rows_.clear();
+  sums_.clear();
+}
+
+void BandSums::Adder::MeetRow(std::size_t row) {
+  rows_.push_back(row);
+  sums_.resize(sums_.size() + channels_);
+  slots_[row] = static_cast<std::int32_t>(rows_.size());
+}
+
+namespace {
+
+// a += b, kept finite: gradients of positions grow with 1/w.
+template <class T>
+void AddNumbers(const double* b, std::size_t n, T* a) {
+  constexpr double kMost = std::numeric_limits<T>::max();
+  for (std::size_t i = 0; i < n; ++i) {
+    a[i] = static_cast<T>(std::clamp(static_cast<double>(a[i]) + b[i], -kMost, kMost));
+  }
+}
+
+}  // namespace
+
+template <class T>
+void BandSums::AddRows(std::span<T> out, std::size_t begin, std::size_t end,
+                       std::size_t first) const {
+  for (const OfBand& band : bands_) {
+    for (std::size_t i = 0; i < band.rows.size(); ++i) {
+      const std::size_t row = band.rows[i];
+      if (row < first + begin || row >= first + end) continue;
+      AddNumbers(band.sums.data() + i * channels_, channels_,
+                 out.data() + (row - first) * channels_);
+    }
+  }
+}
+
+template <class T>
+void BandSums::AddTo(std::span<T> out, const Workers& workers, std::size_t first) const {
+  // How rows are shared among workers does not matter: each has its own sum.
+  const std::size_t rows = out.size() / channels_;
+  const auto count = static_cast<std::size_t>(workers.count());
+  workers.ForRanges(
+      rows, (rows + count - 1) / count,
+      [&](std::size_t begin, std::size_t end, std::size_t) { AddRows(out, begin, end, first); });
+}
+
+template void BandSums::AddTo(std::span<float>, const Workers&, std::size_t) const;
+template void BandSums::AddTo(std::span<double>, const Workers&, std::size_t) const;
+
 }  // namespace tilegrad::compat::nvdiffrast

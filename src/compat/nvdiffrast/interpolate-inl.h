@@ -15,7 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/interpolate.h"
 #include "compat/nvdiffrast/quads-inl.h"
 

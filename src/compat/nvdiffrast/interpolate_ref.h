@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/interpolate.h"
 
 namespace tilegrad::compat::nvdiffrast {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compat/nvdiffrast/mip.h"
+#include "compat/nvdiffrast/texture.h"
 
 #include "base/error.h"
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 
 namespace tilegrad::compat::nvdiffrast {

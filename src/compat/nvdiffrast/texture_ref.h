@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/texture.h"
 #include "compat/nvdiffrast/texture_taps.h"
 

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 
-#include "compat/nvdiffrast/mip.h"
 #include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::compat::nvdiffrast {

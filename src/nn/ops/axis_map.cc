@@ -3,8 +3,6 @@
 #include "nn/kernels/axis_map.h"
 
 #include <algorithm>
-#include <cmath>
-#include <memory>
 #include <utility>
 
 #include "base/error.h"

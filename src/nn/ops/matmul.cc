@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include <utility>
-
 #include "base/error.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"

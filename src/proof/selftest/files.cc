@@ -4,7 +4,6 @@
 #include <cstring>
 
 #include "base/rng.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "nn/nn.h"

@@ -2,6 +2,9 @@
 #include "render/picture/composite.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "base/error.h"
 
 namespace tilegrad {
 namespace {

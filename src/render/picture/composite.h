@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
+#include "render/engine.h"
 #include "render/picture/picture.h"
 #include "scene/image.h"
 #include "tilegrad/renderer.h"

@@ -3,14 +3,72 @@
 // textures.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
-#include "render/picture/layers.h"
+#include "base/parallel.h"
+#include "render/engine.h"
+#include "scene/camera.h"
+#include "scene/image.h"
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad {
+
+// Scenes whose surfaces have holes or let light through, drawn layer by layer from the front (depth
+// peeling): every pixel sees its own layers in the right order, however faces lie in the file or
+// cut each other. Not differentiable.
+
+// How much of what is behind a surface it hides.
+struct SurfaceCover {
+  enum class Kind {
+    kOpaque,  // everything
+    kMask,    // everything where its alpha is at least `cutoff`; elsewhere it is not there
+    kBlend    // the share that its alpha is
+  };
+  Kind kind = Kind::kOpaque;
+  float cutoff = 0.5f;
+
+  float Of(float alpha) const;  // 0..1
+};
+
+struct SceneCover {
+  Scene alpha;                         // the same faces, unlit, coloured by their alpha
+  std::vector<SurfaceCover> surfaces;  // of the scene, as face_surfaces has them
+};
+
+// What is seen, in the order of layers: of each pixel that shows a face in this layer, its index,
+// and the share of what is behind that it hides. Returns whether the pixel needs no layer more.
+using TakeLayer = std::function<bool(const Images& layer, std::size_t pixel, float cover)>;
+
+class LayerRenderer {
+ public:
+  explicit LayerRenderer(const Workers& workers) : engine_(workers) {}
+
+  // Draws image after image of `scene`, until every pixel is done. Behind kMostLayers faces nothing
+  // is drawn.
+  Status Render(const Scene& scene, const SceneCover& cover, const RenderOptions& options,
+                const Outputs& outputs, const TakeLayer& take);
+
+  static constexpr int kMostLayers = 64;
+  const PlanReport& plan() const { return plan_; }  // of the first layer
+
+ private:
+  Status DrawAlpha(const SceneCover& cover, const Camera& camera, const RenderOptions& options);
+  Status RenderAll(const Scene& scene, const SceneCover& cover, const RenderOptions& options,
+                   const Outputs& outputs, const TakeLayer& take);
+  bool Visit(const Scene& scene, const SceneCover& cover, const TakeLayer& take);
+
+  Engine engine_;
+  FrameImages layer_, alpha_;
+  PlanReport plan_;
+};
 
 // In which numbers light is added and multiplied.
 enum class ColorSpace {
@@ -73,5 +131,58 @@ class MeshScene {
   std::vector<Texture> alpha_textures_;            // as textures_
   std::vector<Surface> alpha_surfaces_;
 };
+
+// Pictures of a mesh: under the fixed light of datasets, and unlit for people who look at
+// predictions. Not differentiable.
+
+// Pictures of a mesh with its materials under a light that is fixed in the world, so that a point
+// has one colour in all views: Lambert with ambient 0.45, a key light of 0.45 from (0.35, 0.8, 0.5)
+// and a fill light of 0.2 from (-0.6, 0.3, -0.75), in the numbers of the files, cut at 1. Surfaces
+// are two-sided, cut out where they ask for an alpha mask, else opaque, and normals of files are
+// turned to the side of the winding, since real models are soups of shells. 4 x 4 samples a pixel.
+//
+// Owns a renderer and its scratch memory; one call at a time, on the calling thread.
+class LitRenderer {
+ public:
+  LitRenderer();
+  ~LitRenderer();
+  LitRenderer(LitRenderer&&) noexcept;
+
+  // `cameras` are those of square images of `size` pixels, 1 to 4096. Returns
+  // [cameras][4][size][size], planar RGBA, RGB composited over black; alpha is the covered share.
+  // Errors: an invalid mesh or one without faces, and those of Renderer::Render.
+  Result<std::vector<std::uint8_t>> Render(const Mesh& mesh, std::span<const Camera> cameras,
+                                           int size);
+  // One such picture as an RGBA image, straight alpha.
+  Result<ImageU8> RenderStraight(const Mesh& mesh, const Camera& camera, int size);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Predicted colours hold the light of the training images: unlit, over kPaper, 3 x 3 samples a
+// pixel. One RGB picture of size x size for each camera, whose lenses are for `camera_size` pixels
+// a side.
+struct UnlitPictures {
+  std::span<const Camera> cameras;
+  int camera_size = 64;
+  int size = 256;
+};
+Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const UnlitPictures& request,
+                                      const Workers& workers);
+
+// The unlit colour of each corner, [3F]: factor x texture x vertex colour. `mesh` is valid.
+std::vector<glm::vec3> CornerColors(const Mesh& mesh);
+
+// The light of datasets: Lambert with ambient 0.45, a key light of 0.45 from (0.35, 0.8, 0.5) and a
+// fill light of 0.2 from (-0.6, 0.3, -0.75), fixed in the world, in the numbers of the files.
+
+inline constexpr float kDatasetAmbient = 0.45f;
+
+std::array<Light, 2> DatasetLights();  // key, fill; directions are unit
+
+// White, with that ambient light.
+Surface DatasetSurface();
 
 }  // namespace tilegrad

@@ -5,9 +5,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <span>
+#include <vector>
 
 #include "base/aligned.h"
+#include "base/parallel.h"
 #include "raster/attributes.h"
 #include "raster/bin.h"
 #include "raster/drawn_faces.h"
@@ -19,10 +22,43 @@
 #include "raster/soft_mask/tree.h"
 #include "raster/visibility.h"
 #include "render/pipeline/records.h"
-#include "render/pipeline/topologies.h"
-#include "render/pipeline/work.h"
 
 namespace tilegrad {
+
+// The faces of a batch's meshes. Scenes that share their array of faces, as those of a template
+// mesh do, share what follows from it: it then stays in the cache from image to image.
+
+// Tells whether an image still has the faces that it was prepared from.
+struct TopologyId {
+  std::size_t index = 0;
+  std::uint64_t version = 0;  // 0: no faces
+  bool operator==(const TopologyId&) const = default;
+};
+
+struct FaceTopology {
+  TopologyId id;
+  std::size_t vertices = 0;
+  AlignedVector<std::int32_t> faces;  // [F,3] as given, all in [0, vertices)
+  raster::FaceCorners corners;        // of `faces`
+};
+
+// Grows to its largest use and stays.
+class Topologies {
+ public:
+  // Makes the topologies of a batch, if they are not those of the last one.
+  void Update(std::span<const PipelineScene> scenes, const Workers& workers);
+
+  // That of scene n. Images may look at its corners as long as it has the same id.
+  const FaceTopology& of(std::size_t n) const { return topologies_[of_scene_[n]]; }
+
+ private:
+  void Group(std::span<const PipelineScene> scenes);
+
+  std::deque<FaceTopology> topologies_;   // stay where they are as more come
+  std::vector<std::size_t> of_scene_;     // which of them
+  std::vector<std::size_t> first_scene_;  // that has it
+  std::uint64_t updates_ = 0;
+};
 
 // What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
 // the forward pass of the same scenes.

@@ -14,11 +14,10 @@
 #include "base/parallel.h"
 #include "render/frame_images.h"
 #include "render/pipeline/records.h"
-#include "render/pipeline/work.h"
 
 namespace tilegrad {
 
-class PixelStage;  // pixel_stage.h
+class PixelStage;
 
 // Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
 // at a time per Pipeline. Same bits for any worker count and any run. All scenes of a batch have

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shading/plan.h"
 
+#include <fmt/format.h>
+
+#include <utility>
+
 namespace tilegrad {
 namespace {
 

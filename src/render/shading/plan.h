@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/pipeline/records.h"
 #include "render/scene_fields.h"
 
 namespace tilegrad {

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "render/pipeline/records.h"
-#include "render/pipeline/work.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shading/run.h"
 
-#include <algorithm>
-
 #include "base/clocks.h"
 #include "shade/normalize.h"
 #include "shade/phong.h"

@@ -7,7 +7,6 @@
 #include "base/clocks.h"
 #include "raster/conventions.h"
 #include "render/pipeline/stages.h"
-#include "render/shading/uv_level.h"
 
 namespace tilegrad {
 namespace {

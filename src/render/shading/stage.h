@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "render/frame_images.h"
-#include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "base/aligned.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "base/scratch_bytes.h"
 #include "scene/camera.h"
 #include "train/data/dataset.h"
 #include "train/run/portion.h"

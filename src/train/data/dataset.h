@@ -17,7 +17,6 @@
 #include "base/file.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
-#include "scene/up_axis.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::train {

@@ -11,10 +11,10 @@
 #include <optional>
 #include <vector>
 
+#include "base/aligned.h"
 #include "base/function_ref.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "base/scratch_bytes.h"
 #include "train/data/dataset.h"
 
 namespace tilegrad::train {

@@ -8,7 +8,7 @@
 #include "base/file.h"
 #include "io/archive.h"
 #include "train/run/carried_files.h"
-#include "train/run/first_difference.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
 namespace {

@@ -4,12 +4,15 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "train/data/dataset.h"
 #include "train/eval/evaluation.h"
+#include "train/eval/scores.h"
 
 namespace tilegrad::train {
 
@@ -28,5 +31,46 @@ class ClassMeans {
   std::vector<std::string> classes_;
   std::vector<int> class_models_;
 };
+
+// How far means over held-out models would move with another draw of models.
+
+struct ClassedMean {
+  double mean = 0;              // over classes of means over shapes
+  std::optional<double> error;  // its standard error; none: no class has two shapes
+};
+
+// classes[c]: a number of each shape of a class; classes without any do not count. Classes are
+// fixed and shapes are drawn from them; the spread within a class is taken to be the same in all,
+// since few have more than a handful.
+ClassedMean MeanOverClasses(std::span<const std::vector<double>> classes);
+
+// The errors of all measures, each over the shapes that have it; a measure without one is not
+// there. None where iou, which all have, has none.
+std::optional<Score> StandardErrors(std::span<const std::vector<Score>> classes);
+
+// Two runs on the same held-out models. Models differ far more than runs do, so the difference of
+// two means is known much better than either.
+
+struct PairedDifference {
+  const ScoreMeasure* measure;
+  ClassedMean difference;  // of the first run minus the second
+  // Less than two standard errors, or one that is not known.
+  bool tie() const;
+  bool better() const { return (difference.mean > 0) != measure->less_is_better; }
+};
+
+struct PairedComparison {
+  std::string predictor;                   // of the second run
+  int models = 0;                          // that both have scores of
+  std::vector<PairedDifference> measures;  // that all of these have in both
+};
+
+// By the models of Evaluation::models that both have: mean over the models of a shape, over shapes
+// and over classes. An error where there are none.
+Result<PairedComparison> ComparePaired(const Evaluation& first, const Evaluation& second);
+
+// A line a measure: "3D IoU  +1.3 ± 0.4  better".
+std::string FormatComparison(const PairedComparison& comparison);
+nlohmann::ordered_json ComparisonJson(const PairedComparison& comparison);
 
 }  // namespace tilegrad::train

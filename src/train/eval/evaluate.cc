@@ -10,9 +10,6 @@
 #include "train/data/dataset_files.h"
 #include "train/eval/class_means.h"
 #include "train/eval/retrieval.h"
-#include "train/eval/scores.h"
-#include "train/eval/single_shape.h"
-#include "train/ranks/share.h"
 
 namespace tilegrad::train {
 namespace {

@@ -53,7 +53,7 @@ struct Score {
   std::optional<double> texture_l1 = std::nullopt, lit_l1 = std::nullopt,
                         light_angle = std::nullopt;
   // Table 3, of tasks that learn from photographs, with texture_l1: 1 - IoU of silhouettes, and the
-  // share of visible keypoints that are right (metrics/keypoint_score.h). `iou` means nothing then.
+  // share of visible keypoints that are right (metrics/metrics.h). `iou` means nothing then.
   std::optional<double> mask_loss = std::nullopt, pck = std::nullopt;
 };
 
@@ -61,7 +61,7 @@ struct EvaluationRow {
   std::string method;
   std::vector<Score> classes;                 // as Evaluation::classes
   Score mean;                                 // of the class means
-  std::optional<Score> error = std::nullopt;  // standard errors of `mean` (standard_error.h)
+  std::optional<Score> error = std::nullopt;  // standard errors of `mean` (class_means.h)
 };
 
 struct ModelScore {

@@ -2,8 +2,15 @@
 #include "train/eval/retrieval.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <sstream>
+
+#include "base/error.h"
+#include "render/picture/composite.h"
+#include "train/data/cutout.h"
 
 namespace tilegrad::train {
 namespace {
@@ -67,6 +74,290 @@ ImageIndex::Match ImageIndex::Nearest(std::span<const std::uint8_t> image, int s
     }
   }
   return {entries_[at].model, entries_[at].view, std::sqrt(best / double{kThumbnailBytes}) / 255};
+}
+
+namespace {
+
+constexpr std::size_t kLevels = 256;
+using Histogram = std::array<std::size_t, kLevels + 1>;
+
+// For each voxel the share of grids that have it, in units of 1 / kLevels, rounded down.
+std::vector<std::uint16_t> Shares(std::span<const std::vector<std::uint8_t>> grids) {
+  std::vector<std::size_t> count(grids.front().size(), 0);
+  for (const auto& grid : grids) {
+    for (std::size_t i = 0; i < count.size(); ++i) count[i] += grid[i];
+  }
+  std::vector<std::uint16_t> shares(count.size());
+  for (std::size_t i = 0; i < count.size(); ++i) {
+    shares[i] = static_cast<std::uint16_t>(count[i] * kLevels / grids.size());
+  }
+  return shares;
+}
+
+// How many entries are at level k or above, for each k.
+void SumFromAbove(Histogram* histogram) {
+  for (std::size_t k = kLevels; k-- > 0;) (*histogram)[k] += (*histogram)[k + 1];
+}
+
+// Adds a grid's IoU with the shape {share >= k} for every level k at once.
+void AddIous(const std::vector<std::uint8_t>& grid, std::span<const std::uint16_t> shares,
+             const Histogram& shape_size, std::array<double, kLevels + 1>* sums) {
+  Histogram both{};
+  for (std::size_t i = 0; i < grid.size(); ++i) both[shares[i]] += grid[i];
+  SumFromAbove(&both);
+  const std::size_t solid = both[0];
+  for (std::size_t k = 0; k <= kLevels; ++k) {
+    const std::size_t either = solid + shape_size[k] - both[k];
+    (*sums)[k] += either == 0 ? 1.0 : static_cast<double>(both[k]) / static_cast<double>(either);
+  }
+}
+
+}  // namespace
+
+SingleShape BestSingleShape(std::span<const std::vector<std::uint8_t>> grids) {
+  const auto shares = Shares(grids);
+  Histogram shape_size{};
+  for (const auto share : shares) ++shape_size[share];
+  SumFromAbove(&shape_size);
+  std::array<double, kLevels + 1> sums{};
+  for (const auto& grid : grids) AddIous(grid, shares, shape_size, &sums);
+  // Level 0 would be the whole cube, whatever the grids hold.
+  const auto best = std::max_element(sums.begin() + 1, sums.end());
+  const auto level = static_cast<std::size_t>(best - sums.begin());
+  SingleShape shape;
+  shape.threshold = static_cast<double>(level) / kLevels;
+  shape.mean_iou = *best / static_cast<double>(grids.size());
+  for (const auto share : shares) shape.occupancy.push_back(share >= level);
+  return shape;
+}
+
+Mesh VoxelSurface(std::span<const std::uint8_t> occupancy, int n) {
+  const auto solid = [&](std::array<int, 3> p) {
+    for (int c : p) {
+      if (c < 0 || c >= n) return false;
+    }
+    return occupancy[static_cast<std::size_t>((p[0] * n + p[1]) * n + p[2])] != 0;
+  };
+  Mesh mesh;
+  // One side of a voxel: a square across `axis`, seen from outside.
+  const auto add_side = [&](std::array<int, 3> at, std::size_t axis, int side) {
+    const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto first = static_cast<std::int32_t>(mesh.positions.size());
+    at[axis] += side;
+    for (const auto& [du, dv] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+      auto corner = at;
+      corner[u] += du;
+      corner[v] += dv;
+      mesh.positions.emplace_back(corner[0], corner[1], corner[2]);
+    }
+    const std::int32_t b = side == 1 ? 1 : 3, d = side == 1 ? 3 : 1;
+    mesh.faces.push_back({first, first + b, first + 2});
+    mesh.faces.push_back({first, first + 2, first + d});
+  };
+  for (int x = 0; x < n; ++x) {
+    for (int y = 0; y < n; ++y) {
+      for (int z = 0; z < n; ++z) {
+        if (!solid({x, y, z})) continue;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          for (int side : {0, 1}) {
+            std::array<int, 3> next = {x, y, z};
+            next[axis] += 2 * side - 1;
+            if (!solid(next)) add_side({x, y, z}, axis, side);
+          }
+        }
+      }
+    }
+  }
+  return mesh;
+}
+
+namespace {
+
+constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
+                      kPictureBytes = 4 * kPixels;
+
+constexpr const char* kThumbnails = "thumbnails.npz";  // of a run
+
+// Which of `count` are taken so that at most `most` are, evenly spread.
+std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
+  const std::size_t taken = std::min(count, most);
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < taken; ++i) out.push_back(i * count / taken);
+  return out;
+}
+
+// Of two framed pictures, in [0, 1]: the mean over what either covers of the squared differences of
+// colour and of coverage, which count alike.
+double PictureDistance(const std::uint8_t* a, const std::uint8_t* b) {
+  std::uint32_t color = 0, alpha = 0, covered = 0;  // at most 768 * 255^2
+  for (std::size_t i = 0; i < 3 * kPixels; ++i) {
+    const int difference = int{a[i]} - int{b[i]};
+    color += static_cast<std::uint32_t>(difference * difference);
+  }
+  for (std::size_t i = 3 * kPixels; i < kPictureBytes; ++i) {
+    const int difference = int{a[i]} - int{b[i]};
+    alpha += static_cast<std::uint32_t>(difference * difference);
+    covered += std::max(a[i], b[i]);
+  }
+  if (covered == 0) return 0;
+  return (color / 3.0 + alpha) / (2 * 255.0 * covered);
+}
+
+// One line of a text.
+std::string OneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  return text;
+}
+
+}  // namespace
+
+TrainingPictures TrainingPictures::Of(const Dataset& dataset, const ImageStore& store,
+                                      const Workers& workers) {
+  TrainingPictures out;
+  std::map<std::pair<int, std::string>, int> shapes;  // numbered as they come
+  std::vector<int> shape_of;
+  for (const int m : dataset.Select(Split::kTrain)) {
+    const ModelInfo& model = dataset.models()[static_cast<std::size_t>(m)];
+    const std::string& class_name =
+        dataset.info().classes[static_cast<std::size_t>(model.class_index)];
+    out.models_.push_back(
+        {OneLine(model.name.empty() ? model.id : model.name), OneLine(class_name)});
+    const int next = static_cast<int>(shapes.size());
+    shape_of.push_back(shapes.try_emplace({model.class_index, ShapeOf(model)}, next).first->second);
+  }
+  out.Keep(store, workers);
+  out.Measure(shape_of, workers);
+  return out;
+}
+
+void TrainingPictures::Keep(const ImageStore& store, const Workers& workers) {
+  count_ = std::int64_t{store.models} * store.views;
+  const auto chosen = SpreadIndices(static_cast<std::size_t>(count_), kMostThumbnails);
+  std::vector<std::vector<std::uint8_t>> small(chosen.size());
+  const auto model_of = [&](std::size_t i) { return static_cast<int>(chosen[i]) / store.views; };
+  workers.For(chosen.size(), [&](std::size_t i, std::size_t) {
+    const auto image = store.Image(model_of(i), static_cast<int>(chosen[i]) % store.views);
+    auto made = PrepareCutout(StraightRgba(image, store.size), kThumbnailSize, Framing::kFit);
+    if (made.ok()) small[i] = std::move(*made);
+  });
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (small[i].empty()) continue;
+    pictures_.insert(pictures_.end(), small[i].begin(), small[i].end());
+    of_.push_back(model_of(i));
+  }
+}
+
+std::span<const std::uint8_t> TrainingPictures::Picture(std::size_t i) const {
+  return std::span(pictures_).subspan(i * kPictureBytes, kPictureBytes);
+}
+
+template <class MayMatch>
+std::optional<TrainingPictures::Found> TrainingPictures::Search(std::span<const std::uint8_t> small,
+                                                                const MayMatch& may_match) const {
+  std::optional<Found> best;
+  for (std::size_t i = 0; i < of_.size(); ++i) {
+    if (!may_match(i)) continue;
+    const double square = PictureDistance(small.data(), Picture(i).data());
+    if (!best || square < best->square) best = Found{i, square};
+  }
+  return best;
+}
+
+void TrainingPictures::Measure(std::span<const int> shapes, const Workers& workers) {
+  const auto shape = [&](std::size_t i) { return shapes[static_cast<std::size_t>(of_[i])]; };
+  const auto measured = SpreadIndices(of_.size(), kMostMeasured);
+  std::vector<std::optional<Found>> found(measured.size());
+  workers.For(measured.size(), [&](std::size_t i, std::size_t) {
+    const int own = shape(measured[i]);
+    found[i] = Search(Picture(measured[i]), [&](std::size_t other) { return shape(other) != own; });
+  });
+  for (const auto& nearest : found) {
+    if (nearest) others_.push_back(static_cast<float>(std::sqrt(nearest->square)));
+  }
+  std::sort(others_.begin(), others_.end());
+}
+
+std::optional<double> TrainingPictures::usual() const {
+  if (others_.empty()) return std::nullopt;
+  const double rank = std::ceil(kUsualShare * static_cast<double>(others_.size()));
+  return others_[static_cast<std::size_t>(rank) - 1];
+}
+
+bool TrainingPictures::IsUnlike(const Match& match) const {
+  const auto limit = usual();
+  return limit && match.distance > *limit;
+}
+
+Result<std::optional<TrainingPictures::Match>> TrainingPictures::Nearest(
+    const ImageU8& image) const {
+  TILEGRAD_ASSIGN(const auto small, PrepareCutout(image, kThumbnailSize, Framing::kFit));
+  const auto found = Search(small, [](std::size_t) { return true; });
+  if (!found) return std::optional<Match>();
+  const Model& model = models_[static_cast<std::size_t>(of_[found->picture])];
+  return std::optional(Match{model.name, model.class_name, std::sqrt(found->square)});
+}
+
+Status TrainingPictures::Write(const Path& run) const {
+  std::string names;
+  for (const Model& model : models_) names += model.name + "\t" + model.class_name + "\n";
+  const auto* text = reinterpret_cast<const std::uint8_t*>(names.data());
+  const std::size_t kept = of_.size();
+  return io::SaveNpz(run / kThumbnails,
+                     {{"pictures", io::MakeNpy<std::uint8_t>(
+                                       {kept, 4, kThumbnailSize, kThumbnailSize}, pictures_)},
+                      {"models", io::MakeNpy<std::int32_t>({kept}, of_)},
+                      {"names", io::MakeNpy<std::uint8_t>({names.size()}, {text, names.size()})},
+                      {"others", io::MakeNpy<float>({others_.size()}, others_)},
+                      {"count", io::MakeNpy<std::int64_t>({1}, {&count_, 1})}});
+}
+
+// What the arrays of a file say of each other.
+Status TrainingPictures::Check() const {
+  if (pictures_.size() != of_.size() * kPictureBytes || of_.size() > kMostThumbnails)
+    return DataLoss("{} bytes of {} pictures", pictures_.size(), of_.size());
+  for (const std::int32_t model : of_) {
+    if (model < 0 || static_cast<std::size_t>(model) >= models_.size())
+      return DataLoss("a picture of model {}, of {}", model, models_.size());
+  }
+  for (const float distance : others_) {
+    if (!(distance >= 0 && distance <= 1)) return DataLoss("a distance of {}", distance);
+  }
+  if (!std::is_sorted(others_.begin(), others_.end()))
+    return DataLoss("distances are not in order");
+  return {};
+}
+
+Status TrainingPictures::Load(const RunFile& file) {
+  io::NpzArrays arrays;
+  for (const char* name : {"pictures", "models", "names", "others", "count"}) {
+    TILEGRAD_ASSIGN(arrays[name], io::DecodeNpzArray(file.bytes, file.place, name));
+  }
+  return Fill(arrays).Within(file.place);
+}
+
+Status TrainingPictures::Fill(const io::NpzArrays& arrays) {
+  TILEGRAD_ASSIGN(pictures_, arrays.at("pictures").As<std::uint8_t>());
+  TILEGRAD_ASSIGN(of_, arrays.at("models").As<std::int32_t>());
+  TILEGRAD_ASSIGN(others_, arrays.at("others").As<float>());
+  TILEGRAD_ASSIGN(const auto text, arrays.at("names").As<std::uint8_t>());
+  TILEGRAD_ASSIGN(const auto count, arrays.at("count").As<std::int64_t>());
+  if (count.size() != 1) return DataLoss("{} counts of pictures", count.size());
+  count_ = count[0];
+  std::istringstream lines(std::string(text.begin(), text.end()));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t tab = std::min(line.find('\t'), line.size());
+    models_.push_back({line.substr(0, tab), line.substr(std::min(tab + 1, line.size()))});
+  }
+  return Check();
+}
+
+Result<std::optional<TrainingPictures>> TrainingPictures::Read(const Path& run) {
+  TILEGRAD_ASSIGN(const auto file, ReadRunFile(run, kThumbnails));
+  if (!file) return std::optional<TrainingPictures>();
+  TrainingPictures out;
+  TILEGRAD_TRY(out.Load(*file));
+  return std::optional(std::move(out));
 }
 
 }  // namespace tilegrad::train

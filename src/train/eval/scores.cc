@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/eval/scores.h"
 
-#include <cstdlib>
-
-#include "base/error.h"
 #include "render/picture/composite.h"
 #include "render/picture/mesh_scene.h"
 #include "scene/camera_conventions.h"
-#include "train/eval/measures.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train {

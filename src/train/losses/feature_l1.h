@@ -8,10 +8,13 @@
 // its second sum.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <span>
 #include <vector>
 
-#include "nn/gan.h"
+#include "nn/networks.h"
 #include "nn/tape.h"
 
 namespace tilegrad::train {
@@ -29,5 +32,57 @@ nn::Var FeatureL1Loss(const FeatureFunction& features, const nn::Var& predicted,
 // The levels of a critic without its scores, which the adversarial loss is about. The critic must
 // outlive the function.
 FeatureFunction FeaturesOf(nn::Critic& critic);
+
+// Equation 13: the L1 loss of colours. As the official code: the sum over the channels of the mean
+// over pixels and images of |I - I'|, that is three times a plain mean for RGB.
+
+// Sum of |a - b| of one image, in double and in order.
+template <class T>
+double AbsoluteDifference(std::span<const T> a, std::span<const T> b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += std::abs(static_cast<double>(b[i]) - static_cast<double>(a[i]));
+  return sum;
+}
+
+// The subgradient `scale` * sign(predicted - truth), 0 where they are equal.
+template <class T>
+void AbsoluteDifferenceBackward(std::span<const T> truth, std::span<const T> predicted,
+                                double scale, std::span<T> d_predicted) {
+  const T s = static_cast<T>(scale);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    d_predicted[i] = predicted[i] > truth[i] ? s : predicted[i] < truth[i] ? -s : T(0);
+  }
+}
+
+// image and truth: [N, channels, H, W] of one dtype. A scalar.
+nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth);
+
+// The plain mean over images, channels and pixels of weight * |image - truth|; weight: [N, H, W].
+nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,
+                            const nn::Tensor& weight);
+
+// Huber's mixture instead of |d|: d^2 / (2 soft) up to |d| = soft, |d| - soft / 2 beyond. Where
+// something unknown makes colours bright or dark, L1 alone settles for their median, which may be
+// black, and this for nearly their mean.
+template <class T>
+double HuberDifference(std::span<const T> truth, std::span<const T> predicted, double soft) {
+  double sum = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double d = std::abs(static_cast<double>(predicted[i]) - static_cast<double>(truth[i]));
+    sum += d < soft ? 0.5 * d * d / soft : d - 0.5 * soft;
+  }
+  return sum;
+}
+template <class T>
+void HuberDifferenceBackward(std::span<const T> truth, std::span<const T> predicted, double soft,
+                             double scale, std::span<T> d_predicted) {
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double d = static_cast<double>(predicted[i]) - static_cast<double>(truth[i]);
+    d_predicted[i] = static_cast<T>(scale * std::clamp(d / soft, -1.0, 1.0));
+  }
+}
+// soft > 0, in units of colours.
+nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft);
 
 }  // namespace tilegrad::train

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "nn/nn.h"
-#include "train/run/step_values.h"
+#include "train/run/log.h"
 
 namespace tilegrad::train {
 

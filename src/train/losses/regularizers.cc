@@ -2,7 +2,6 @@
 #include "train/losses/regularizers.h"
 
 #include "train/losses/area.h"
-#include "train/losses/edge_length.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
 

@@ -2,7 +2,7 @@
 #include "train/losses/wgan_gp.h"
 
 #include "base/error.h"
-#include "nn/gan.h"
+#include "nn/networks.h"
 #include "nn/ops.h"
 
 namespace tilegrad::train {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -73,5 +74,52 @@ struct SurfaceScore {
 // 0.9). All zero if one of the two has no points. Coordinates must be finite.
 SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<const glm::vec3> truth,
                              double threshold);
+
+// How crisp a picture is.
+
+// Some planes of one picture: [channels][height][width], any range.
+struct PlanarPicture {
+  std::span<const float> values;
+  int channels = 0, height = 0, width = 0;
+};
+
+// High-pass energy: the mean over channels and counted pixels of (I - B I)^2, where B is the
+// binomial filter (1 2 1)^T (1 2 1) / 16. Counted is a pixel whose whole 3x3 window lies in the
+// picture and, where `covered` [height][width] is given, at pixels that are not 0 there: the crisp
+// outline of a blurred texture does not count. 0 of a constant picture and where no pixel counts;
+// m^2 of a chequerboard of +m and -m. Compare it with the truth's on the truth's pixels: below it,
+// a picture is blurred; above it, noisy. InvalidArgument: the sizes do not fit together, or a
+// number is not finite.
+Result<double> HighPassEnergy(const PlanarPicture& picture,
+                              std::span<const std::uint8_t> covered = {});
+
+// PCK: the percentage of correct keypoints, as CMR counts it.
+
+// An error is right if it is below `threshold`, in parts of the longer side of the object's box.
+class KeypointScore {
+ public:
+  KeypointScore(std::size_t keypoints, double threshold)
+      : threshold_(threshold), right_(keypoints), seen_(keypoints) {}
+  // A visible keypoint.
+  void Add(std::size_t keypoint, double error) {
+    ++seen_[keypoint];
+    right_[keypoint] += error < threshold_ ? 1 : 0;
+  }
+  // The share that is right of each keypoint, and the mean of those over the keypoints that were
+  // seen; nothing if none was.
+  std::optional<double> Mean() const {
+    double sum = 0, count = 0;
+    for (std::size_t k = 0; k < seen_.size(); ++k) {
+      if (seen_[k] == 0) continue;
+      sum += static_cast<double>(right_[k]) / static_cast<double>(seen_[k]);
+      count += 1;
+    }
+    return count > 0 ? std::optional(sum / count) : std::nullopt;
+  }
+
+ private:
+  double threshold_;
+  std::vector<std::int64_t> right_, seen_;
+};
 
 }  // namespace tilegrad::train

@@ -3,9 +3,45 @@
 // all workers, with the same bits for any number of them.
 #pragma once
 
-#include "train/metrics/feature_rows.h"
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad::train {
+
+// Pictures or shapes as points: what metrics of sets of them work on.
+
+// `rows` points of `width` coordinates, one after the other.
+struct FeatureRows {
+  std::vector<float> values;
+  std::size_t width = 0;
+
+  std::size_t rows() const { return width == 0 ? 0 : values.size() / width; }
+  std::span<const float> Row(std::size_t i) const {
+    return std::span(values).subspan(i * width, width);
+  }
+};
+
+// InvalidArgument with `what` if there are fewer than `least` rows, values that fill no whole row,
+// or one that is not finite.
+Status CheckRows(const FeatureRows& rows, std::size_t least, const char* what);
+// The same of two sets, which must also agree in width.
+Status CheckPair(const FeatureRows& a, const FeatureRows& b, std::size_t least, const char* what);
+
+// `count` of the rows, or all if there are fewer, drawn without replacement by `seed`.
+FeatureRows DrawRows(const FeatureRows& from, std::size_t count, std::uint64_t seed);
+// Rows [begin, end).
+FeatureRows SliceRows(const FeatureRows& from, std::size_t begin, std::size_t end);
+
+// Each column of `rows` minus its mean in `reference`, divided by its deviation there; a column
+// that is constant there is set to 0.
+FeatureRows Standardised(const FeatureRows& rows, const FeatureRows& reference);
+
+// |a - b|^2 in double, in order.
+double SquaredDistance(std::span<const float> a, std::span<const float> b);
 
 // Whether what is generated looks like the truth (precision), and whether all of the truth is
 // generated (recall); in [0, 1]. Kynkaanniemi et al. 2019: a point counts as covered by a set if it
@@ -58,5 +94,20 @@ struct SetScores {
 // More than kNeighbours rows must remain. `truth` should be what the generator was not trained on.
 Result<SetScores> ScoreSets(const FeatureRows& truth, const FeatureRows& generated,
                             std::uint64_t seed, const Workers& workers);
+
+// How far two sets of pictures are from each other as a whole: distances of distributions of their
+// features. Small sets are biased, so a figure means something beside one of equal size only: see
+// set_scores.h. With features of any network but Inception v3 this is not "FID".
+
+// Frechet distance of the normal distributions of two sets (Dowson, Landau 1982; Heusel et al.
+// 2017): |m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2)), C the unbiased covariances. At least 2
+// rows each. Of f32 features as good as sqrt of their rounding: 1e-6 of the traces.
+Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b);
+
+// Kernel distance (Binkowski et al. 2018): the unbiased estimate of the squared maximum mean
+// discrepancy with k(x, y) = (x . y / width + 1)^3, which may fall below 0; at least 2 rows each.
+// Standardise the rows first (by the true set), or the widest columns decide alone. Same bits for
+// any worker count.
+Result<double> KernelDistance(const FeatureRows& a, const FeatureRows& b, const Workers& workers);
 
 }  // namespace tilegrad::train

@@ -2,7 +2,6 @@
 #include "train/models/mesh_network.h"
 
 #include "base/error.h"
-#include "nn/layers.h"
 #include "nn/nn.h"
 
 namespace tilegrad::train {

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "nn/layers.h"
-#include "train/models/prediction.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 

@@ -6,12 +6,11 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <numeric>
-#include <vector>
 
 #include "base/error.h"
 #include "nn/nn.h"
 #include "scene/weak_perspective_ref.h"
-#include "train/ops/weak_cameras.h"
+#include "train/models/weak_cameras.h"
 
 namespace tilegrad::train {
 namespace {

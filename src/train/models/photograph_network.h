@@ -12,8 +12,8 @@
 
 #include "nn/ops.h"
 #include "scene/mesh.h"
-#include "train/models/picture_code.h"
-#include "train/models/prediction.h"
+#include "train/models/picture_lookup.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 

@@ -4,10 +4,14 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "nn/context.h"
-#include "scene/sphere_uv.h"
+#include "nn/networks.h"
+#include "nn/ops.h"
+#include "scene/mesh.h"
+#include "scene/shapes.h"
 #include "tilegrad/camera.h"
 
 namespace tilegrad::train {
@@ -59,5 +63,67 @@ class PictureLookup {
   std::vector<Face> faces_;
   std::vector<SurfacePoint> texels_;  // [side][side]
 };
+
+// What the networks of sections 5.2 to 5.4 have in common: a U-Net from a picture to a map of the
+// sphere, whose bottom goes through one code that other heads start from, too.
+
+struct PictureCodeShape {
+  std::int64_t image_size = 64;  // pixels a side, a multiple of 2^levels of the U-Net
+  std::int64_t latent = 384;     // numbers of the code
+  int layers = 1;                // fully connected, from the U-Net's bottom to the code
+};
+
+class PictureCode : public nn::Module {
+ public:
+  PictureCode(nn::Context& context, const nn::UNetShape& unet, const PictureCodeShape& shape,
+              Rng& rng);
+
+  struct Encoded {
+    nn::StepVector<nn::Var> levels;  // UNet::Encode
+    nn::Var latent;                  // [B, latent]
+  };
+  Encoded Encode(const nn::Var& pictures, nn::Mode mode);    // [B, in, size, size]
+  nn::Var DecodeMap(const Encoded& encoded, nn::Mode mode);  // [B, out, h, w]
+
+  nn::Var Forward(const nn::Var& pictures, nn::Mode mode) override {
+    return DecodeMap(Encode(pictures, mode), mode);
+  }
+  void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+
+ private:
+  nn::UNet unet_;
+  nn::Sequential latent_, map_;
+  nn::Shape bottom_;  // of the U-Net, for one picture
+};
+
+// Rows of v [B, n], each divided by sqrt(|v|^2 + 1e-8), so that a row of zeros stays one.
+nn::Var UnitRows(const nn::Var& v);
+
+// Maps of a sphere as N3MR's texture cubes of 2 x 2 x 2 texels a face, and back: one network for
+// both renderers.
+
+class FaceCubes {
+ public:
+  static constexpr std::int64_t kTexels = 8;  // of a face; texel (i, j, k) is number 4 i + 2 j + k
+
+  FaceCubes() = default;
+  // `sphere` with SphereUvs; maps are side x side.
+  FaceCubes(nn::Context& context, const Mesh& sphere, int side);
+
+  // textures [B,side,side,3] -> [B,F,8,3]: as N3MR's loader, bilinear samples at barycentric
+  // coordinates (i, j, k) / (i + j + k), and at the middle for (0, 0, 0).
+  nn::Var Cubes(const nn::Var& textures) const;
+  // [B,F,8,3] -> [B,side,side,3]: what N3MR would show at each texel's place.
+  nn::Var Maps(const nn::Var& cubes) const;
+
+ private:
+  std::int64_t side_ = 0, faces_ = 0;
+  nn::AxisMap to_cubes_, to_maps_;  // of [side side] and of [8 F]
+};
+
+// positions [N,V,3], directions [N,3] in the world -> [N,F,1,1]: ambient + max(0, n.d) with each
+// face's outward normal n, as N3MR lights faces.
+nn::Var FaceLight(const nn::Var& positions, const std::vector<Face>& faces,
+                  const nn::Var& directions, double ambient);
 
 }  // namespace tilegrad::train

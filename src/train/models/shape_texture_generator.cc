@@ -32,7 +32,7 @@ nn::Var FrameOfWhole(const nn::Var& map) {
 }
 
 // Which column of a map each column of a texture shows. The mirror image at x = 0 of column i is
-// W/2 - 1 - i (scene/sphere_uv.h).
+// W/2 - 1 - i (scene/shapes.h).
 nn::Tensor MapColumns(nn::Context& context, const GeneratorConfig& config) {
   const std::int64_t width = config.texture_size, half = width / 2;
   const std::int64_t first = ShapeTextureGenerator::FirstColumn(config);

@@ -9,7 +9,7 @@
 
 #include "nn/layers.h"
 #include "scene/mesh.h"
-#include "train/models/prediction.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
 

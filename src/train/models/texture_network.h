@@ -8,14 +8,63 @@
 #include <string>
 #include <vector>
 
+#include "nn/nn.h"
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
-#include "train/models/face_cubes.h"
-#include "train/models/picture_code.h"
-#include "train/models/prediction.h"
-#include "train/models/texture_painter.h"
+#include "train/models/picture_lookup.h"
+#include "train/models/sphere_model.h"
 
 namespace tilegrad::train {
+
+// Texels mixed from what the input picture shows of them and what a network makes up.
+
+struct TexturePainterShape {
+  int image_size = 64, texture_size = 128;  // pixels and texels a side
+  std::int64_t width = 16;                  // channels of the maps that come in, and of the layers
+  std::int64_t palette = 0;                 // paints of an object (PaletteColors); 0: none
+};
+
+class TexturePainter {
+ public:
+  TexturePainter(nn::Context& context, const Mesh& sphere, const TexturePainterShape& shape,
+                 Rng& rng);
+
+  // map: [B, width, image_size, image_size] -> textures [B, 3, texture_size, texture_size] in
+  // [0, 1], but for a tenth of what is above 1. Gradients go to `map` and the layers.
+  //
+  // A mixture of colours: what the picture shows at the texel and at its mirror image, without the
+  // predicted light and then brighter or darker; what the network makes up; that of the texel's
+  // paint. Were the light left in it, textures would explain their own pictures best under no
+  // light at all.
+  nn::Var Paint(const nn::Var& map, const PictureLookup::Job& job, nn::Mode mode);
+  // PictureLookup::Cues of the picture.
+  nn::Tensor Cues(const PictureLookup::Job& job) const { return coarse_.Cues(context_, job); }
+
+  void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
+    layers_.Visit(prefix, visitor);
+  }
+
+ private:
+  // Shares of picture, mirror image, made-up colour and paint: [B, 3 or 4, h, w], their sum is 1.
+  nn::Var Shares(const nn::Var& raw) const;
+  // Colours that do not come from the texel's own place in the picture, times their shares.
+  nn::Var MadeUp(const nn::Var& raw, const nn::Var& shares, const nn::Tensor& seen) const;
+
+  nn::Context& context_;
+  TexturePainterShape shape_;
+  PictureLookup coarse_, fine_;  // of the picture's size, and of the texture's
+  nn::Sequential layers_;
+};
+
+// Colours of what a picture does not show, or shows in the dark: most of an object is of a few
+// paints, and its lit parts give the colour of each.
+//
+// Each texel is of some paint, in shares `kinds` [M, K, h, w] that sum to 1 over K. The colour of a
+// paint is the mean of what `seen` (PictureLookup::Look, [M, 12, h, w]) shows of it without the
+// predicted light, where it is covered, faces the camera and is lit; where nothing is, that of
+// `guess` [M, 3, h, w]. Returns the colours of all texels, [M, 3, h, w]; gradients go to `kinds`
+// and `guess`.
+nn::Var PaletteColors(const nn::Var& kinds, const nn::Tensor& seen, const nn::Var& guess);
 
 struct TextureNetworkConfig {
   std::int64_t base = 24;          // U-Net: channels of the first level; they double to at most
@@ -32,7 +81,7 @@ struct TextureNetworkConfig {
   // Texels are looked up in the picture through the predicted shape and camera, in addition to the
   // decoder's texels (picture_lookup.h).
   bool lookup = false;
-  bool cubes = false;  // in evaluation textures are as N3MR's cubes show them (face_cubes.h)
+  bool cubes = false;  // in evaluation textures are as N3MR's cubes show them (picture_lookup.h)
   std::int64_t lookup_width = 16;   // channels of the decoder and of the layers behind it, then
   std::int64_t palette = 0;         // paints of an object (PaletteColors), with `lookup`; 0: none
   double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 
 #include "base/clocks.h"
-#include "train/ranks/messages.h"
 
 namespace tilegrad::train {
 namespace {

@@ -6,7 +6,6 @@
 #define MPICH_SKIP_MPICXX 1
 #include <mpi.h>
 
-#include <climits>
 #include <cstdlib>
 #include <mutex>
 #include <string>

@@ -5,11 +5,9 @@
 #include <cstdlib>
 #include <thread>
 
-#include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
 #include "base/simd_target.h"
-#include "train/ranks/messages.h"
 
 namespace tilegrad::train {
 namespace {

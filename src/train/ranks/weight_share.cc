@@ -6,7 +6,6 @@
 
 #include "base/clocks.h"
 #include "base/error.h"
-#include "train/ranks/messages.h"
 
 namespace tilegrad::train {
 

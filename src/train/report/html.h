@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pages: their files, and text that is safe to put into them.
+// What pages are made of: their files, text that is safe to put into them, and plots as SVG.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,33 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "base/escape_text.h"
+#include "base/text.h"
 #include "scene/image.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::train {
+
+struct LogPoint {
+  double x, y;        // > 0
+  std::string title;  // shown by a browser where the mouse is
+};
+
+struct LogSeries {
+  std::vector<std::string> name;  // lines of its key, at most two
+  std::vector<LogPoint> points;   // joined in this order
+};
+
+struct LogPlot {
+  std::string x_label, y_label;
+  std::vector<LogSeries> series;
+};
+
+// 720 x 440 pixels; axes end at powers of ten. Texts are escaped.
+std::string LogPlotSvg(const LogPlot& plot);
+
+// Pages: their files, and text that is safe to put into them.
 
 // Compiled in: report.html with {{placeholders}}, report.css, report.js.
 extern const std::string_view kReportHtml, kReportCss, kReportJs;

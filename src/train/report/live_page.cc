@@ -5,12 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "io/mesh_file.h"
 #include "train/config.h"
 #include "train/predictor.h"
 #include "train/report/html.h"
-#include "train/report/page_data.h"
+#include "train/report/report.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
 #include "train/run/run_files.h"
@@ -36,7 +35,7 @@ Files FilesIn(const Path& folder, std::string_view beginning, std::string_view e
 }
 
 // At most so many, the first and the last among them.
-Files Spread(const Files& files, std::size_t most) {
+Files Thinned(const Files& files, std::size_t most) {
   if (files.size() <= most) return files;
   Files out;
   std::size_t i = 0;
@@ -62,7 +61,7 @@ Json PictureList(const Path& run) {
   Files files = FilesIn(run / "samples", "step_", ".png");
   files.merge(FilesIn(run / "timelapse", "", ".png"));
   Json out = Json::array();
-  for (const auto& [step, file] : Spread(files, kMostPictures))
+  for (const auto& [step, file] : Thinned(files, kMostPictures))
     out.push_back({{"step", step}, {"file", file.lexically_relative(run).generic_string()}});
   return out;
 }
@@ -154,7 +153,7 @@ Files LivePage::Meshes(std::int64_t step) const {
   const Path result = source_.run / "mesh.glb";
   const bool newest = files.empty() || WrittenAt(result) >= WrittenAt(files.rbegin()->second);
   if (IsFile(result) && newest) files[step] = result;
-  if (!files.empty() || source_.data.empty()) return Spread(files, kMostMeshes);
+  if (!files.empty() || source_.data.empty()) return Thinned(files, kMostMeshes);
   files = FilesIn(source_.run / "checkpoints", "step_", ".safetensors");
   if (!files.empty()) files.erase(files.begin(), std::prev(files.end()));
   return files;

@@ -1,18 +1,227 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/report/report.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "io/image_file.h"
+#include "train/data/stream/textured_meshes.h"
 #include "train/predictor.h"
 #include "train/report/html.h"
-#include "train/report/page_data.h"
-#include "train/report/sections.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::train {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kCurvePoints = 1000;
+constexpr int kMostTexels = 2048;  // a side; some browsers take no more than twice that
+
+void AppendLittleEndian(std::uint32_t value, std::size_t bytes, Bytes* out) {
+  for (std::size_t i = 0; i < bytes; ++i) out->push_back(static_cast<std::uint8_t>(value >> 8 * i));
+}
+
+std::uint32_t Quantise(float unit, float levels) {
+  return static_cast<std::uint32_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * levels));
+}
+
+// 16 bits for each number of `points`, over [low, high] of its axis.
+template <class Point>
+std::string Steps(const std::vector<Point>& points, const Point& low, const Point& high) {
+  Bytes bytes;
+  for (const Point& p : points) {
+    for (int k = 0; k < Point::length(); ++k) {
+      const float extent = high[k] - low[k];
+      AppendLittleEndian(Quantise(extent > 0 ? (p[k] - low[k]) / extent : 0, 65535), 2, &bytes);
+    }
+  }
+  return Base64(bytes);
+}
+
+// Of vertices, times the factor of their material.
+std::string Colors(const Mesh& mesh, const glm::vec4& factor) {
+  Bytes bytes;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const glm::vec4 color = mesh.colors.empty() ? factor : mesh.colors[v] * factor;
+    for (int k = 0; k < 3; ++k) AppendLittleEndian(Quantise(color[k], 255), 1, &bytes);
+  }
+  return Base64(bytes);
+}
+
+std::string Faces(const Mesh& mesh, std::size_t index_bytes) {
+  Bytes bytes;
+  for (const Face& face : mesh.faces) {
+    for (const std::int32_t v : face)
+      AppendLittleEndian(static_cast<std::uint32_t>(v), index_bytes, &bytes);
+  }
+  return Base64(bytes);
+}
+
+template <class Point>
+Json ListOf(const Point& point) {
+  Json out = Json::array();
+  for (int k = 0; k < Point::length(); ++k) out.push_back(point[k]);
+  return out;
+}
+
+// The material of the one texture that all faces have; null where there is none or several.
+const Material* TexturedMaterial(const Mesh& mesh) {
+  if (mesh.corner_uvs.empty() || mesh.materials.empty()) return nullptr;
+  const Material& first = mesh.materials[0];
+  const auto alike = [&](const Material& m) {
+    return m.base_color_texture == first.base_color_texture;
+  };
+  const bool one = first.base_color_texture >= 0 && std::ranges::all_of(mesh.materials, alike);
+  return one ? &first : nullptr;
+}
+
+const char* WrapName(TextureWrap wrap) {
+  return wrap == TextureWrap::kRepeat   ? "REPEAT"
+         : wrap == TextureWrap::kMirror ? "MIRRORED_REPEAT"
+                                        : "CLAMP_TO_EDGE";
+}
+
+Json TextureJson(const Mesh& mesh, const Material& material) {
+  const MeshTexture& texture = mesh.textures[static_cast<std::size_t>(material.base_color_texture)];
+  const auto address = PngAddress(ShrunkImage(texture.image, kMostTexels));
+  if (!address.ok()) return nullptr;  // of no pixels
+  glm::vec2 low = mesh.corner_uvs[0];
+  glm::vec2 high = low;
+  for (const glm::vec2& uv : mesh.corner_uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return {{"image", *address},
+          {"wrap", {WrapName(material.wrap[0]), WrapName(material.wrap[1])}},
+          {"low", ListOf(low)},
+          {"high", ListOf(high)},
+          {"uvs", Steps(mesh.corner_uvs, low, high)}};
+}
+
+// More than a pen can draw. std::stod would throw for numbers next to 0.
+double SixDigits(double value) {
+  return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
+}
+
+// The log's names in their order; later entries may bring new ones. What only counts on with the
+// steps makes no curve.
+std::vector<std::string> CurveNames(const std::vector<LogEntry>& log) {
+  std::vector<std::string> names;
+  for (const LogEntry& entry : log) {
+    for (const auto& [name, value] : entry.values) {
+      if (name == "epoch" || name == "seconds") continue;
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  }
+  return names;
+}
+
+Json CurvesJson(const std::vector<LogEntry>& log, const std::vector<std::string>& names) {
+  Json curves = {{"step", Json::array()}};
+  for (const std::string& name : names) curves[name] = Json::array();
+  for (const LogEntry& entry : Thin(log, kCurvePoints)) {
+    curves["step"].push_back(entry.step);
+    for (const std::string& name : names) {
+      const auto at = std::find_if(entry.values.begin(), entry.values.end(),
+                                   [&](const auto& value) { return value.first == name; });
+      curves[name].push_back(at == entry.values.end() ? Json() : Json(SixDigits(at->second)));
+    }
+  }
+  return curves;
+}
+
+std::string TitleOf(const std::string& name, const TermLabels& labels) {
+  if (name == "loss") return "Total loss";
+  if (const auto known = labels.find(name); known != labels.end()) return known->second;
+  std::string words = name;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  if (!words.empty())
+    words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
+  return words;
+}
+
+Json ExampleJson(const Example& example) {
+  return {{"name", example.name},
+          {"class", example.class_name},
+          {"prediction", MeshJson(example.prediction)},
+          {"truth", MeshJson(example.truth)}};
+}
+
+// The means of a stretch of entries that have the same values.
+LogEntry MeanEntry(std::span<const LogEntry> stretch) {
+  LogEntry mean = stretch.back();
+  for (std::size_t v = 0; v < mean.values.size(); ++v) {
+    double sum = 0;
+    int count = 0;
+    for (const LogEntry& entry : stretch) {
+      if (v >= entry.values.size() || entry.values[v].first != mean.values[v].first) continue;
+      sum += entry.values[v].second;
+      ++count;
+    }
+    mean.values[v].second = sum / count;
+  }
+  return mean;
+}
+
+}  // namespace
+
+Json MeshJson(const Mesh& mesh) {
+  if (mesh.faces.empty()) return nullptr;
+  const Bounds bounds = MeshBounds(mesh);
+  const std::size_t index_bytes = mesh.positions.size() > 65536 ? 4 : 2;
+  const Material* textured = TexturedMaterial(mesh);
+  return {{"low", ListOf(bounds.low)},
+          {"high", ListOf(bounds.high)},
+          {"positions", Steps(mesh.positions, bounds.low, bounds.high)},
+          {"colors", Colors(mesh, textured == nullptr ? glm::vec4(1) : textured->base_color)},
+          {"faces", Faces(mesh, index_bytes)},
+          {"index_bytes", index_bytes},
+          {"texture", textured == nullptr ? Json() : TextureJson(mesh, *textured)}};
+}
+
+Result<Json> CentredMeshJson(Mesh mesh) {
+  if (mesh.faces.empty()) return Json();
+  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule().half_extent)));
+  return MeshJson(mesh);
+}
+
+std::vector<LogEntry> Thin(const std::vector<LogEntry>& log, std::size_t count) {
+  if (log.size() <= count) return log;
+  std::vector<LogEntry> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t begin = i * log.size() / count, end = (i + 1) * log.size() / count;
+    out.push_back(MeanEntry(std::span(log).subspan(begin, end - begin)));
+  }
+  return out;
+}
+
+Json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels) {
+  const std::vector<std::string> names = CurveNames(log);
+  Json out = {{"curves", CurvesJson(log, names)}, {"charts", Json::array()}};
+  for (const std::string& name : names)
+    out["charts"].push_back({{"key", name}, {"title", TitleOf(name, labels)}});
+  return out;
+}
+
+Json PageData(const ReportFacts& facts) {
+  const Showcase& show = facts.showcase;
+  Json out = CurveData(facts.run.log, facts.run.header.labels);
+  out["camera"] = {{"fov_y", show.fov_y},
+                   {"azimuth", show.azimuth},
+                   {"elevation", show.elevation},
+                   {"distance", show.distance}};
+  out["generated"] = show.generated;
+  out["models"] = Json::array();
+  for (const Example& example : show.examples) out["models"].push_back(ExampleJson(example));
+  return out;
+}
+
 namespace {
 
 // run.json, config.toml, metrics.jsonl; errors name the file and the key or line.

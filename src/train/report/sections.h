@@ -8,8 +8,8 @@
 
 #include "base/file.h"
 #include "train/config.h"
-#include "train/run/header.h"
 #include "train/run/log.h"
+#include "train/run/run_files.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {

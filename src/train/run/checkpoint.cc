@@ -5,7 +5,6 @@
 #include <charconv>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "base/hash.h"
 #include "train/named_weights.h"
 #include "train/run/run_files.h"

@@ -4,7 +4,10 @@
 // is all that a run's future depends on.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -64,5 +67,23 @@ std::vector<Path> ListCheckpoints(const Path& run);
 void PruneCheckpoints(const Path& run, std::int64_t keep);
 // Removes half-written files that a killed run left in its folder.
 void RemoveHalfWritten(const Path& run);
+
+// Why a run cannot go on: what it was started with is kept as text, a line for each thing.
+
+// The first line in which two such texts differ: was "rate = 1", is "rate = 2"; "" if they are
+// equal. A line that one of them lacks is none.
+inline std::string FirstDifference(const std::string& was, const std::string& is) {
+  std::istringstream old_lines(was), new_lines(is);
+  for (std::string a, b;;) {
+    const bool more_a = static_cast<bool>(std::getline(old_lines, a));
+    const bool more_b = static_cast<bool>(std::getline(new_lines, b));
+    if (!more_a && !more_b) return "";
+    if (more_a && more_b && a == b) continue;
+    const auto quoted = [](bool there, const std::string& line) {
+      return there ? fmt::format("\"{}\"", line) : std::string("none");
+    };
+    return fmt::format("was {}, is {}", quoted(more_a, a), quoted(more_b, b));
+  }
+}
 
 }  // namespace tilegrad::train

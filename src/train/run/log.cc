@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/run/log.h"
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -160,6 +162,29 @@ std::string TensorboardScalarsRecord(double wall_time, std::int64_t step, const 
   AppendVarint(event, static_cast<std::uint64_t>(step));
   AppendBytes(event, 5, summary);
   return Record(event);
+}
+
+std::string StepValues::ForConsole() const {
+  std::string out = fmt::format("loss {:.4f}", loss);
+  for (const LossTerm& term : terms) {
+    if (term.weight != 0) out += fmt::format("  {} {:.3g}", term.name, term.value);
+  }
+  return out;
+}
+
+std::string StepValues::DescribeTerms() const {
+  std::string out;
+  for (const LossTerm& term : terms) {
+    out += fmt::format("{}{} {} x {}", out.empty() ? "" : ", ", term.name, term.value, term.weight);
+  }
+  return out;
+}
+
+Scalars StepValues::ForLog() const {
+  Scalars out = {{"loss", loss}};
+  for (const LossTerm& term : terms) out.emplace_back(term.name, term.value);
+  for (const auto& [name, value] : also) out.emplace_back(name, value);
+  return out;
 }
 
 }  // namespace tilegrad::train

@@ -8,13 +8,9 @@
 
 #include "base/clocks.h"
 #include "base/error.h"
-#include "base/file.h"
 #include "base/text.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
-#include "train/run/checkpoint.h"
-#include "train/run/first_difference.h"
-#include "train/run/log.h"
+#include "io/mesh_file.h"
 #include "train/run/run_files.h"
 
 namespace tilegrad::train {

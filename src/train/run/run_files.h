@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/file.h"
@@ -35,5 +36,28 @@ bool IsOfFit(const std::string& settings);
 std::vector<Path> RunFiles(const Path& folder);
 // An error names the first that cannot be removed.
 Status RemoveRun(const Path& folder);
+
+// <run>/run.json: what a run is, for people and for the commands that look at it.
+
+// In words, for names of the log that do not explain themselves.
+using TermLabels = std::map<std::string, std::string>;
+
+struct RunHeader {
+  std::string name = {};            // the configuration's
+  std::string dataset = {};         // folder, as training was given it
+  std::string dataset_source = {};  // where its models are from
+  int training_models = 0;
+  std::int64_t parameters = 0;                                    // numbers that are trained
+  std::vector<std::pair<std::string, std::string>> machine = {};  // as DescribeMachine
+  TermLabels labels = {};  // of what its steps have said so far
+};
+
+Status WriteHeader(const Path& run, const RunHeader& header);
+// Errors name the file and the key or line.
+Result<RunHeader> ReadHeader(const Path& run);
+
+// What a result depends on besides configuration and data, as name and value: version, compiler,
+// CPU, cores, SIMD target.
+std::vector<std::pair<std::string, std::string>> DescribeMachine();
 
 }  // namespace tilegrad::train

@@ -9,10 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "nn/networks.h"
 #include "train/losses/feature_l1.h"
+#include "train/losses/loss_sum.h"
+#include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"
 #include "train/run/portion.h"
-#include "train/tasks/learned_critic.h"
+#include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
 

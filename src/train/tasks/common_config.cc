@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "nn/optim.h"
+#include "train/losses/iou.h"
 
 namespace tilegrad::train {
 
@@ -93,6 +94,14 @@ RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size) 
 double SharpnessAt(const RenderConfig& render, std::int64_t steps, std::int64_t step) {
   const double share = 2.0 * static_cast<double>(step) / static_cast<double>(steps);
   return nn::Geometric(render.sharpness_start, render.sharpness, share);
+}
+
+void AddIou(double weight, const nn::Var& alpha, const nn::Tensor& truth, LossSum* sum) {
+  sum->Add("iou", "IoU loss (1 − soft IoU of silhouettes)", weight, IouLoss(alpha, truth));
+}
+
+void AddColor(double weight, const nn::Var& loss, LossSum* sum) {
+  sum->Add("color", "Colour loss (mean L1)", weight, loss);
 }
 
 }  // namespace tilegrad::train

@@ -7,10 +7,11 @@
 #include <string>
 #include <string_view>
 
+#include "train/losses/loss_sum.h"
 #include "train/losses/regularizers.h"
 #include "train/models/sphere_model.h"
 #include "train/run/config_fields.h"
-#include "train/run/schedule.h"
+#include "train/run/run.h"
 
 namespace tilegrad::train {
 
@@ -70,5 +71,12 @@ double LearningRateAt(const OptimizerConfig& config, std::int64_t steps, std::in
 double SharpnessAt(const RenderConfig& config, std::int64_t steps, std::int64_t step);
 // Of square images with 1/delta = `sharpness`.
 RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size);
+
+// The terms of equation 14 that tasks share.
+
+// alpha and truth: [N, size, size].
+void AddIou(double weight, const nn::Var& alpha, const nn::Tensor& truth, LossSum* sum);
+// `loss`: of colours, however they are compared.
+void AddColor(double weight, const nn::Var& loss, LossSum* sum);
 
 }  // namespace tilegrad::train

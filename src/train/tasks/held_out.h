@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "base/parallel.h"
 #include "train/data/dataset.h"
 #include "train/eval/evaluate.h"
 #include "train/tasks/task.h"
@@ -39,5 +40,13 @@ std::vector<int> ChooseModels(const Dataset& dataset, int count);
 // Which of `views` around a model are shown, kShownViews at most: the first at five sixths of the
 // circle, which sees models that face +z obliquely from the front; the others spread from there.
 std::vector<int> ShownViews(int views);
+
+// The examples of a report in one image.
+
+// Fills sheet and sheet_columns from examples that show, as ShowHeldOut makes them, ShownViews of
+// the dataset, each as truth and prediction. A row an example: what the network sees, its
+// prediction from there, its prediction from the second view, and the truth from there. Predictions
+// are drawn in detail, the dataset's pictures pixel by pixel. Nothing without examples.
+Status AddSheet(int image_size, const Workers& workers, Showcase* showcase);
 
 }  // namespace tilegrad::train

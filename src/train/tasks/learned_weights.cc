@@ -61,4 +61,74 @@ Status LoadPredictingWeights(nn::Module& network, const std::vector<nn::NamedTen
   return nn::LoadState(network, averages.empty() ? state : averages);
 }
 
+namespace {
+
+void NoteTerm(const TermWords& words, double value, StepValues* values) {
+  if (words.name != nullptr) LossSum(values).Watch(words.name, words.label, value);
+}
+
+}  // namespace
+
+LearnedCritic::LearnedCritic(nn::Context& context, const Job& job)
+    : context_(context),
+      job_(job),
+      critic_(Make(context, job)),
+      weights_(context, critic_, job.optimizer, job.steps) {}
+
+void LearnedCritic::AddGeneratorLoss(double weight, const nn::Var& fake, LossSum* sum) {
+  const auto& [name, label] = job_.role.adversarial;
+  sum->Add(name, label, weight, WganGeneratorLoss(critic_, fake));
+}
+
+Result<nn::StepVector<nn::Gradient>> LearnedCritic::Gradients(const Pair& pair,
+                                                              std::uint64_t number,
+                                                              nn::GradientListener* listener,
+                                                              StepValues* values) {
+  Rng rng(job_.seed ^ job_.interpolates, number);
+  const CriticLoss loss = WganCriticLoss(critic_, nn::Constant(context_, pair.real),
+                                         nn::Constant(context_, pair.fake), job_.game, rng);
+  auto gradients = nn::Gradients(loss.total, weights_.adam().parameters(), listener);
+  TILEGRAD_TRY(context_.TakeStatus());
+  const double norm = nn::GlobalNorm(context_, gradients);
+  if (!std::isfinite(loss.total.item()) || !std::isfinite(norm)) {
+    return InternalError(
+        "{}: the critic's loss is {}, its gradient's norm {}; a smaller {}.learning_rate or a "
+        "larger {}.penalty may help",
+        job_.role.distance.name, loss.total.item(), norm, job_.role.keys, job_.role.keys);
+  }
+  if (values == nullptr) return gradients;
+  NoteTerm(job_.role.distance, loss.wasserstein.item(), values);
+  if (job_.game.penalty > 0) NoteTerm(job_.role.penalty, loss.penalty.item(), values);
+  NoteTerm(job_.role.gradient, norm, values);
+  return gradients;
+}
+
+std::vector<nn::NamedTensor> LearnedCritic::State() {
+  return WithPrefix(job_.role.prefix, weights_.State());
+}
+
+Status LearnedCritic::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t updates) {
+  return weights_.LoadState(OfPrefix(job_.role.prefix, state), updates);
+}
+
+std::vector<nn::NamedTensor> WithPrefix(const std::string& prefix,
+                                        std::vector<nn::NamedTensor> tensors) {
+  for (nn::NamedTensor& tensor : tensors) tensor.name = prefix + tensor.name;
+  return tensors;
+}
+
+std::vector<nn::NamedTensor> OfPrefix(const std::string& prefix,
+                                      const std::vector<nn::NamedTensor>& tensors) {
+  std::vector<nn::NamedTensor> out;
+  for (const nn::NamedTensor& tensor : tensors) {
+    if (tensor.name.starts_with(prefix))
+      out.push_back({tensor.name.substr(prefix.size()), tensor.value});
+  }
+  return out;
+}
+
+void Append(std::vector<nn::NamedTensor> more, std::vector<nn::NamedTensor>* all) {
+  for (nn::NamedTensor& tensor : more) all->push_back(std::move(tensor));
+}
+
 }  // namespace tilegrad::train

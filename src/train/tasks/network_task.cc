@@ -6,6 +6,7 @@
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
+
 Status NetworkTask::BeginStart(const TaskStart& start, std::int64_t batch) {
   context_ = &start.context;
   lesson_.batch = batch;

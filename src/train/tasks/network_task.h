@@ -4,7 +4,13 @@
 // header and the log's progress are here.
 #pragma once
 
+#include <span>
+#include <vector>
+
+#include "nn/optim.h"
+#include "train/run/log.h"
 #include "train/tasks/adversary.h"
+#include "train/tasks/common_config.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/task.h"
 

@@ -4,11 +4,6 @@
 #include <map>
 
 #include "base/error.h"
-#include "train/tasks/classify/task.h"
-#include "train/tasks/gan/task.h"
-#include "train/tasks/photographs/task.h"
-#include "train/tasks/single_image/task.h"
-#include "train/tasks/textured_image/task.h"
 
 namespace tilegrad::train {
 namespace {

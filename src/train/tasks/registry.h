@@ -19,4 +19,18 @@ void RegisterTask(const std::string& kind, TaskFactory make);
 // With the defaults of its fields. InvalidArgument lists the kinds there are.
 Result<std::unique_ptr<Task>> MakeTask(const std::string& kind);
 
+// tilegrad's own, by their kinds. "single_image": section 5.1 of the paper, shape and vertex colours
+// from one image.
+std::unique_ptr<Task> MakeSingleImageTask();
+// "textured_image": sections 5.2 and 5.3, shape, texture and light from one image.
+std::unique_ptr<Task> MakeTexturedImageTask();
+// "photographs": section 5.4, shape, texture, keypoints and camera from photographs, one view of
+// each object, in a folder as train/data/photographs/photographs.h has it.
+std::unique_ptr<Task> MakePhotographsTask();
+// "gan": section 5.5, textured shapes from noise, learned from pictures alone.
+std::unique_ptr<Task> MakeGanTask();
+// "classify": the class of an object from one picture of it, for a perceptual loss
+// (classify/perceptual_network.h).
+std::unique_ptr<Task> MakeClassifyTask();
+
 }  // namespace tilegrad::train

@@ -4,7 +4,7 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/fingerprint.h"
-#include "train/tasks/learned_weights.h"
+#include "train/tasks/network_task.h"
 
 namespace tilegrad::train {
 

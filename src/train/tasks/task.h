@@ -22,10 +22,10 @@
 #include "train/eval/evaluation.h"
 #include "train/run/checkpoint.h"
 #include "train/run/config_fields.h"
-#include "train/run/header.h"
+#include "train/run/log.h"
 #include "train/run/portion.h"
-#include "train/run/schedule.h"
-#include "train/run/step_values.h"
+#include "train/run/run.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 

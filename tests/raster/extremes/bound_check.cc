@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "raster/extremes/soft_scene.h"
+#include "raster/extremes/scenes.h"
 #include "raster/project.h"
 #include "render/pipeline/records.h"
 #include "render/pipeline/test_scenes.h"

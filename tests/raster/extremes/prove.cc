@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks of bound_test.cc and extremes_test.cc without an end: counts scenes, violations and
+// The checks of extremes_test.cc and extremes_test.cc without an end: counts scenes, violations and
 // the largest errors into a file, and goes on from there (`./run prove`). A scene is a pure
 // function of its number; `prove --scene N` runs that one alone, on every target.
 #include <fmt/format.h>

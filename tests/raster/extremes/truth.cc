@@ -10,7 +10,7 @@
 
 #include "raster/conventions.h"
 #include "raster/extremes/bounded.h"
-#include "raster/extremes/soft_scene.h"
+#include "raster/extremes/scenes.h"
 #include "raster/project.h"
 #include "raster/visibility_ref.h"
 #include "render/mesh_ref.h"

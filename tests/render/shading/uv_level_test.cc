@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mip levels, and sides, of faces that float has trouble with: those that reach past the camera.
-#include "render/shading/uv_level.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "base/rng.h"
 #include "raster/interpolate_ref.h"
 #include "render/reference.h"
+#include "render/shading/run.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad::uv_level_test {

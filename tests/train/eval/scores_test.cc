@@ -6,8 +6,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "scene/shapes.h"
+#include "support/temp_folder.h"
+#include "train/data/build/build.h"
+#include "train/eval/class_means.h"
+#include "train/eval/evaluate.h"
+#include "train/eval/evaluation.h"
 #include "train/eval/retrieval.h"
 
 namespace tilegrad::train::scores_test {
@@ -155,6 +163,240 @@ TEST(ImageIndex, ThumbnailsAreMeans) {
   EXPECT_EQ(small[0], 64);
   EXPECT_EQ(small[1], 0);
   EXPECT_EQ(Thumbnail(Flat(7, 5), 5), std::vector<std::uint8_t>(4 * 256, 7));  // fewer than it has
+}
+
+// Tables of scores: names of classes are text, whatever they hold.
+
+Evaluation Named(const std::string& name) {
+  Evaluation e;
+  e.predictor = name;
+  e.split = "test";
+  e.views_per_model = 1;
+  e.classes = {name};
+  e.class_models = {1};
+  e.rows = {{name, {{0.5, 0.25}}, {0.5, 0.25}}};
+  e.models = {{name, name, {0.5, 0.25}}};
+  return e;
+}
+
+TEST(EvaluationTable, MarkdownHoldsNoHtmlAndNoFurtherCells) {
+  const std::string text = FormatMarkdown(Named("<b onclick=x>|[y](z)\n*"));
+  EXPECT_EQ(text.find('<'), std::string::npos) << text;
+  EXPECT_NE(text.find("&lt;b onclick=x&gt;\\|\\[y\\](z)\\\\n\\*"), std::string::npos) << text;
+  // The table's lines: heading, dashes, one method; three cells each.
+  int lines = 0;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with('|')) continue;
+    ++lines;
+    int bars = 1;  // the first
+    for (std::size_t i = 1; i < line.size(); ++i) bars += line[i] == '|' && line[i - 1] != '\\';
+    EXPECT_EQ(bars, 4) << line;
+  }
+  EXPECT_EQ(lines, 3);
+}
+
+using WrittenEvaluation = TempFolderTest;
+
+TEST_F(WrittenEvaluation, NamesNeedNotBeUtf8) {
+  ASSERT_TRUE(WriteEvaluation(folder_, Named("caf\xe9")).ok());
+  const auto back = ReadEvaluation(folder_);
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ((*back)->classes[0], "caf\xe9");
+  EXPECT_NE(ReadText(folder_ / "eval.md").value().find("caf\\\\xe9"), std::string::npos);
+}
+
+// Standard errors and paired differences, on numbers worked out by hand.
+
+// Squares about the means 2 and 6: 2 + 2 of two degrees of freedom, so a variance of 2; the mean of
+// the classes has that of (2/2 + 2/2) / 4. A third class of one shape adds 2/1 and no freedom.
+TEST(StandardErrors, AreThoseOfAMeanOverClasses) {
+  const std::vector<std::vector<double>> two = {{1, 3}, {5, 7}, {}};
+  EXPECT_EQ(MeanOverClasses(two).mean, 4);
+  EXPECT_NEAR(*MeanOverClasses(two).error, std::sqrt(0.5), 1e-12);
+  const std::vector<std::vector<double>> three = {{1, 3}, {5, 7}, {7}};
+  EXPECT_EQ(MeanOverClasses(three).mean, 5);
+  EXPECT_NEAR(*MeanOverClasses(three).error, std::sqrt(4.0) / 3, 1e-12);
+  const std::vector<std::vector<double>> single = {{1}, {2}};
+  EXPECT_FALSE(MeanOverClasses(single).error);
+}
+
+Evaluation Scored(const std::string& name, const std::vector<double>& ious) {
+  Evaluation out;
+  out.predictor = name;
+  out.split = "test";
+  out.views_per_model = 1;
+  out.classes = {"chair"};
+  out.class_models = {static_cast<int>(ious.size())};
+  out.rows = {{name, {{ious[0], 0.5}}, {ious[0], 0.5}}};
+  for (std::size_t m = 0; m < ious.size(); ++m)
+    out.models.push_back({"chair", std::to_string(m), {.iou = ious[m], .f_score = 0.5}});
+  return out;
+}
+
+const PairedDifference& IouOf(const PairedComparison& comparison) { return comparison.measures[0]; }
+
+// Models differ by 0.3, runs by 0.02 to 0.04: their means are within each other's errors, their
+// differences far from 0.
+TEST(Paired, FindsADifferenceThatMeansHide) {
+  const Evaluation first = Scored("first", {0.22, 0.54, 0.83}),
+                   second = Scored("second", {0.2, 0.5, 0.8});
+  const PairedComparison comparison = ComparePaired(first, second).value();
+  EXPECT_EQ(comparison.models, 3);
+  EXPECT_NEAR(IouOf(comparison).difference.mean, 0.03, 1e-12);
+  EXPECT_NEAR(*IouOf(comparison).difference.error, std::sqrt(0.0001 / 3), 1e-12);
+  EXPECT_FALSE(IouOf(comparison).tie());
+  EXPECT_TRUE(IouOf(comparison).better());
+  EXPECT_FALSE(IouOf(ComparePaired(second, first).value()).better());
+  const std::string text = FormatComparison(comparison);
+  EXPECT_NE(text.find("3D IoU                  +3.0 ± 0.6  better"), std::string::npos) << text;
+  EXPECT_NE(text.find("F-score                 +0.0 ± 0.0  a tie"), std::string::npos) << text;
+  EXPECT_EQ(ComparisonJson(comparison)["measures"]["iou"]["verdict"], "better");
+}
+
+TEST(Paired, SmallDifferencesAreTies) {
+  const auto comparison =
+      ComparePaired(Scored("a", {0.3, 0.5, 0.8}), Scored("b", {0.2, 0.55, 0.8}));
+  EXPECT_TRUE(IouOf(*comparison).tie());
+}
+
+// Two liveries of one shape count as one: without that, the error would be half as large.
+TEST(Paired, ModelsOfAShapeCountOnce) {
+  Evaluation first = Scored("a", {0.3, 0.3, 0.5, 0.5}), second = Scored("b", {0.2, 0.2, 0.5, 0.5});
+  for (std::size_t m = 0; m < 4; ++m) first.models[m].shape = m < 2 ? "one" : "two";
+  const PairedComparison comparison = ComparePaired(first, second).value();
+  const ClassedMean& difference = IouOf(comparison).difference;
+  EXPECT_NEAR(difference.mean, 0.05, 1e-12);
+  EXPECT_NEAR(*difference.error, 0.05, 1e-12);
+}
+
+// Of two measures on which less is better, the lower is the better one; what one lacks is left out.
+TEST(Paired, KnowsWhichWayIsBetterAndWhatBothHave) {
+  Evaluation first = Scored("a", {0.3, 0.5}), second = first;
+  for (ModelScore& model : first.models) model.score.color_l1 = 0.1;
+  for (ModelScore& model : second.models) model.score.color_l1 = 0.2;
+  first.models[1].score.color_l1 = 0.11;
+  first.models[0].score.texture_l1 = 0.1;
+  const PairedComparison comparison = ComparePaired(first, second).value();
+  ASSERT_EQ(comparison.measures.size(), 3u);
+  EXPECT_STREQ(comparison.measures[2].measure->key, "color_l1");
+  EXPECT_TRUE(comparison.measures[2].better());
+}
+
+TEST(Paired, WithoutACommonModelIsAnError) {
+  Evaluation other = Scored("other", {0.5});
+  other.models[0].id = "x";
+  ExpectMessage(ComparePaired(Scored("a", {0.5}), other).status(), "other");
+}
+
+using WrittenErrors = TempFolderTest;
+
+TEST_F(WrittenErrors, ComeBackAndAreShown) {
+  Evaluation evaluation = Scored("a", {0.5, 0.7});
+  evaluation.rows[0].mean = {.iou = 0.6, .f_score = 0.5, .light_angle = 30};
+  evaluation.rows[0].error = Score{.iou = 0.1, .f_score = 0.02, .light_angle = 2};
+  evaluation.models[0].shape = "one";
+  EvaluationRow constant = evaluation.rows[0];
+  constant.method = kMeanLightRow;
+  constant.mean.light_angle = 60;
+  evaluation.rows.insert(evaluation.rows.begin(), constant);
+  const std::string table = FormatTable(evaluation);
+  for (const char* part : {"60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50"})
+    EXPECT_NE(table.find(part), std::string::npos) << part << "\n" << table;
+  ASSERT_TRUE(WriteEvaluation(folder_, evaluation).ok());
+  const auto back = ReadEvaluation(folder_);
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ((*back)->rows[1].error->light_angle, 2);
+  EXPECT_EQ((*back)->models[0].shape, "one");
+  EXPECT_EQ(EvaluationJson(**back)["rows"][1]["light_of_constant"], 0.5);
+}
+
+// A shape counts once in the scores of its class, however many liveries it has.
+
+class EvaluateShapesTest : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    BuildOptions options;
+    options.image_size = 8;
+    options.views = 1;
+    const StopFlag stop = false;
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, folder_, Workers(1), {}, stop).ok());
+  }
+
+  // Of each class: models 0 and 1 to train on, 2 to 5 to test with, of which 2, 3 and 4 are
+  // `shape`.
+  Dataset WithShape(const std::string& shape) const {
+    Dataset before = Dataset::Open(folder_).value();
+    std::vector<ModelInfo> models = before.models();
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      models[m].split = m % 6 < 2 ? Split::kTrain : Split::kTest;
+      if (m % 6 >= 2 && m % 6 < 5) models[m].shape = shape;
+    }
+    EXPECT_TRUE(WriteModels(folder_, before.info(), models).ok());
+    return Dataset::Open(folder_).value();
+  }
+
+  // Predicts a ball, then ever flatter boxes, so that scores differ.
+  static Result<Evaluation> Score(
+      const Dataset& dataset,
+      const std::function<void(EvaluationJob&)>& change = [](EvaluationJob&) {}) {
+    float height = 1;
+    EvaluationJob job;
+    job.dataset = &dataset;
+    job.template_mesh = Icosphere(1, 1);
+    job.views_per_model = 1;
+    job.predict = [&](std::span<const std::uint8_t>) {
+      height *= 0.9f;
+      return Result<std::vector<Mesh>>({Box(glm::vec3(0), {1, height, 1})});
+    };
+    change(job);
+    const StopFlag stop = false;
+    return Evaluate(job, Workers(1), {}, stop);
+  }
+};
+
+TEST_F(EvaluateShapesTest, LiveriesAreAveragedFirst) {
+  for (const char* shape : {"", "one"}) {
+    const auto scored = Score(WithShape(shape));
+    ASSERT_TRUE(scored.ok()) << scored.status().message();
+    const EvaluationRow& row = scored->rows.back();
+    ASSERT_EQ(scored->models.size(), 4 * row.classes.size());
+    for (std::size_t c = 0; c < row.classes.size(); ++c) {
+      const auto iou = [&](std::size_t m) { return scored->models[4 * c + m].score.iou; };
+      const double liveries = iou(0) + iou(1) + iou(2), other = iou(3);
+      const double expected =
+          shape[0] == '\0' ? (liveries + other) / 4 : (liveries / 3 + other) / 2;
+      EXPECT_NEAR(row.classes[c].iou, expected, 1e-12);  // sums of four numbers up to 1
+      EXPECT_EQ(scored->class_models[c], 4);
+    }
+  }
+}
+
+// Of six models a class two are trained on; what is searched is spread over all of them.
+TEST_F(EvaluateShapesTest, TheNearestPictureIsOfTrainingModelsThatItMayKnow) {
+  const Dataset dataset = WithShape("");
+  const auto names = [](const Evaluation& evaluation) {
+    std::vector<std::string> out;
+    for (const EvaluationRow& row : evaluation.rows) out.push_back(row.method);
+    return out;
+  };
+  const std::vector<std::string> three = {"undeformed template", "best single shape", "tilegrad"};
+  const std::vector<std::string> four = {three[0], three[1], "nearest training picture", three[2]};
+  const auto all = static_cast<int>(dataset.Select(Split::kTrain).size());
+  const auto score = [&](Split split, int searched) {
+    return Score(dataset,
+                 [=](EvaluationJob& job) {
+                   job.split = split;
+                   job.retrieval_models = searched;
+                 })
+        .value();
+  };
+  EXPECT_EQ(score(Split::kTest, 1000).retrieval_models, all);
+  EXPECT_EQ(names(score(Split::kTest, 1000)), four);
+  EXPECT_EQ(score(Split::kTest, 3).retrieval_models, 3);
+  EXPECT_EQ(names(score(Split::kTest, 3)), four);
+  EXPECT_EQ(names(score(Split::kTest, 0)), three);
+  EXPECT_EQ(names(score(Split::kTrain, 1000)), three);  // each would find itself
 }
 
 }  // namespace tilegrad::train::scores_test

@@ -10,7 +10,7 @@
 #include "support/temp_folder.h"
 #include "train/losses/feature_l1.h"
 #include "train/models/classifier.h"
-#include "train/ops/render_op.h"
+#include "train/models/render_op.h"
 
 namespace tilegrad::train::wgan_gp_test {
 

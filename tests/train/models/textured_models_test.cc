@@ -9,11 +9,9 @@
 #include "nn/gradient_check.h"
 #include "nn/nn.h"
 #include "scene/camera.h"
-#include "scene/light_frame.h"
 #include "scene/shapes.h"
-#include "train/models/face_cubes.h"
 #include "train/models/picture_lookup.h"
-#include "train/models/texture_painter.h"
+#include "train/models/texture_network.h"
 #include "train/tasks/textured_image/object_pictures.h"
 
 namespace tilegrad::train::face_cubes_test {

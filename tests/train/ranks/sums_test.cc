@@ -10,11 +10,10 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "thread_ranks.h"
+#include "train/ranks/exchange.h"
 #include "train/ranks/gradient_sums.h"
 #include "train/ranks/launch.h"
-#include "train/ranks/messages.h"
 #include "train/ranks/process_group.h"
-#include "train/ranks/share.h"
 #include "train/ranks/weight_share.h"
 
 namespace tilegrad::train::sums_test {

@@ -19,7 +19,7 @@
 #include "train/data/build/make_model.h"
 #include "train/data/dataset.h"
 #include "train/data/dataset_files.h"
-#include "train/ranks/messages.h"
+#include "train/ranks/exchange.h"
 
 namespace tilegrad::train {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "scene/up_axis.h"
+#include "scene/mesh.h"
 #include "train/data/broken_members.h"
 #include "train/data/dataset_files.h"
 #include "train/data/sources/model_source.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/rng.h"
-#include "render/picture/mesh_pictures.h"
+#include "render/picture/mesh_scene.h"
 
 namespace tilegrad::train {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/shortage.h"
+#include "base/read_budget.h"
 #include "io/image_file.h"
 
 namespace tilegrad::train {

@@ -11,7 +11,6 @@
 #include "base/json_text.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
-#include "io/picture_names.h"
 #include "train/data/cutout.h"
 #include "train/data/photographs/factorization.h"
 #include "train/data/photographs/photographs.h"

@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "base/aligned.h"
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "base/rng.h"
-#include "base/scratch_bytes.h"
 #include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
@@ -50,7 +50,7 @@ class PhotoStore {
  public:
   // Reads and crops the pictures of `photographs` (indices into set.photographs, whose store they
   // share). A pixel beyond a picture's edge is white, as CMR's. Memory: 1.44 size^2 * 4 bytes a
-  // photograph, on disk where they are many (scratch_bytes.h). Errors name the file: one that
+  // photograph, on disk where they are many (aligned.h). Errors name the file: one that
   // cannot be read, or whose size is not its mask's.
   static Result<PhotoStore> Load(const PhotographSet& set, const std::vector<int>& photographs,
                                  const CropRule& rule, int size, const Workers& workers,

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
-#include "scene/creases.h"
+#include "scene/topology.h"
 #include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
 #include "train/data/sources/installed.h"

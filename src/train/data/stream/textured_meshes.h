@@ -22,7 +22,7 @@ struct TexturedMeshRequest {
   int max_texture = 128;       // texels a side; larger textures are averaged down
   std::int64_t max_faces = 0;  // larger meshes are clustered (build/truth_mesh.h); 0: none
   bool colored = false;        // the coloured meshes of the dataset itself, of any source
-  // Degrees: normals are smooth across edges where faces meet at less (scene/creases.h), as
+  // Degrees: normals are smooth across edges where faces meet at less (scene/topology.h), as
   // renderers of models shade them; 0: flat.
   double crease = 0;
   std::string cache = "4G";  // of memory, as ParseByteCount reads it

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "render/picture/dataset_light.h"
+#include "render/picture/mesh_scene.h"
 
 namespace tilegrad::train {
 namespace {

@@ -3,9 +3,19 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
+#include <utility>
 
 #include "base/error.h"
-#include "train/tasks/classify/pictures.h"
+#include "base/rng.h"
+#include "render/picture/composite.h"
+#include "train/data/dataset_files.h"
+#include "train/data/trained_models.h"
+#include "train/eval/class_means.h"
+#include "train/eval/retrieval.h"
+#include "train/predictor.h"
+#include "train/ranks/process_group.h"
+#include "train/tasks/held_out.h"
 
 namespace tilegrad::train {
 namespace {
@@ -76,6 +86,313 @@ Result<std::vector<int>> ClassifierModel::Classify(std::span<const std::uint8_t>
       nn::Constant(context_, ColorsOf(context_, images, image_size_)), nn::Mode::kEval);
   TILEGRAD_TRY(context_.TakeStatus());
   return MostLikely(scores.value());
+}
+
+namespace {
+
+constexpr std::size_t kSearched = 1000;  // training models whose pictures are searched, at most
+
+Status CheckClasses(const Dataset& dataset, const ClassifierModel& model) {
+  if (dataset.info().classes == model.classes()) return {};
+  return InvalidArgument("{}: its {} classes are not the {} that the network was trained on",
+                         dataset.folder().string(), dataset.info().classes.size(),
+                         model.classes().size());
+}
+
+// Some views of one model, one after the other.
+std::vector<std::uint8_t> SelectedViews(std::span<const std::uint8_t> images, int of,
+                                        std::span<const int> views) {
+  const std::size_t bytes = images.size() / static_cast<std::size_t>(of);
+  std::vector<std::uint8_t> out;
+  for (const int view : views) {
+    const auto image = images.subspan(static_cast<std::size_t>(view) * bytes, bytes);
+    out.insert(out.end(), image.begin(), image.end());
+  }
+  return out;
+}
+
+Score Accuracy(std::span<const int> said, int truth) {
+  Score score;
+  score.accuracy = static_cast<double>(std::count(said.begin(), said.end(), truth)) /
+                   static_cast<double>(said.size());
+  return score;
+}
+
+class Examiner {
+ public:
+  Examiner(const Dataset& dataset, const TaskEvaluation& job, ClassifierModel& model,
+           const Workers& workers, const ProgressSink& progress, const StopFlag& stop)
+      : data_(dataset),
+        job_(job),
+        model_(model),
+        workers_(workers),
+        progress_(progress),
+        stop_(stop),
+        share_(job.group),
+        views_(SpreadViews(dataset.info().views,
+                           std::clamp(job.views_per_model, 1, dataset.info().views))) {}
+
+  Result<Evaluation> Run() {
+    const Split split = job_.split;
+    const std::vector<int> models = data_.Select(split);
+    if (models.empty()) {
+      return InvalidArgument("{}: its {} split has no models; `tilegrad dataset` makes the splits",
+                             data_.folder().string(), SplitName(split));
+    }
+    TILEGRAD_TRY(LearnBaselines());
+    for (auto* scores : {&frequent_, &retrieved_, &said_}) scores->resize(models.size());
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      TILEGRAD_TRY(Tick("evaluating", i, models.size()));
+      if (share_.Has(i)) TILEGRAD_TRY(Examine(i, models[i]));
+    }
+    for (auto* scores : {&frequent_, &retrieved_, &said_}) TILEGRAD_TRY(share_.Gather(scores));
+    out_.split = SplitName(split);
+    Fill(models);
+    return std::move(out_);
+  }
+
+ private:
+  Status Tick(const char* stage, std::size_t done, std::size_t total) const {
+    if (stop_.load()) return Cancelled("stopped while {}; nothing was written", stage);
+    if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
+    return {};
+  }
+  const ModelInfo& Info(int model) const { return data_.models()[static_cast<std::size_t>(model)]; }
+  // A training model's own picture would be found.
+  bool Retrieves() const { return job_.split != Split::kTrain; }
+
+  Status LearnBaselines() {
+    const std::vector<int> train = data_.Select(Split::kTrain);
+    std::vector<int> counts(data_.info().classes.size(), 0);
+    for (const int m : train) ++counts[static_cast<std::size_t>(Info(m).class_index)];
+    most_frequent_ = static_cast<int>(std::ranges::max_element(counts) - counts.begin());
+    const std::size_t searched = Retrieves() ? std::min(train.size(), kSearched) : 0;
+    for (std::size_t i = 0; i < searched; ++i) {
+      TILEGRAD_TRY(Tick("training pictures", i, searched));
+      const int model = train[i * train.size() / searched];
+      TILEGRAD_ASSIGN(const auto images, data_.LoadImages(model));
+      index_.Add(images, data_.info().views, data_.info().image_size);
+      searched_.push_back(Info(model).class_index);
+    }
+    out_.retrieval_models = static_cast<int>(searched);
+    return {};
+  }
+
+  Status Examine(std::size_t i, int model) {
+    const int truth = Info(model).class_index;
+    TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
+    const std::vector<std::uint8_t> images = SelectedViews(all, data_.info().views, views_);
+    std::vector<int> said, found(views_.size());
+    const std::size_t bytes = images.size() / views_.size();
+    for (std::size_t v = 0; v < views_.size(); v += Model::kImagesAtOnce) {
+      const std::size_t count = std::min(Model::kImagesAtOnce, views_.size() - v);
+      TILEGRAD_ASSIGN(const auto some,
+                      model_.Classify(std::span(images).subspan(v * bytes, count * bytes)));
+      said.insert(said.end(), some.begin(), some.end());
+    }
+    said_[i] = Accuracy(said, truth);
+    frequent_[i] = Accuracy(std::vector<int>{most_frequent_}, truth);
+    if (!Retrieves()) return {};
+    workers_.For(views_.size(), [&](std::size_t v, std::size_t) {
+      const auto match =
+          index_.Nearest(std::span(images).subspan(v * bytes, bytes), data_.info().image_size);
+      found[v] = searched_[static_cast<std::size_t>(match.model)];
+    });
+    retrieved_[i] = Accuracy(found, truth);
+    return {};
+  }
+
+  void Fill(std::span<const int> models) {
+    const ClassMeans means(data_, models);
+    out_.classes = means.classes();
+    out_.class_models = means.class_models();
+    out_.rows = {means.Row("most frequent class", frequent_)};
+    if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieved_));
+    out_.rows.push_back(means.Row("tilegrad", said_));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const ModelInfo& info = Info(models[i]);
+      out_.models.push_back({model_.classes()[static_cast<std::size_t>(info.class_index)], info.id,
+                             said_[i], info.shape});
+    }
+    out_.predictor = job_.predictor.description();
+    out_.dataset_source = data_.info().source;
+    out_.views_per_model = static_cast<int>(views_.size());
+  }
+
+  const Dataset& data_;
+  const TaskEvaluation& job_;
+  ClassifierModel& model_;
+  const Workers& workers_;
+  const ProgressSink& progress_;
+  const StopFlag& stop_;
+  const Share share_;  // of models
+  std::vector<int> views_;
+  int most_frequent_ = 0;
+  ImageIndex index_;
+  std::vector<int> searched_;  // their classes, in the order of the index
+  std::vector<Score> frequent_, retrieved_, said_;
+  Evaluation out_;
+};
+
+Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& classifier) {
+  const DatasetInfo& info = dataset.info();
+  Example out = NamedExample(dataset, model);
+  TILEGRAD_ASSIGN(const auto all, dataset.LoadImages(model));
+  const std::vector<int> views = ShownViews(info.views);
+  const std::vector<std::uint8_t> images = SelectedViews(all, info.views, views);
+  TILEGRAD_ASSIGN(const auto said, classifier.Classify(images));
+  const std::size_t bytes = images.size() / views.size(), rgb = bytes / 4 * 3;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const auto planes = std::span(images).subspan(v * bytes, bytes);
+    const std::string& name = classifier.classes()[static_cast<std::size_t>(said[v])];
+    out.pictures.push_back(
+        {OverGrey(PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), info.image_size,
+                                           info.image_size},
+                  kPaper),
+         "called " + name, out.name + ": called " + name});
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
+                                      const Workers& workers, const ProgressSink& progress,
+                                      const StopFlag& stop) {
+  if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
+  if (job.oracle_steps > 0)
+    return InvalidArgument("--oracle fits meshes; a classifier predicts none");
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
+  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  return Examiner(dataset, job, model, workers, progress, stop).Run();
+}
+
+Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
+                                const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
+  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
+  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  Showcase out = AboutDataset(dataset, request.header);
+  out.purpose = "to classify an object from one image";
+  out.note =
+      "The network saw none of these in training. The predicted class stands below each picture. "
+      "The models are spread over the classes in the dataset's order, not picked by hand.";
+  const std::vector<int> chosen = ChooseModels(dataset, request.examples);
+  for (const int m : chosen) {
+    if (stop) return Cancelled("stopped while classifying; nothing was written");
+    TILEGRAD_ASSIGN(Example example, ExampleOf(dataset, m, model));
+    out.examples.push_back(std::move(example));
+    if (progress) progress({"classifying", out.examples.size(), chosen.size(), ""});
+  }
+  return out;
+}
+
+namespace {
+
+constexpr std::uint64_t kShiftStream = 0x7368696674;
+constexpr int kPictureChannels = 3;
+
+// How one picture is read: numbers of `image` from [4][size][size] bytes.
+struct Placement {
+  int size;
+  bool mirrored;
+  Shift shift;
+
+  // The byte that comes to (x, y) of channel c, or 0 from beyond the picture.
+  std::uint8_t At(std::span<const std::uint8_t> image, int c, int y, int x) const {
+    const int row = y - shift.y, moved = x - shift.x;
+    if (row < 0 || row >= size || moved < 0 || moved >= size) return 0;
+    const int column = mirrored ? size - 1 - moved : moved;
+    return image[static_cast<std::size_t>((c * size + row) * size + column)];
+  }
+  template <class T>
+  void Read(std::span<const std::uint8_t> image, T* to) const {
+    for (int c = 0; c < kPictureChannels; ++c) {
+      for (int y = 0; y < size; ++y) {
+        for (int x = 0; x < size; ++x)
+          *to++ = static_cast<T>(At(image, c, y, x)) * static_cast<T>(1.0 / 255);
+      }
+    }
+  }
+};
+
+// A batch under construction.
+struct Gathering {
+  const LabelledImages& data;
+  std::vector<Sample> batch;
+  std::vector<Shift> shifts;
+  LabelledBatch out;
+
+  void Run(std::size_t i) {
+    const Sample& sample = batch[i];
+    const Placement placement{data.images.size, sample.mirrored,
+                              shifts.empty() ? Shift() : shifts[i]};
+    const std::size_t numbers = out.images.elements() / batch.size();
+    nn::WithFloatType(out.images.dtype(), [&]<class T>(T) {
+      placement.Read(data.images.Image(sample.model, sample.views[0]),
+                     out.images.data<T>() + i * numbers);
+    });
+    out.labels.data<std::int32_t>()[i] = data.labels[static_cast<std::size_t>(sample.model)];
+  }
+};
+
+}  // namespace
+
+Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<int>& models,
+                                    const Workers& workers, const ProgressSink& progress,
+                                    const StopFlag& stop) {
+  LabelledImages out;
+  TILEGRAD_ASSIGN(out.images, LoadImageStore(dataset, models, workers, progress, stop));
+  for (const int m : models)
+    out.labels.push_back(dataset.models()[static_cast<std::size_t>(m)].class_index);
+  return out;
+}
+
+Shift RandomShift(std::uint64_t seed, std::uint64_t position, int most) {
+  Rng rng(seed ^ kShiftStream, position);
+  const auto draw = [&] {
+    return static_cast<int>(rng.Below(static_cast<std::uint64_t>(2 * most + 1))) - most;
+  };
+  const int x = draw();
+  return {x, draw()};
+}
+
+BatchWork<LabelledBatch> LabelledWork(nn::Context& context, const LabelledImages& data,
+                                      std::vector<Sample> batch, std::vector<Shift> shifts) {
+  const auto count = static_cast<std::int64_t>(batch.size()),
+             size = static_cast<std::int64_t>(data.images.size);
+  const auto work =
+      std::make_shared<Gathering>(Gathering{data,
+                                            std::move(batch),
+                                            std::move(shifts),
+                                            {context.Empty({count, kPictureChannels, size, size}),
+                                             context.Empty({count}, nn::DType::kI32)}});
+  return {work->batch.size(), [work](std::size_t i, std::size_t) { work->Run(i); },
+          [work] { return Result<LabelledBatch>(std::move(work->out)); }};
+}
+
+LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
+                             std::span<const Sample> batch, std::span<const Shift> shifts) {
+  return *MakeNow(
+      LabelledWork(context, data, {batch.begin(), batch.end()}, {shifts.begin(), shifts.end()}),
+      context.workers());
+}
+
+nn::Tensor ColorsOf(nn::Context& context, std::span<const std::uint8_t> images, int size) {
+  const auto plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  const std::size_t count = images.size() / (4 * plane);
+  nn::Tensor out = context.Empty({static_cast<std::int64_t>(count), kPictureChannels, size, size});
+  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
+    for (std::size_t i = 0; i < count; ++i) {
+      Placement{size, false, {}}.Read(images.subspan(4 * plane * i, 4 * plane),
+                                      out.data<T>() + kPictureChannels * plane * i);
+    }
+  });
+  return out;
 }
 
 }  // namespace tilegrad::train

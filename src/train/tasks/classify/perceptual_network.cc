@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "nn/features.h"
+#include "nn/networks.h"
 #include "nn/serialize.h"
 #include "train/config.h"
 #include "train/tasks/classify/model.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/classify/task.h"
-
 #include <set>
 
 #include "base/error.h"
@@ -10,11 +8,10 @@
 #include "train/losses/loss_sum.h"
 #include "train/predictor.h"
 #include "train/tasks/classify/config.h"
-#include "train/tasks/classify/held_out.h"
 #include "train/tasks/classify/model.h"
-#include "train/tasks/classify/pictures.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/network_task.h"
+#include "train/tasks/registry.h"
 
 namespace tilegrad::train {
 namespace {

@@ -8,9 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "train/tasks/gan/critic.h"
+#include "train/tasks/adversary.h"
+#include "train/tasks/gan/config.h"
+#include "train/tasks/gan/real_pictures.h"
 #include "train/tasks/gan/step.h"
-#include "train/tasks/gan/texture_bank.h"
 #include "train/tasks/gan/watch.h"
 #include "train/tasks/task.h"
 

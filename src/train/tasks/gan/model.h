@@ -2,6 +2,14 @@
 // A trained generator: latent codes in, textured meshes out.
 #pragma once
 
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "scene/camera.h"
+#include "scene/image.h"
+#include "scene/mesh.h"
+#include "tilegrad/status.h"
 #include "train/tasks/gan/config.h"
 #include "train/tasks/task.h"
 
@@ -49,5 +57,21 @@ std::vector<float> BetweenCodes(std::span<const float> from, std::span<const flo
 std::vector<nn::NamedTensor> KeptState(ShapeTextureGenerator& generator);
 Status LoadKept(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
 Status LoadKeptShape(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
+
+// Pictures of generated objects for people: under the light of datasets.
+
+struct SheetLook {
+  int size = 128;      // pixels a side of each picture
+  int columns = 8;     // pictures a row
+  bool behind = true;  // also from behind: two pictures to an object
+};
+
+// From in front and above, turned by `azimuth` degrees more.
+Camera SheetCamera(int size, double azimuth);
+// A picture for each mesh.
+Result<std::vector<ImageU8>> DrawObjects(std::span<const Mesh> meshes, const Camera& camera,
+                                         int size, const Workers& workers);
+Result<ImageU8> DrawSheet(std::span<const Mesh> meshes, const SheetLook& look,
+                          const Workers& workers);
 
 }  // namespace tilegrad::train

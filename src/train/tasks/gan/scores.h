@@ -7,8 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "base/file.h"
+#include "train/losses/feature_l1.h"
 #include "train/metrics/set_scores.h"
 #include "train/tasks/gan/model.h"
+#include "train/tasks/gan/real_pictures.h"
 #include "train/tasks/gan/watch.h"
 
 namespace tilegrad::train {
@@ -42,5 +45,29 @@ Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
                                  const ProgressSink& progress, const StopFlag& stop);
 std::string FormatScores(const GanScores& scores);  // Markdown tables
 nlohmann::ordered_json ScoresJson(const GanScores& scores);
+
+// What sets of generated and true objects are compared by.
+
+// Which columns differ within the truth. The others are cells at the edge of what any object
+// covers: standardised, they would decide alone.
+std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth);
+// 0 in all others.
+FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns);
+
+// Features of pictures: the cells of each view, or what the levels of a classifier say on average
+// of the pixels of all views.
+class Judge {
+ public:
+  // `run`: of task.kind = "classify"; empty: cells.
+  static Result<Judge> Make(nn::Context& context, const Path& run);
+  std::string name() const;  // in words
+  Result<FeatureRows> Pictures(const ObjectViews& set) const;
+
+ private:
+  explicit Judge(nn::Context& context) : context_(context) {}
+  Result<FeatureRows> Levels(const ObjectViews& set) const;
+  nn::Context& context_;
+  FeatureFunction network_;
+};
 
 }  // namespace tilegrad::train

@@ -8,11 +8,17 @@
 #include <vector>
 
 #include "train/losses/loss_sum.h"
-#include "train/ops/render_op.h"
-#include "train/tasks/gan/critic.h"
+#include "train/models/render_op.h"
+#include "train/tasks/gan/config.h"
 #include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
+
+// Of silhouettes in all views, of their colours (D_I), of texture maps (D_t).
+enum class GanCritic { kSilhouettes, kPictures, kTextures };
+
+LearnedCritic::Job JobOf(const GanConfig& config, GanCritic critic);
 
 enum class GanStage { kShape, kTexture };
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/gan/task.h"
-
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
@@ -9,9 +7,9 @@
 #include "train/predictor.h"
 #include "train/tasks/gan/learner.h"
 #include "train/tasks/gan/model.h"
-#include "train/tasks/gan/sheet.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/network_task.h"
+#include "train/tasks/registry.h"
 
 namespace tilegrad::train {
 namespace {

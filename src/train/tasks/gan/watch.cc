@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "train/metrics/frechet.h"
 
 namespace tilegrad::train {
 namespace {

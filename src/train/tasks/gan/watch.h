@@ -3,7 +3,7 @@
 // and their diversity.
 #pragma once
 
-#include "train/metrics/feature_rows.h"
+#include "train/metrics/set_scores.h"
 #include "train/tasks/gan/real_pictures.h"
 #include "train/tasks/gan/step.h"
 

@@ -17,7 +17,7 @@ struct PhotographLosses {
   double camera = 2;           // 1 - |q q'|, and the mean square of scale and shift
   double azimuth = 2;          // which of several cameras is the likeliest (cross-entropy)
   double deformation = 10;     // mean length of movements
-  double laplacian = 30;       // losses/cotangent_laplacian.h
+  double laplacian = 30;       // losses/laplacian.h
   double entropy = 0.16;       // of each keypoint's weights
   double color = 1;            // equation 13 where the object is
   double flow_distance = 0.5;  // of the flow from the object (data/photographs/distance_barrier.h)

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/photographs/task.h"
-
 #include "base/error.h"
 #include "base/text.h"
 #include "nn/nn.h"
@@ -8,9 +6,9 @@
 #include "train/predictor.h"
 #include "train/tasks/network_task.h"
 #include "train/tasks/photographs/evaluate.h"
-#include "train/tasks/photographs/pictures.h"
 #include "train/tasks/photographs/step.h"
-#include "train/tasks/textured_image/pictures.h"
+#include "train/tasks/registry.h"
+#include "train/tasks/textured_image/object_pictures.h"
 
 namespace tilegrad::train {
 namespace {

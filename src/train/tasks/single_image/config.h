@@ -2,12 +2,41 @@
 // The keys of `task.kind = "single_image"`. What each does: config.cc, one line a key.
 #pragma once
 
+#include <optional>
+#include <string>
+
+#include "rivals/renderer.h"
+#include "tilegrad/status.h"
 #include "train/data/stream/stream_config.h"
 #include "train/models/mesh_network.h"
+#include "train/run/config_fields.h"
 #include "train/tasks/common_config.h"
-#include "train/tasks/single_image/rivals.h"
 
 namespace tilegrad::train {
+
+// Whose renderer trains: ours, or one of those that section 5.1 compares with. Network, data, steps
+// and the other losses stay the same, which is Table 1 of the paper.
+
+struct RivalConfig {
+  // SoftRas's own training, but for its near plane of 1: its cameras are 2.7 away from objects, so
+  // nothing is nearer, and a face that is has no gradient.
+  rivals::SoftRasOptions softras = {.near_plane = 0.1};
+  std::string softras_distance = "euclidean", softras_alpha = "product";
+  double softras_late_sigma = 1;  // share of sigma after 60 % of the run
+  bool softras_color = false;     // colours of vertices, mixed by softras_colors
+  rivals::SoftRasColors softras_colors = {};
+  rivals::N3mrOptions n3mr = {};
+  std::string n3mr_reduction = "mean";
+  bool n3mr_color = false;  // each face in the mean colour of its corners
+};
+
+ConfigFields FieldsOf(RivalConfig* config);
+
+// What `rule` draws with; nothing for "dibr". Errors: a word that is none of those known.
+Result<std::optional<rivals::Options>> RivalOptions(const std::string& rule,
+                                                    const RivalConfig& config);
+// Of a step, `share` of the run.
+double SoftRasSigmaAt(const RivalConfig& config, double share);
 
 struct SingleImageConfig {
   NetworkConfig network;

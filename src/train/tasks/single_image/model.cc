@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/single_image/model.h"
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "nn/nn.h"
+#include "render/picture/composite.h"
+#include "train/models/render_op.h"
 
 namespace tilegrad::train {
 namespace {
@@ -51,6 +55,44 @@ Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,
   auto model = std::make_unique<SingleImageModel>(context, sized, static_cast<int>(size));
   TILEGRAD_TRY(model->Load(checkpoint.tensors, checkpoint.info.half_extent));
   return std::unique_ptr<Model>(std::move(model));
+}
+
+namespace {
+
+constexpr int kSampleZoom = 2, kSampleGap = 2;
+
+ImageU8 ShownPixels(const float* rgb, const float* alpha, int size) {
+  const std::size_t plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  return Enlarged(OverGrey(PlanarRgba<float>{{rgb, 3 * plane}, {alpha, plane}, size, size}, kPaper),
+                  kSampleZoom);
+}
+
+}  // namespace
+
+Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageStore& store,
+                            std::span<const Sample> samples, std::int64_t at_step) {
+  const nn::NoGrad off(context);
+  const BatchTensors batch = GatherBatch(context, store, {samples.begin(), samples.end()});
+  const Prediction meshes =
+      step.network().Forward(nn::Constant(context, batch.input), nn::Mode::kEval);
+  const int views = static_cast<int>(samples[0].views.size());
+  const RenderedImages images = step.losses().DrawOurs(meshes, batch, at_step);
+  TILEGRAD_TRY(context.TakeStatus());
+  const std::size_t plane =
+      static_cast<std::size_t>(store.size) * static_cast<std::size_t>(store.size);
+  // Soft alpha is a signal for training, and rounds to 1 beside a face; people see what is covered.
+  const std::span<const std::int32_t> ids = step.losses().renderer().frame.images().face_ids;
+  std::vector<float> covered(ids.size());
+  std::ranges::transform(ids, covered.begin(),
+                         [](std::int32_t id) { return id < 0 ? 0.0f : 1.0f; });
+  std::vector<ImageU8> cells;
+  for (std::size_t n = 0; n < samples.size() * static_cast<std::size_t>(views); ++n) {
+    cells.push_back(ShownPixels(batch.truth_colors.data<float>() + 3 * plane * n,
+                                batch.truth_alpha.data<float>() + plane * n, store.size));
+    cells.push_back(ShownPixels(images.colors.value().data<float>() + 3 * plane * n,
+                                covered.data() + plane * n, store.size));
+  }
+  return TileImages(cells, 2 * views, kSampleGap);
 }
 
 }  // namespace tilegrad::train

@@ -2,7 +2,12 @@
 // The trained network of section 5.1, ready to predict.
 #pragma once
 
+#include <span>
+
+#include "base/file.h"
+#include "scene/image.h"
 #include "train/models/mesh_network.h"
+#include "train/tasks/single_image/step.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {
@@ -13,5 +18,14 @@ namespace tilegrad::train {
 Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,
                                                     const NetworkConfig& config,
                                                     const Checkpoint& checkpoint);
+
+// Pictures of what a network does now: rows of input | prediction | truth ... for a few objects.
+
+// One row an object: input view, its prediction, then each other view as prediction and truth; RGB
+// composited over light grey, `zoom` screen pixels a pixel. Uses the statistics of training (eval
+// mode) and no gradient; the weights are those of the last
+// step, also where a moving average of them predicts.
+Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageStore& store,
+                            std::span<const Sample> samples, std::int64_t at_step);
 
 }  // namespace tilegrad::train

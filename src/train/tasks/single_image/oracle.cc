@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "nn/optim.h"
-#include "train/tasks/single_image/image_losses.h"
+#include "train/tasks/single_image/step.h"
 
 namespace tilegrad::train {
 namespace {

@@ -3,11 +3,74 @@
 // gradients -> Adam.
 #pragma once
 
-#include "train/tasks/learned_weights.h"
-#include "train/tasks/single_image/image_losses.h"
+#include <optional>
+#include <vector>
+
+#include "nn/context.h"
+#include "scene/camera.h"
+#include "train/data/batches.h"
+#include "train/data/stream/textured_stream.h"
+#include "train/models/mesh_network.h"
+#include "train/models/render_op.h"
+#include "train/run/log.h"
+#include "train/tasks/network_task.h"
+#include "train/tasks/next_batch.h"
+#include "train/tasks/single_image/config.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {
+
+// Equation 14: meshes -> renderer -> losses against the pictures.
+
+// The pictures of one step as tensors, from the dataset or rendered for it.
+
+// The tensors of one batch: what the network sees, and what the renders are held to.
+struct BatchTensors {
+  nn::Tensor input;             // [B, 4, size, size]
+  nn::Tensor truth_colors;      // [B * views, 3, size, size]
+  nn::Tensor truth_alpha;       // [B * views, size, size]
+  std::vector<Camera> cameras;  // [B * views]
+  double stream_seconds = 0;    // of processor time, for pictures that were rendered for it
+};
+BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
+                         const std::vector<Sample>& batch);
+// Of a batch the first objects, which are rendered for it.
+struct StreamedObjects {
+  TexturedStream* from = nullptr;  // null: all are of the store
+  std::int64_t first = 0;          // position in the run of the batch's first object
+};
+// `store` and the stream outlive the work, whose lanes are the stream's.
+BatchWork<BatchTensors> GatherWork(nn::Context& context, const ImageStore& store,
+                                   std::vector<Sample> batch, const StreamedObjects& stream);
+
+class ImageLosses {
+ public:
+  // Of deformed copies of `sphere`, which outlives it. The words of config.render and config.rivals
+  // are known (RivalOptions).
+  ImageLosses(nn::Context& context, const SingleImageConfig& config, const SphereModel& sphere,
+              int image_size);
+
+  // On the tape; `values` gets the sum and its terms.
+  nn::Var Total(const Prediction& meshes, const BatchTensors& batch, std::int64_t step,
+                StepValues* values);
+
+  SceneRenderer& renderer() { return renderer_; }
+  // By our renderer, whichever renderer trains.
+  RenderedImages DrawOurs(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
+
+ private:
+  // Whether the rule draws colours, which the colour loss needs.
+  bool HasColor() const;
+  // The images that losses look at.
+  RenderedImages Draw(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
+
+  SingleImageConfig config_;
+  int image_size_;
+  const SphereModel& sphere_;
+  SceneRenderer renderer_;
+  std::optional<rivals::Options> rival_;  // instead of ours
+  RivalRenderer rival_renderer_;
+};
 
 // Network, optimiser and renderer of a run.
 class TrainStep {

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/single_image/task.h"
-
 #include "base/error.h"
 #include "base/text.h"
 #include "io/image_file.h"
-#include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
 #include "train/data/few_models.h"
 #include "train/data/trained_models.h"
-#include "train/eval/training_pictures.h"
+#include "train/eval/retrieval.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/network_task.h"
+#include "train/tasks/registry.h"
 #include "train/tasks/single_image/model.h"
 #include "train/tasks/single_image/oracle.h"
-#include "train/tasks/single_image/sample_images.h"
 #include "train/tasks/single_image/step.h"
 
 namespace tilegrad::train {

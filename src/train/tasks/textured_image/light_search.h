@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "train/data/stream/light_draw.h"
+#include "train/models/render_op.h"
+#include "train/models/texture_network.h"
 
 namespace tilegrad::train {
 

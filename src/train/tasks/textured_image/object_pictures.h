@@ -3,11 +3,15 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "scene/image.h"
 #include "tilegrad/renderer.h"
 #include "train/data/stream/textured_stream.h"
+#include "train/tasks/task.h"
+#include "train/tasks/textured_image/held_out_views.h"
+#include "train/tasks/textured_image/model.h"
 
 namespace tilegrad::train {
 
@@ -33,5 +37,20 @@ class ObjectPictures {
 ImageU8 OnPaper(std::span<const float> rgba, int size);
 // For the network: bytes.
 std::vector<std::uint8_t> ToBytes(std::span<const float> rgba);
+
+// Rows of pictures as the paper's figures 5 and 6.
+
+struct ShownObject {
+  std::string name;
+  const PredictedObject& object;  // from the first view
+  const HeldOutViews::Views& truth;
+};
+
+// input | texture + light | texture | light | the true texture and light | for each other view
+// texture and true texture | map.
+Result<std::vector<ShownPicture>> PicturesOf(const ShownObject& shown, ObjectPictures& pictures,
+                                             int size);
+// Such rows below each other, all cells of one size.
+ImageU8 SheetOf(const std::vector<std::vector<ShownPicture>>& rows, int size);
 
 }  // namespace tilegrad::train

@@ -3,13 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/losses/color_l1.h"
-#include "train/ops/light_frames.h"
-#include "train/tasks/equation14.h"
+#include "train/losses/feature_l1.h"
+#include "train/models/weak_cameras.h"
+#include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
 namespace {
@@ -221,6 +223,132 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
               LightAngle(objects, batch));
   }
   return sum.total();
+}
+
+namespace {
+
+template <class T>
+void Copy(std::span<const float> from, T* to) {
+  std::transform(from.begin(), from.end(), to, [](float x) { return static_cast<T>(x); });
+}
+
+// View `m` of the batch, [4][size][size], to where it is seen.
+template <class T>
+void Place(std::span<const float> rgba, std::size_t m, TexturedBatch* batch) {
+  const std::size_t plane = rgba.size() / 4;
+  Copy(rgba, batch->input.data<T>() + m * rgba.size());
+  for (const std::size_t n : {2 * m, 2 * (m ^ 1) + 1}) {
+    Copy(rgba.first(3 * plane), batch->truth_colors.data<T>() + n * 3 * plane);
+    Copy(rgba.subspan(3 * plane), batch->truth_alpha.data<T>() + n * plane);
+    batch->cameras[n] = batch->views[m].camera;
+  }
+}
+
+// A batch under construction.
+struct Rendering {
+  TexturedStream& stream;
+  std::vector<Sample> models;
+  std::uint64_t first;
+  TexturedBatch batch;
+  std::vector<Status> failures = std::vector<Status>(models.size());
+
+  void Run(std::size_t b, std::size_t lane) {
+    const auto rgba =
+        stream.Render(models[b].model, first + b, lane, std::span(batch.views).subspan(2 * b, 2));
+    failures[b] = rgba.status();
+    if (!rgba.ok()) return;
+    const std::size_t image = rgba->size() / 2;
+    nn::WithFloatType(batch.input.dtype(), [&]<class T>(T) {
+      Place<T>(rgba->first(image), 2 * b, &batch);
+      Place<T>(rgba->subspan(image), 2 * b + 1, &batch);
+    });
+  }
+  Result<TexturedBatch> Finish() {
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    batch.stream_seconds = stream.TakeSeconds();
+    return std::move(batch);
+  }
+};
+
+}  // namespace
+
+BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream, int size,
+                                    std::vector<Sample> models, std::int64_t first) {
+  const std::size_t objects = models.size(), inputs = kViewsOfObject * objects, images = 2 * inputs;
+  const auto m = static_cast<std::int64_t>(inputs), n = static_cast<std::int64_t>(images);
+  TexturedBatch batch{context.Empty({m, 4, size, size}), context.Empty({n, 3, size, size}),
+                      context.Empty({n, size, size}), std::vector<Camera>(images),
+                      std::vector<TexturedView>(inputs)};
+  const auto work = std::make_shared<Rendering>(
+      Rendering{stream, std::move(models), static_cast<std::uint64_t>(first), std::move(batch)});
+  return {objects, [work](std::size_t b, std::size_t lane) { work->Run(b, lane); },
+          [work] { return work->Finish(); }};
+}
+
+Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
+                                  const std::vector<Sample>& models, std::int64_t first) {
+  return MakeNow(RenderWork(context, stream, size, models, first), context.workers());
+}
+
+namespace {
+
+// The image that shows input m as the object's other input has it: see TexturedBatch.
+constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
+static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
+
+template <class T>
+struct TargetRow {
+  const T* said;
+  T* out;
+  std::size_t numbers;  // 3: a direction, 9: harmonics
+};
+
+template <class T>
+void Write(const FoundLight& found, const TargetRow<T>& row) {
+  const auto& d = found.direction;
+  if (d == std::array<double, 3>{}) {
+    std::copy_n(row.said, row.numbers, row.out);
+  } else if (row.numbers == 3) {
+    std::ranges::transform(d, row.out, [](double x) { return static_cast<T>(x); });
+  } else {
+    const auto sh = SkyAndLight(
+        found.sky, {static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])});
+    std::ranges::transform(sh, row.out, [](float x) { return static_cast<T>(x); });
+  }
+}
+
+}  // namespace
+
+LightTargets::LightTargets(nn::Context& context, const LightConfig& config)
+    : context_(context), search_(config), renderer_(context.workers()) {}
+
+nn::Tensor LightTargets::Find(const Prediction& objects, const TexturedBatch& batch,
+                              RenderJob job) {
+  job.shading.lighting = Lighting::kNone;
+  job.normals = true;
+  const std::size_t size = static_cast<std::size_t>(job.options.width), pixels = size * size;
+  const SceneVars scenes{.positions = nn::Constant(context_, objects.positions.value()),
+                         .textures = nn::Constant(context_, objects.textures.value())};
+  if (!RenderScenes(renderer_, scenes, std::move(job)).colors.valid()) return {};
+  const nn::Tensor said = PredictedLights(objects).value();
+  nn::Tensor out = context_.Empty(said.shape(), said.dtype());
+  nn::WithFloatType(out.dtype(), [&]<class T>(T) {
+    const ImagesT<T>& drawn = FrameOf(renderer_, T{}).images();
+    const std::span<const T> picture = batch.truth_colors.template span<T>();
+    const std::span<const T> cover = batch.truth_alpha.template span<T>();
+    context_.workers().For(batch.views.size(), [&](std::size_t m, std::size_t) {
+      const std::size_t n = ImageFromOther(m);
+      const auto planes = [&](std::span<const T> images) {
+        return images.subspan(3 * n * pixels, 3 * pixels);
+      };
+      const FoundLight found = search_.Find<T>({planes(drawn.color), planes(drawn.normals),
+                                                planes(picture), cover.subspan(n * pixels, pixels)},
+                                               batch.cameras[n].rotation);
+      const auto numbers = static_cast<std::size_t>(said.shape()[1]);
+      Write<T>(found, {said.data<T>() + numbers * m, out.data<T>() + numbers * m, numbers});
+    });
+  });
+  return out;
 }
 
 }  // namespace tilegrad::train

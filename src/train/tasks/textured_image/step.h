@@ -7,16 +7,73 @@
 // predicted from that view.
 #pragma once
 
-#include "train/ops/render_op.h"
-#include "train/ops/rival_op.h"
-#include "train/run/step_values.h"
-#include "train/tasks/learned_weights.h"
+#include <vector>
+
+#include "nn/context.h"
+#include "train/data/batches.h"
+#include "train/data/stream/textured_stream.h"
+#include "train/models/render_op.h"
+#include "train/models/texture_network.h"
+#include "train/run/log.h"
+#include "train/tasks/network_task.h"
+#include "train/tasks/next_batch.h"
 #include "train/tasks/task.h"
-#include "train/tasks/textured_image/batch.h"
 #include "train/tasks/textured_image/config.h"
-#include "train/tasks/textured_image/light_targets.h"
+#include "train/tasks/textured_image/light_search.h"
 
 namespace tilegrad::train {
+
+// What a step sees: objects in two views, each under a light of its own.
+
+inline constexpr int kViewsOfObject = 2;
+
+// M = 2 B inputs: 2 b and 2 b + 1 are the views of object b. The mesh that is predicted from input
+// m is seen in N = 2 M images: 2 m in its own view, 2 m + 1 in the other one of its object.
+struct TexturedBatch {
+  nn::Tensor input;                 // [M, 4, size, size]
+  nn::Tensor truth_colors;          // [N, 3, size, size]
+  nn::Tensor truth_alpha;           // [N, size, size]
+  std::vector<Camera> cameras;      // [N]
+  std::vector<TexturedView> views;  // [M]
+  Portion portion{};                // of the step's batch
+  double stream_seconds = 0;        // of processor time, for its pictures
+};
+
+// The input whose view image n shows.
+constexpr std::size_t InputOfImage(std::size_t n) { return n % 2 == 0 ? n / 2 : (n / 2) ^ 1; }
+
+// One object for each of `models`. `first`: position in the run of the first. The stream outlives
+// the work, whose lanes are the stream's.
+BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream, int size,
+                                    std::vector<Sample> models, std::int64_t first);
+// The same, on all workers.
+Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
+                                  const std::vector<Sample>& models, std::int64_t first);
+
+// Targets for the lights that the network predicts for a batch, found by search (LightSearch). The
+// object is drawn unlit with the texture predicted from its other view; the target is the light
+// that makes this most like the input. The texture of the same view depends on the predicted light,
+// so the network would learn to repeat itself.
+
+// The predicted lights that LightTargets has targets for: directions or harmonics.
+inline const nn::Var& PredictedLights(const Prediction& objects) {
+  return objects.sh.valid() ? objects.sh : objects.directions;
+}
+
+class LightTargets {
+ public:
+  LightTargets(nn::Context& context, const LightConfig& config);
+
+  // In the axes of the inputs' cameras, without gradient: [M, 3] unit directions, of harmonics
+  // [M, 9]; the prediction itself for inputs that show too little. `job` draws the batch; its
+  // shading is replaced. An empty tensor if drawing failed: the context's status has the error.
+  nn::Tensor Find(const Prediction& objects, const TexturedBatch& batch, RenderJob job);
+
+ private:
+  nn::Context& context_;
+  LightSearch search_;
+  SceneRenderer renderer_;
+};
 
 // What losses, and critics of the images, look at.
 struct TexturedRenders {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/textured_image/task.h"
-
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
@@ -8,9 +6,9 @@
 #include "train/predictor.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/network_task.h"
-#include "train/tasks/textured_image/evaluate.h"
+#include "train/tasks/registry.h"
 #include "train/tasks/textured_image/held_out_views.h"
-#include "train/tasks/textured_image/pictures.h"
+#include "train/tasks/textured_image/object_pictures.h"
 #include "train/tasks/textured_image/step.h"
 
 namespace tilegrad::train {

@@ -10,10 +10,9 @@
 #include <cstring>
 #include <set>
 
-#include "io/glb_writer.h"
-#include "scene/creases.h"
+#include "io/mesh_file.h"
 #include "scene/shapes.h"
-#include "scene/sphere_uv.h"
+#include "scene/topology.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
 

@@ -3,7 +3,6 @@
 // reported, and serves as the network of a perceptual loss.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <numeric>
 
 #include "base/rng.h"
@@ -15,8 +14,8 @@
 #include "train/report/report.h"
 #include "train/run/log.h"
 #include "train/same_run.h"
+#include "train/tasks/classify/model.h"
 #include "train/tasks/classify/perceptual_network.h"
-#include "train/tasks/classify/pictures.h"
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The K nearest faces of every pixel, within a blur radius, as PyTorch3D's rasterizer has them
+// (compat/pytorch3d_fragment.h), and the way back. For conversions: Renderer needs no such
+// lists. The same bits for any number of workers.
+//
+// A face is listed for a pixel if it has an area (> 1e-8), all its depths are >= 1e-8, and the
+// pixel is inside, or nearer to its boundary than the root of blur_radius. Lists are by depth, near
+// faces first; of equal depths the face with the lower index.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "base/parallel.h"
+#include "compat/pytorch3d_fragment.h"
+#include "scene/camera.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::compat::pytorch3d {
+
+struct LayeredOptions {
+  ImageSize size;           // pixels, 1..16384; the shorter side spans [-1, 1]
+  int faces_per_pixel = 1;  // K, 1..1024
+  double blur_radius = 0;   // NDC^2, >= 0
+  bool cull_backfaces = false;
+  FragmentRule rule;
+};
+
+// Faces [first, first + count) of those packed make up one image.
+struct FaceRange {
+  std::int64_t first, count;
+};
+
+// [N,H,W,K], and [N,H,W,K,3] for barycentrics; all -1 behind the last face of a pixel. Row 0 is on
+// top, and x falls along a row.
+template <class T>
+struct LayeredImages {
+  std::span<std::int64_t> pix_to_face;  // index of the packed face
+  std::span<T> zbuf, barycentrics, dists;
+};
+
+// face_vertices [F,3,3]: x, y, depth; of all images, packed. Errors name the array, the index and
+// what was expected.
+template <class T>
+Status RasterizeLayers(std::span<const T> face_vertices, std::span<const FaceRange> images,
+                       const LayeredOptions& options, const Workers& workers,
+                       const LayeredImages<T>& out);
+
+// dL/d(images) in, shaped as they are; an empty span is zero. d_face_vertices [F,3,3] is
+// overwritten. Which faces are listed is held fixed.
+template <class T>
+struct LayeredAdjoint {
+  std::span<const std::int64_t> pix_to_face;
+  std::span<const T> d_zbuf, d_barycentrics, d_dists;
+  std::span<T> d_face_vertices;
+};
+template <class T>
+Status RasterizeLayersBackward(std::span<const T> face_vertices, const LayeredOptions& options,
+                               const Workers& workers, const LayeredAdjoint<T>& adjoint);
+
+}  // namespace tilegrad::compat::pytorch3d
