@@ -14,6 +14,9 @@ target_compile_options(tilegrad_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-re
 if(TILEGRAD_UNITY)
   target_compile_options(tilegrad_flags INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
 endif()
+# GCC frees memory while it compiles, whatever the machine has: a tenth of its time for a fifth less memory (0.7 instead of 0.85 GB for the
+# largest of our files). In KiB.
+target_compile_options(tilegrad_flags INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:--param=ggc-min-heapsize=524288>)
 if(TILEGRAD_WERROR)
   target_compile_options(tilegrad_flags INTERFACE -Werror)
 endif()
