@@ -16,6 +16,7 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "fit/clock.h"
 #include "fit/config.h"
 #include "fit/doctor.h"
 #include "fit/input.h"
@@ -77,5 +78,27 @@ TermLabels FitLabels();
 // The page. `sheet` is the timelapse in one picture, or empty.
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,
                               const ImageU8& sheet);
+
+// What a fit leaves behind when it is over.
+
+// The scene at the end, its scores and what is written of both.
+class FitResult {
+ public:
+  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers,
+            const Watch& watch)
+      : job_(job), scene_(scene), clock_(clock), workers_(workers), watch_(watch) {}
+  Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
+
+ private:
+  Result<ImageU8> Sheet(const RunPlan& plan) const;
+  Status Score(FitOutcome* outcome) const;
+  Status WriteCameras() const;
+
+  const FitJob& job_;
+  const FitScene& scene_;
+  const FitClock& clock_;
+  const Workers& workers_;
+  const Watch& watch_;
+};
 
 }  // namespace tilegrad::train

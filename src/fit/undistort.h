@@ -2,10 +2,26 @@
 // Images of lenses that bend rays, as a straight lens would have taken them.
 #pragma once
 
-#include "fit/view_pixels.h"
+#include <string>
+#include <vector>
+
+#include "fit/transforms.h"
 #include "scene/camera.h"
 
 namespace tilegrad::train {
+
+// One image with its mask, as a fit takes it.
+
+struct ViewPixels {
+  ImageSize size;
+  std::vector<float> color, alpha;  // [3,H,W] straight, [H,W]
+  std::string mask;                 // where the alpha is from, for messages; empty: it is all 1
+
+  std::size_t pixels() const { return alpha.size(); }
+};
+
+// Turned as the frame's camera counts pixels. Errors name the file.
+Result<ViewPixels> LoadViewPixels(const TransformsFrame& frame);
 
 // Takes what `lens` bends out of colours and alpha, bilinearly, and returns the camera of the image
 // that is left: `camera`, or where the object would leave the image one with a shorter focal

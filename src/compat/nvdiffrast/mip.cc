@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compat/nvdiffrast/texture.h"
-
 #include "base/error.h"
+#include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {

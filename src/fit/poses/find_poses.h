@@ -10,6 +10,7 @@
 // mesh that is the mean of everything. Starts end once two agree.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <span>
@@ -17,6 +18,8 @@
 
 #include "base/progress.h"
 #include "fit/image_loss.h"
+#include "fit/poses/crop.h"
+#include "fit/scene.h"
 #include "scene/camera.h"
 
 namespace tilegrad::train {
@@ -63,5 +66,20 @@ Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera>
 // it is so afterwards. Up is made +y.
 Result<std::vector<Camera>> RefinePoses(const TargetImages& images, std::span<const Camera> cameras,
                                         const Workers& workers, const Watch& watch = {});
+
+// An object from all around, and where a picture fits in best.
+
+struct Viewpoint {
+  Camera camera;  // looks at the origin
+  Crop crop;      // what it sees
+};
+
+// The object of a scene, which is about 1 across and around the origin, from 12.5 to 15 degrees
+// apart: from 45 degrees below the horizon to 80 above, without roll about `up`.
+Result<std::vector<Viewpoint>> LookAround(const FitScene& scene, const std::array<double, 3>& up,
+                                          FitRenderer* renderer);
+
+// Degrees between the directions in which two cameras look.
+double DirectionGap(const Camera& a, const Camera& b);
 
 }  // namespace tilegrad::train

@@ -19,8 +19,8 @@ void RegisterTask(const std::string& kind, TaskFactory make);
 // With the defaults of its fields. InvalidArgument lists the kinds there are.
 Result<std::unique_ptr<Task>> MakeTask(const std::string& kind);
 
-// tilegrad's own, by their kinds. "single_image": section 5.1 of the paper, shape and vertex colours
-// from one image.
+// tilegrad's own, by their kinds. "single_image": section 5.1 of the paper, shape and vertex
+// colours from one image.
 std::unique_ptr<Task> MakeSingleImageTask();
 // "textured_image": sections 5.2 and 5.3, shape, texture and light from one image.
 std::unique_ptr<Task> MakeTexturedImageTask();

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/data/split.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/few_models.h"
+#include "train/data/split.h"
 
 namespace tilegrad::train::index_test {
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rivals on the tape: which images there are, what reaches the inputs, errors. Gradients
 // through a whole step: chain_test.cc.
+#include "train/models/render_op.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +17,6 @@
 #include "scene/shapes.h"
 #include "shade/spherical_harmonics_ref.h"
 #include "train/gradient_check.h"
-#include "train/models/render_op.h"
 #include "train/models/weak_cameras.h"
 
 namespace tilegrad::train::render_op_test {

@@ -2,6 +2,7 @@
 // Makes a dataset from a source of models: loads, normalises, renders, voxelises, samples, splits.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -60,5 +61,19 @@ struct BuildSummary {
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers,
                                   const ProgressSink& progress, const StopFlag& stop);
+
+// Which models of a source a dataset gets.
+
+// Entries by classes, per_class, liveries and limit; ascending. The first by hash, so that a part
+// of a set is as varied as the whole: first of shapes, then of the models of each.
+std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
+                                       const BuildOptions& options);
+
+// InvalidArgument names a class that no entry has.
+Status CheckClasses(const std::vector<SourceEntry>& entries,
+                    const std::vector<std::string>& classes);
+
+// InvalidArgument names an option out of its range.
+Status CheckOptions(const BuildOptions& options);
 
 }  // namespace tilegrad::train

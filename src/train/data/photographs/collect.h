@@ -6,9 +6,13 @@
 #include <array>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "base/file.h"
+#include "base/function_ref.h"
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "scene/camera.h"
 #include "train/data/broken_members.h"
 #include "train/data/photographs/photographs.h"
 
@@ -18,7 +22,7 @@ struct CollectionJob {
   std::string source;  // "cub" or "pascal3d"
   Path input;
   std::string class_name = "car";  // of PASCAL3D+
-  Path masks = {};                 // of PASCAL3D+ (pascal3d_masks.h); empty: none
+  Path masks = {};                 // of PASCAL3D+ (pascal3d.h); empty: none
   bool allow_broken = false;       // more than BrokenMembers does
 };
 
@@ -36,5 +40,21 @@ struct CollectionSummary {
 Result<CollectionSummary> CollectPhotographs(const CollectionJob& job, const Path& folder,
                                              const Workers& workers, const ProgressSink& progress,
                                              const StopFlag& stop);
+
+// The members of a set of photographs, one after the other: files of annotations or of pictures.
+
+struct MemberWork {
+  const Workers& workers;
+  const ProgressSink& progress;
+  const StopFlag& stop;
+};
+
+// take(index, worker) for each name; those that fail are broken, in their order. Errors: stopped,
+// or the system refused resources, which says nothing of a member.
+Status TakeMembers(const std::vector<std::string>& names, const MemberWork& work,
+                   FunctionRef<Status(std::size_t, std::size_t)> take, BrokenMembers* broken);
+
+// Reads a picture to its end and copies its file. Its size, as stored.
+Result<ImageSize> TakePicture(const Path& from, const Path& to);
 
 }  // namespace tilegrad::train

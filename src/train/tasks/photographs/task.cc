@@ -5,7 +5,7 @@
 #include "train/data/batches.h"
 #include "train/predictor.h"
 #include "train/tasks/network_task.h"
-#include "train/tasks/photographs/evaluate.h"
+#include "train/tasks/photographs/model.h"
 #include "train/tasks/photographs/step.h"
 #include "train/tasks/registry.h"
 #include "train/tasks/textured_image/object_pictures.h"
