@@ -132,6 +132,14 @@ TEST_F(Weights, ComeAlongByName) {
            "predicts no meshes");
 }
 
+// Those of data/weights, which are installed.
+TEST_F(Weights, OfTheRepositoryPredict) {
+  const std::string to = " --refine 0 --out " + In("out") + " " + Shared("view.png");
+  ExpectIn(ExpectDone("predict" + to, "cd " + folder_.string() + " && env -u TILEGRAD_WEIGHTS "),
+           "share/tilegrad/weights/furniture.safetensors");
+  EXPECT_TRUE(Exists("out/view_predicted.glb"));
+}
+
 TEST_F(Weights, ThatAreMissingAreToldOf) {
   const std::string to = " --out " + In("out") + " " + Shared("view.png");
   const Outcome other = RunProgram("predict --run cars" + to, Alone());
