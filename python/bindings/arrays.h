@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // NumPy arrays as spans, and errors as Python's exceptions. tilegrad/_arrays.py has converted and
-// named what the caller gave; here is checked what a span relies on, dtype, layout and, where
-// nobody behind knows how many numbers there must be, the shape. The one home of both on this side.
+// named the caller's arrays; this checks what a span relies on: dtype, layout and, where no later
+// code knows the number of elements, the shape. The only place for both on this side.
 #pragma once
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ namespace tilegrad::python {
 
 namespace py = pybind11;
 
-// Text that may hold names from files, which are of any bytes: what is not UTF-8 is replaced.
+// Text that may hold names from files, with any bytes: replaces what is not UTF-8.
 inline py::str Text(const std::string& bytes) {
   const auto size = static_cast<py::ssize_t>(bytes.size());
   PyObject* text = PyUnicode_DecodeUTF8(bytes.data(), size, "replace");
@@ -99,7 +99,7 @@ inline bool HasShape(const py::array& array, std::span<const py::ssize_t> shape)
 }
 
 // `object` as an array that is C-contiguous, of T (TypeError otherwise) and of `shape`
-// (ValueError); kAny stands for any length of an axis.
+// (ValueError); kAny matches any length of an axis.
 template <class T>
 py::array CheckedArray(const py::object& object, const char* function, const char* argument,
                        std::span<const py::ssize_t> shape) {
@@ -117,7 +117,7 @@ py::array CheckedArray(const py::object& object, const char* function, const cha
                                     ShapeText(ShapeOf(array)), ShapeText(shape)));
 }
 
-// The numbers of `array`, row-major; valid while the array lives. Errors as of CheckedArray.
+// The numbers of `array`, row-major; valid while the array lives. Errors: as CheckedArray.
 template <class T>
 std::span<const T> SpanOf(const py::object& array, const char* function, const char* argument,
                           const std::vector<py::ssize_t>& shape) {
@@ -136,7 +136,7 @@ std::span<T> MutableSpanOf(const py::object& array, const char* function, const 
   return {static_cast<T*>(checked.mutable_data()), static_cast<std::size_t>(checked.size())};
 }
 
-// A bug, found before anybody reads or writes behind the end of an array.
+// Catches a bug before anything reads or writes past the end of an array.
 inline void CheckCount(std::size_t count, std::span<const py::ssize_t> shape) {
   std::size_t numbers = 1;
   for (const py::ssize_t axis : shape) numbers *= static_cast<std::size_t>(axis);
@@ -145,7 +145,7 @@ inline void CheckCount(std::size_t count, std::span<const py::ssize_t> shape) {
       fmt::format("internal error: an array of shape {} with {} numbers", ShapeText(shape), count));
 }
 
-// `data` of `owner` as an array that keeps the owner alive. Not to be written to, unless told.
+// `data` of `owner` as an array that keeps the owner alive. Read-only unless `writeable`.
 template <class T>
 py::array ViewOf(std::span<const T> data, const std::vector<py::ssize_t>& shape,
                  const py::object& owner, bool writeable = false) {

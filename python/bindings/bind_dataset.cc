@@ -20,7 +20,7 @@ using train::Dataset;
 py::ssize_t Side(const Dataset& d) { return d.info().image_size; }
 py::ssize_t Views(const Dataset& d) { return d.info().views; }
 
-// Raises for an index that is not there.
+// Raises for an index out of range.
 int CheckedModel(const Dataset& d, int model) {
   if (model < 0 || model >= static_cast<int>(d.models().size()))
     throw py::index_error(

@@ -15,7 +15,7 @@ void BindRenderer(py::module_& m);
 
 namespace {
 
-// What is known of an image, by its name: its numbers, and the one place that knows their shape.
+// The numbers and shape of an image, by its name; the only place that knows the shape.
 template <class T>
 struct NamedImage {
   std::span<const T> values;

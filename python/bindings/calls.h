@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Engine functions for two kinds of numbers as functions of Python: all arrays of a call are
-// float32, or all are float64.
+// Engine functions as Python functions for two dtypes: all arrays of a call are float32, or all are
+// float64.
 #pragma once
 
 #include <cstddef>
@@ -15,16 +15,15 @@
 namespace tilegrad::python {
 
 // The process's Workers of `threads` threads (0: one for each core that it may use), made at the
-// first call; several threads may use them at the same time. A child of a fork has Workers of its
-// own.
+// first call; several threads may use them at the same time. A forked child has its own Workers.
 const Workers& SharedWorkers(int threads);
 
-// Memory for results that a program asks for again and again, as the steps of a training do: blocks
-// that arrays gave back are handed out again. Pages that come anew from the system may cost more
-// than what is computed into them.
+// Recycles the memory of results that a program requests repeatedly, as training steps do: reuses
+// the blocks of freed arrays. Fresh pages from the system may cost more than the computation that
+// fills them.
 
 inline constexpr std::size_t kLeastKeptBytes = std::size_t{1} << 16;  // malloc keeps smaller ones
-// In all; beyond, those that were given back first go to the system.
+// In total; beyond that, the blocks freed first go back to the system.
 inline constexpr std::size_t kMostKeptBytes = std::size_t{256} << 20;
 
 // At least `bytes` uninitialised bytes, aligned for kernels, until the capsule dies. With the GIL
@@ -35,7 +34,7 @@ struct KeptBlock {
 };
 KeptBlock TakeKeptBlock(std::size_t bytes);
 
-// call(float()) or call(double()), by the numbers of `array`, which is the argument of that name.
+// call(float()) or call(double()), by the dtype of `array`, which is the argument of that name.
 template <class Call>
 auto Dispatch(const py::array& array, const char* function, const char* argument,
               const Call& call) {
@@ -77,7 +76,7 @@ std::span<const T> OptionalSpanOf(const std::optional<py::array>& array, const c
   return array.has_value() ? SpanOf<T>(*array, function, argument, shape) : std::span<const T>();
 }
 
-// The numbers of `array`, which must be finite. Errors as of SpanOf.
+// The numbers of `array`, which must be finite. Errors: as SpanOf.
 template <class T>
 std::span<const T> FiniteSpanOf(const py::object& array, const char* function, const char* argument,
                                 const std::vector<py::ssize_t>& shape) {
@@ -86,7 +85,7 @@ std::span<const T> FiniteSpanOf(const py::object& array, const char* function, c
   throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
 }
 
-// Engine work, other Python threads running.
+// Runs engine work without the GIL.
 template <class Work>
 void Run(const char* function, const Work& work) {
   Status status;

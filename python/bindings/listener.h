@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Long work that Python hears of and may stop.
+// Long work that reports to Python and that Python may stop.
 #pragma once
 
 #include <condition_variable>
@@ -13,16 +13,16 @@
 
 namespace tilegrad::python {
 
-// A Python function that is told of progress, and may stop the work: by returning True, by an
-// exception, by Ctrl-C. Work runs on a separate thread, without the GIL; the function is called
-// on the thread that called Run, which looks for Ctrl-C ten times a second, whatever the work does.
+// A Python callback for progress, which may stop the work by returning True or by an exception;
+// Ctrl-C stops it, too. The work runs on a separate thread, without the GIL; the callback runs on
+// the thread that called Run, which checks for Ctrl-C ten times a second, whatever the work does.
 class Listener {
  public:
   explicit Listener(py::object function) : function_(std::move(function)) {}
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
-  // What `work`, which touches no Python object, returns. It may be called several times.
+  // The result of `work`, which must not touch Python objects. May be called several times.
   template <class Work>
   auto Run(const Work& work) {
     std::optional<decltype(work())> result;
@@ -30,7 +30,7 @@ class Listener {
     return *std::move(result);
   }
 
-  // For the work: to be told, and to look at.
+  // For the work: where to report progress, and the flag to check.
   ProgressSink Sink() {
     return [this](const Progress& progress) { Pass(progress); };
   }
@@ -41,7 +41,7 @@ class Listener {
 
  private:
   void RunApart(const std::function<void()>& work);
-  void Pass(const Progress& progress);  // on the thread of the work
+  void Pass(const Progress& progress);  // on the work's thread
   void HearUntilDone();                 // on the caller's, from here on
   void Hear(const Progress* progress);  // with the GIL; null: nothing is new
 
@@ -52,7 +52,7 @@ class Listener {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  const Progress* news_ = nullptr;  // that the thread of the work waits with, until it is heard
+  const Progress* news_ = nullptr;  // the work's thread waits until it is heard
   bool apart_ = false;              // the work has a separate thread
   bool done_ = false;
 };

@@ -92,7 +92,7 @@ MeshTexture TextureFromDict(const char* function, const py::dict& dict) {
       fmt::format("{}: a texture has 3 or 4 channels, got {}", function, out.image.channels));
 }
 
-// Copies dict[name], if it is there, into a vector of records of T.
+// Copies dict[name], if present, into a vector of records of T.
 template <class T, class Record>
 void Read(const char* function, const py::dict& dict, const char* name,
           std::vector<py::ssize_t> shape, std::vector<Record>* out) {

@@ -13,13 +13,13 @@
 
 namespace tilegrad::python {
 
-// Of [height,width,channels] uint8. Errors as of SpanOf.
+// `pixels`: [height,width,channels] uint8. Errors: as SpanOf.
 ImageU8 ImageFromPython(const char* function, const char* argument, const py::object& pixels);
 
 py::dict MeshToDict(Mesh mesh);
 
-// ValueError or TypeError, in the name of `function`, where an array has another shape or dtype or
-// a material a value that does not exist. The rest is Validate's to check (scene/mesh.h).
+// ValueError or TypeError, naming `function`, if an array has another shape or dtype or a material
+// has an unknown value. Validate (scene/mesh.h) checks the rest.
 Mesh MeshFromDict(const char* function, const py::dict& dict);
 
 }  // namespace tilegrad::python

@@ -8,7 +8,7 @@
 namespace tilegrad::python {
 namespace {
 
-// The shape of what one image has of `array`.
+// The shape of one image's part of `array`.
 std::vector<py::ssize_t> ShapeOfOne(const py::object& array, std::size_t axes) {
   if (array.is_none()) return {};
   const auto shape = ShapeOf(py::reinterpret_borrow<py::array>(array));
@@ -139,8 +139,8 @@ void GradientRecord<T>::Store() const {
 template class GradientRecord<float>;
 template class GradientRecord<double>;
 
-// What another process left in the copy of its memory is neither used nor ended: a lock of it may
-// be held by a thread that does not exist here.
+// The session copied from another process is neither used nor destroyed: a thread that does not
+// exist here may hold one of its locks.
 void RendererObject::DropForeignSession() {
   if (session_ != nullptr && session_->process != getpid()) static_cast<void>(session_.release());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A renderer as Python has it: for both kinds of numbers, for any thread, in any process.
+// The renderer behind Python's: for float32 and float64, any thread, any process.
 #pragma once
 
 #include <unistd.h>
@@ -18,15 +18,15 @@ namespace tilegrad::python {
 template <class T>
 class GradientRecord {
  public:
-  // `arrays`: from the names of SceneArrays' fields, and textures (a list with None
-  // for what is not wanted), to arrays of the same shapes, or with a leading axis more for a
-  // gradient of each image. What is missing is not wanted. ValueError or TypeError for an array of
-  // another shape or dtype, or one that is read-only.
+  // `arrays` maps the names of SceneArrays' fields, and textures (a list, with None where not
+  // wanted), to arrays of the same shapes, or with an additional leading axis for a gradient of
+  // each image. Missing names are not wanted. ValueError or TypeError for an array of another shape
+  // or dtype, or one that is read-only.
   GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays, GradientMode mode);
   GradientRecord(GradientRecord&&) noexcept = default;
 
   const std::vector<SceneGradientsT<T>>& gradients() const { return gradients_; }
-  // What is not a plain array in C++, from the records to the arrays.
+  // Copies what is not a plain array in C++ from the records to the arrays.
   void Store() const;
 
  private:
@@ -68,7 +68,7 @@ class FramePool {
   std::vector<FrameT<T>> spare_;
 };
 
-// A frame with what it needs: the scenes' arrays, and a place to leave its memory to.
+// A frame with the scenes' arrays, which it needs, and the pool to which it returns its memory.
 template <class T>
 class FrameObject {
  public:
@@ -91,8 +91,8 @@ class FrameObject {
   FrameT<T> frame_;
 };
 
-// Calls from several threads wait for each other. In a child process after a fork the engine starts
-// anew: the parent's may have been at work when it was copied.
+// Serialises calls from several threads. A child process gets a new engine after a fork: the
+// parent's may have been busy when it was copied.
 class RendererObject {
  public:
   explicit RendererObject(int threads) : threads_(threads) {}

@@ -28,8 +28,8 @@ LightT<T> LightOf(std::span<const T> numbers);
 template <class T>
 void PutLight(const LightT<T>& light, std::span<T> numbers);
 
-// What Python hands over. Shapes are those of include/tilegrad/scene.h; a leading axis of `count`
-// numbers is each image's own.
+// The arrays from Python. Shapes are those of include/tilegrad/scene.h; an additional leading axis
+// of length `count` holds each image's own.
 struct SceneArrays {
   py::dict fields;  // by the names of SceneT's members: positions, faces, streams, sh,
                     // face_surfaces; camera [17], lights [L,4], surfaces [S,13]
@@ -43,8 +43,8 @@ struct SceneArrays {
   bool at_corners(std::string_view name) const;
 };
 
-// A part of a scene for every image of a batch: one array that all share, or one of a leading axis
-// more, which holds each image's own. T is const for what is read.
+// A field of a scene for every image of a batch: one array that all share, or one with an
+// additional leading axis, which holds each image's own. T is const for inputs.
 template <class T>
 class Field {
  public:
@@ -91,16 +91,16 @@ class SceneRecord {
  public:
   // ValueError or TypeError for an array of another shape or dtype.
   SceneRecord(std::size_t count, SceneArrays arrays);
-  SceneRecord(const SceneRecord&) = delete;  // `scenes_` looks at the other members
+  SceneRecord(const SceneRecord&) = delete;  // `scenes_` refers to the other members
   SceneRecord& operator=(const SceneRecord&) = delete;
 
   const std::vector<SceneT<T>>& scenes() const { return scenes_; }
   std::size_t count() const { return scenes_.size(); }
-  int channels() const { return channels_; }  // of attributes, where there is no image, too
+  int channels() const { return channels_; }  // of attributes; known even without images
   const SceneArrays& arrays() const { return arrays_; }
 
-  // The number of an array that the engine counts one by one, as Python has it: "faces[2,1]" of
-  // number 7 of "faces". Numbers of records keep theirs.
+  // The Python index of an element that the engine counts one by one: "faces[2,1]" for number 7 of
+  // "faces". Elements of records keep their number.
   std::string PlaceOf(std::string_view name, std::size_t number) const;
 
  private:

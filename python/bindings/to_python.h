@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What C++ made, handed to Python; and long work without the GIL.
+// Hands results of C++ to Python; runs long work without the GIL.
 #pragma once
 
 #include <memory>
@@ -14,8 +14,7 @@
 
 namespace tilegrad::python {
 
-// The numbers of `values`, a vector of T or of records that hold nothing but T, as an array of
-// `shape`.
+// The numbers of `values`, a vector of T or of records that hold only T, as an array of `shape`.
 template <class T, class Vector>
 py::array OwnedArray(Vector values, std::vector<py::ssize_t> shape) {
   CheckCount(values.size() * sizeof(values[0]) / sizeof(T), shape);
@@ -26,14 +25,14 @@ py::array OwnedArray(Vector values, std::vector<py::ssize_t> shape) {
   return py::array(py::dtype::of<T>(), std::move(shape), data, base);
 }
 
-// What `work` returns; other threads of Python run meanwhile. `work` touches no Python object.
+// The result of `work`, which must not touch Python objects; other Python threads run meanwhile.
 template <class Work>
 auto WithoutGil(const Work& work) {
   const py::gil_scoped_release release;
   return work();
 }
 
-// What `load` returns, without the GIL. max_bytes: of ReadBudget; 0: the usual limit.
+// The result of `load`, run without the GIL. max_bytes: of ReadBudget; 0: the usual limit.
 template <class Load>
 auto LoadWithin(std::size_t max_bytes, const Load& load) {
   return ValueOrThrow(WithoutGil([&] {
@@ -43,7 +42,7 @@ auto LoadWithin(std::size_t max_bytes, const Load& load) {
   }));
 }
 
-// As Python's warning; bytes that are no text are shown escaped.
+// Issues a Python warning; escapes bytes that are no text.
 inline void WarnUser(const std::string& text) {
   if (PyErr_WarnEx(PyExc_UserWarning, EscapeControls(text).c_str(), 1) != 0)
     throw py::error_already_set();

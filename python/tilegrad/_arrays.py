@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of the caller as NumPy arrays: memory is shared where possible; otherwise the array is
-copied once, and the copy is counted. Errors name the function, the argument, and what was expected
-and got. All such checks of the Python package are here.
+"""Converts the caller's arrays to NumPy arrays: shares memory where possible; otherwise copies an
+array once and counts the copy. Errors name the function, the argument, and what was expected and
+got. All such checks of the Python package are here.
 
 Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
 the CPU) or `__array__`, numbers, and nested sequences of numbers. Masked arrays only if nothing in
@@ -17,7 +17,7 @@ from typing import Any, Optional, Sequence, Union
 import numpy as np
 
 Axis = Union[int, str]  # a length, or the name of one: "V"
-Sizes = dict  # name of a length -> length, as the arrays so far have it
+Sizes = dict  # name of a length -> length, from the arrays so far
 
 NUMBERS = (list, tuple, int, float)  # not yet arrays: making one is not a copy
 _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
@@ -40,13 +40,12 @@ def reset_stats() -> None:
 
 def as_array(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
              sizes: Optional[Sizes] = None) -> np.ndarray:
-    """`value` as a C-contiguous array of `dtype` and `shape`; of the same memory if it is that
-    already.
+    """`value` as a C-contiguous array of `dtype` and `shape`; without a copy if it is one already.
 
-    shape: a length for each axis; a name stands for a length that is looked up in `sizes`, or
-        noted there if it is new.
-    TypeError: not an array of numbers, or one that `dtype` cannot take (complex, or real for an
-        integer `dtype`). ValueError: another shape, or an integer out of range.
+    shape: a length for each axis; a name denotes a length that is looked up in `sizes`, or recorded
+        there if it is new.
+    TypeError: not an array of numbers, or one that `dtype` cannot represent (complex, or real for
+        an integer `dtype`). ValueError: another shape, or an integer out of range.
     """
     array = contiguous(function, argument, value, dtype)
     check_shape(function, argument, array.shape, shape, sizes)
@@ -69,8 +68,8 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
-    """The dtype that `value` asks to be computed in: float64 if it is an array of that, float32
-    for everything else, lists of numbers included."""
+    """The dtype in which to compute `value`: float64 for an array of float64, float32 for
+    everything else, lists of numbers included."""
     if isinstance(value, NUMBERS):
         return np.dtype(np.float32)
     array = value if type(value) is np.ndarray else foreign(function, argument, value)
@@ -88,7 +87,7 @@ def check_shape(function: str, argument: str, got: Sequence[int], expected: Sequ
 
 
 def _fits(got: Sequence[int], expected: Sequence[Axis], sizes: Sizes) -> bool:
-    """Whether `got` is `expected`; then names that are new are noted in `sizes`."""
+    """Whether `got` is `expected`; if so, records new names in `sizes`."""
     if len(got) != len(expected):
         return False
     for length, axis in zip(got, expected):
@@ -96,13 +95,13 @@ def _fits(got: Sequence[int], expected: Sequence[Axis], sizes: Sizes) -> bool:
             return False
     for length, axis in zip(got, expected):
         if axis.__class__ is str and sizes.setdefault(axis, length) != length:
-            return False  # a new name that stands for two lengths
+            return False  # a new name with two lengths
     return True
 
 
 def as_batched(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
                sizes: Sizes) -> np.ndarray:
-    """As `as_array`, of `shape` or with a leading axis N more."""
+    """As `as_array`, of `shape` or with an additional leading axis N."""
     array = contiguous(function, argument, value, dtype)
     check_batched(function, argument, array.shape, shape, sizes)
     return array
@@ -110,7 +109,7 @@ def as_batched(function: str, argument: str, value: Any, dtype: Any, shape: Sequ
 
 def check_batched(function: str, argument: str, got: Sequence[int], shape: Sequence[Axis],
                   sizes: Sizes) -> None:
-    """ValueError unless `got` is `shape`, or that with a leading axis N more."""
+    """ValueError unless `got` is `shape`, or that with an additional leading axis N."""
     batched = ("N", *shape)
     if len(got) == len(batched):
         return check_shape(function, argument, got, batched, sizes)
@@ -146,8 +145,8 @@ def check_indices(function: str, argument: str, indices: np.ndarray, count: int)
 
 
 def as_names(function: str, argument: str, value: Any, choices: Sequence[str]) -> tuple[str, ...]:
-    """A name of `choices`, or several, as a tuple; TypeError if it is neither, ValueError if one is
-    not among them."""
+    """One or several names of `choices`, as a tuple; TypeError for anything else, ValueError for an
+    unknown name."""
     try:
         names = (value,) if isinstance(value, str) else tuple(value)
     except TypeError:
@@ -190,7 +189,7 @@ def as_limit(function: str, max_bytes: Any) -> int:
 
 
 def as_text(function: str, argument: str, value: Any) -> str:
-    """`value`, a str; TypeError if it is anything else, ValueError if UTF-8 cannot hold it."""
+    """`value`, a str; TypeError if it is anything else, ValueError if UTF-8 cannot encode it."""
     if not isinstance(value, str):
         raise TypeError(f"{function}: {argument} {value!r} is not a string")
     try:
@@ -202,8 +201,8 @@ def as_text(function: str, argument: str, value: Any) -> str:
 
 
 def as_flag(function: str, argument: str, value: Any) -> bool:
-    """`value`, which is True or False (or 1 or 0), as a bool; TypeError if it is anything else:
-    "no" is true to Python."""
+    """`value`, which is True or False (or 1 or 0), as a bool; TypeError if it is anything else,
+    since "no" is truthy."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     try:
@@ -222,7 +221,7 @@ def as_pixels(function: str, argument: str, value: Any) -> int:
 
 
 def _count_masked(value: Any, depth: int = 0) -> int:
-    """How many numbers of an array, or of arrays in nested sequences, are masked."""
+    """The number of masked elements of an array, or of arrays in nested sequences."""
     if isinstance(value, np.ma.MaskedArray):
         return int(np.ma.count_masked(value)) if np.ma.is_masked(value) else 0
     if not isinstance(value, (list, tuple)) or depth > 64:  # more than an array can have dimensions
@@ -232,7 +231,7 @@ def _count_masked(value: Any, depth: int = 0) -> int:
 
 
 def refuse_masked(function: str, argument: str, value: Any) -> None:
-    """TypeError if numbers of `value` are masked: NumPy would use the values behind the mask."""
+    """TypeError if elements of `value` are masked: NumPy would use the values under the mask."""
     count = _count_masked(value)
     if count:
         what = "is a masked array" if isinstance(value, np.ndarray) else "holds masked arrays"
@@ -241,8 +240,8 @@ def refuse_masked(function: str, argument: str, value: Any) -> None:
 
 
 def plain(function: str, argument: str, value: Any) -> np.ndarray:
-    """Anything as a NumPy array, without a copy where the protocol allows it; TypeError if it is
-    none, as tensors that are sparse, on another device or need a gradient."""
+    """Anything as a NumPy array, without a copy where the protocol allows it; TypeError if that
+    fails, as for tensors that are sparse, on another device or require a gradient."""
     refuse_masked(function, argument, value)
     try:
         if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
@@ -269,13 +268,13 @@ def _from_dlpack(function: str, argument: str, value: Any) -> np.ndarray:
     if device not in _CPU_DEVICES:
         raise TypeError(f"{function}: {argument} is on another device than the CPU; copy it there "
                         f"first (value.cpu(), for example)")
-    if getattr(value, "is_neg", bool)():  # torch would hand over the numbers without their sign
+    if getattr(value, "is_neg", bool)():  # torch would export the numbers without their sign
         value = value.resolve_neg()
     return np.from_dlpack(value)
 
 
 def _check_dtype(function: str, argument: str, array: np.ndarray, dtype: np.dtype) -> None:
-    """Real numbers may be made float32 or float64; integers another integer if they fit."""
+    """Real numbers may become float32 or float64; integers another integer type if they fit."""
     kind = array.dtype.kind
     if kind not in ("iuf" if dtype.kind == "f" else "b" if dtype.kind == "b" else "iu"):
         raise TypeError(f"{function}: {argument} has dtype {array.dtype}, expected {dtype}")
@@ -287,7 +286,7 @@ def _check_dtype(function: str, argument: str, array: np.ndarray, dtype: np.dtyp
 
 
 def count_array() -> None:
-    """For `stats`: an array came in."""
+    """Counts a received array for `stats`."""
     _counts["arrays"] += 1
 
 

@@ -43,17 +43,17 @@ class Camera(Packed):
     translation: (3,) or (N, 3), world units.
     fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, not 0, and principal point.
     near_plane: number or (N,), > 0, world units; nearer geometry is clipped.
-    size: (width, height) of the images that fx, fy, cx, cy are for, pixels; None: not known.
-        Set by constructors that take width and height, and by readers of files. If it is known,
-        rendering at another size is an error; `resize` makes the camera of that size.
+    size: (width, height) of the images that fx, fy, cx, cy are for, pixels; None: unknown. Set by
+        constructors that take width and height, and by readers of files. If known, rendering at
+        another size is an error; `resize` converts the camera to that size.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
     for what is not an array of these shapes; render refuses numbers that are not finite, focal
     lengths of 0, and near planes that are not above 0.
 
-    `rotation` is not checked; any matrix is applied as is. A mirror (determinant
-    -1, or one negative focal length) shows the mirror image, and its front faces are back faces here; with scale or shear
-    specular light takes -rotation.T @ translation for the place of the eye, which it then is not.
+    `rotation` is not checked; any matrix is applied as is. A reflection (determinant -1, or one
+    negative focal length) shows the mirror image and swaps front and back faces; with scale or
+    shear, specular light uses -rotation.T @ translation as the eye's position, which is then wrong.
     Camera.from_... and files.save_cameras refuse such matrices.
     """
 
@@ -77,7 +77,7 @@ class Camera(Packed):
 
     @classmethod
     def of_numbers(cls, numbers: np.ndarray, size: Optional[Size] = None) -> "Camera":
-        """Of an array (..., 17), which is not copied."""
+        """From an array (..., 17), without a copy."""
         camera = super().of_numbers(numbers)
         camera.size = size
         return camera
@@ -96,10 +96,10 @@ class Camera(Packed):
     @classmethod
     def look_at(cls, eye, target=(0, 0, 0), up=(0, 1, 0), *, fov_y: float = _core.FOV_Y,
                 width: int, height: int) -> "Camera":
-        """At `eye`, looking at `target`, with `up` upwards; world units, (3,) or (N, 3). Where
-        `up` lies along the view another axis of the world takes its place.
+        """At `eye`, looking at `target`, with `up` upwards; world units, (3,) or (N, 3). Where `up`
+        is parallel to the view, another axis of the world replaces it.
 
-        fov_y: degrees, the whole vertical field of view, (0, 180). Pixels are square, the principal
+        fov_y: degrees, the full vertical field of view, (0, 180). Pixels are square, the principal
             point is the middle of an image of width x height pixels.
         """
         rows = Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
@@ -113,7 +113,7 @@ class Camera(Packed):
               height: int) -> "Camera":
         """At distance * (cos el cos az, sin el, cos el sin az), looking at the origin, y up.
 
-        azimuth, elevation: degrees; distance: world units, > 0; numbers or (N,). The rest as of
+        azimuth, elevation: degrees; distance: world units, > 0; numbers or (N,). The rest as in
         look_at.
         """
         function = "Camera.orbit"
@@ -127,7 +127,7 @@ class Camera(Packed):
     @classmethod
     def framing(cls, mesh: Any, *, azimuth=60, elevation=20, fov_y: float = _core.FOV_Y,
                 margin: float = 0.05, width: int = 512, height: int = 512) -> "Camera":
-        """From that direction, at the smallest distance that shows the whole mesh.
+        """From the given direction, at the smallest distance that shows the whole mesh.
 
         mesh: what `tilegrad.meshes.as_mesh` takes, or points (V, 3). azimuth, elevation: degrees;
             numbers or (N,); azimuth 90 looks at the +z side.
@@ -149,8 +149,8 @@ class Camera(Packed):
         k: (3, 3) or (N, 3, 3) intrinsic matrix, pixels, without skew.
         rotation, translation: (3, 3), (3,) or with N, world to camera.
         pixel_centre: "integer": the centre of the first pixel is (0, 0), as OpenCV calibrates;
-            "half": it is (0.5, 0.5), of matrices whose principal point is just width / 2.
-        size: as of Camera.
+            "half": it is (0.5, 0.5), for matrices whose principal point is just width / 2.
+        size: as in Camera.
         """
         function = "Camera.from_opencv"
         return _converted("opencv", (k, rotation, translation), known_size(function, size),
@@ -162,7 +162,7 @@ class Camera(Packed):
         """COLMAP's PINHOLE model, and a line of images.txt.
 
         quaternion: (4,) or (N, 4): w, x, y, z, world to camera, of any length > 0.
-        translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,). size: as of Camera.
+        translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,). size: as in Camera.
         """
         return _converted("colmap", (quaternion, translation, fx, fy, cx, cy),
                           known_size("Camera.from_colmap", size))
@@ -181,7 +181,7 @@ class Camera(Packed):
     def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
         """Kaolin's and DIB-R's.
 
-        rotation: (3, 3) or (N, 3, 3); position: (3,) or (N, 3), where the camera stands;
+        rotation: (3, 3) or (N, 3, 3); position: (3,) or (N, 3), of the camera;
         projection: (3,) or (N, 3), camera_proj, its last number -1. width, height: pixels.
         """
         return _converted("kaolin", (rotation, position, projection),
@@ -204,7 +204,7 @@ class Camera(Packed):
         """A frame of NeRF's transforms.json.
 
         camera_to_world: (4, 4) or (N, 4, 4), transform_matrix. fl_x, fl_y, cx, cy: pixels.
-        size: as of Camera.
+        size: as in Camera.
         """
         return _converted("nerf", (camera_to_world, fl_x, fl_y, cx, cy),
                           known_size("Camera.from_nerf", size))
@@ -221,7 +221,7 @@ class Camera(Packed):
 
     def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
         """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
-        near_plane; rendering here has none."""
+        near_plane; tilegrad itself has none."""
         size = self._sized("Camera.to_opengl", width, height)
         far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
         return self._parts("opengl", size, far_plane=far_plane)
@@ -240,8 +240,7 @@ class Camera(Packed):
         return self._parts("nerf")
 
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
-        """The same view, of an image of width x height pixels, on one of to_width x to_height:
-        everything scales."""
+        """Scales the camera of an image of width x height pixels to one of to_width x to_height."""
         size = size_of("Camera.resize", to_width, to_height)
         numbers = _core.camera_resize(self._rows(), self._sized("Camera.resize", width, height),
                                       size)
@@ -264,7 +263,7 @@ class Camera(Packed):
 
 
 def _converted(convention: str, values: Sequence[Any], size: Optional[Size], **extra: Any) -> Camera:
-    """Of another program's numbers."""
+    """A camera from another program's numbers."""
     shapes = _CONVENTIONS[convention]
     rows = Rows(f"Camera.from_{convention}",
                 **{name: (value, shapes[name]) for name, value in zip(shapes, values)})
@@ -276,7 +275,7 @@ def _converted(convention: str, values: Sequence[Any], size: Optional[Size], **e
 
 def _framed(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, margin: float,
             size: Size) -> Camera:
-    """The camera from that side which is as near as the points allow that all are in the picture."""
+    """The nearest camera from that direction that has all points in the picture."""
     width, height = size
     low, high = points.min(axis=0), points.max(axis=0)
     centre = (low + high) / 2
@@ -297,8 +296,8 @@ def _framed(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, marg
 
 
 def points_of(function: str, mesh: Any) -> np.ndarray:
-    """The vertices that faces use of what `tilegrad.meshes.as_mesh` takes, or points (V, 3) as they
-    are, float64. ValueError: there are none, or one is not finite."""
+    """The vertices that faces use, of anything `tilegrad.meshes.as_mesh` takes, or points (V, 3) as
+    they are; float64. ValueError: there are none, or one is not finite."""
     points, faces = _parts(mesh)
     points = _arrays.as_array(function, "mesh", points, np.float64, ("V", 3))
     if faces is not None:

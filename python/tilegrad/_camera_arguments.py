@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What constructors of cameras are given: arrays with or without a leading axis, sizes of images."""
+"""Arguments of camera constructors: arrays with or without a leading axis, sizes of images."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Size = tuple[int, int]  # width, height of an image, pixels
 
 
 class Rows:
-    """Arguments of a constructor as rows for C++: their leading axes are broadcast, and given back
-    to what comes out."""
+    """Arguments of a constructor as rows for C++: broadcasts their leading axes, and restores them
+    in the result."""
 
     def __init__(self, function: str, **arguments: tuple[Any, tuple[int, ...]]) -> None:
         arrays = {}
@@ -40,7 +40,7 @@ class Rows:
         return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
 
     def shaped(self, numbers: np.ndarray) -> np.ndarray:
-        """(..., 17), of the leading axes that the arguments have."""
+        """(..., 17), with the leading axes of the arguments."""
         return numbers.reshape(self.lead + numbers.shape[-1:])
 
 
@@ -50,7 +50,7 @@ def size_of(function: str, width: int, height: int) -> Size:
 
 
 def known_size(function: str, size: Any) -> Optional[Size]:
-    """`size` as a pair of numbers of pixels; None, which is not known, stays that."""
+    """`size` as a pair of pixel counts; None (unknown) stays None."""
     if size is None:
         return None
     if not isinstance(size, (tuple, list)) or len(size) != 2:
@@ -61,13 +61,13 @@ def known_size(function: str, size: Any) -> Optional[Size]:
 
 
 def common_size(sizes: Iterable[Optional[Size]]) -> Optional[Size]:
-    """The one size that is known; None where none is, or several are."""
+    """The only known size; None if none is known, or several are."""
     known = set(sizes) - {None}
     return known.pop() if len(known) == 1 else None
 
 
 def checked_size(function: str, own: Optional[Size], size: Size) -> Size:
-    """`size`; ValueError, in the name of `function`, if `own`, a camera's, is known and another."""
+    """`size`; ValueError, naming `function`, if `own`, a camera's, is known and different."""
     if own in (None, size):
         return size
     here, there = ("{} x {}".format(*numbers) for numbers in (own, size))

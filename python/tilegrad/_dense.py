@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tensors of PyTorch that have real numbers in the CPU's memory, in full precision."""
+"""Dense, real PyTorch tensors on the CPU, in full precision."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HALVES = (torch.bfloat16, torch.float16)
 
 
 def check_dense(function: str, argument: str, tensor: torch.Tensor) -> None:
-    """TypeError for a tensor of another device, and for a sparse, quantized or complex one."""
+    """TypeError for a tensor on another device, and for a sparse, quantized or complex one."""
     if tensor.device.type != "cpu":
         raise TypeError(f"{function}: {argument} is on {tensor.device}; tilegrad renders on the "
                         f"CPU: give {argument}.cpu()")
@@ -44,7 +44,7 @@ def full_precision(function: Function) -> Function:
 
 
 def widened(tensor: torch.Tensor) -> torch.Tensor:
-    """In torch.autocast as float32, through which gradients flow back; elsewhere as it is."""
+    """Under torch.autocast as float32, differentiably; elsewhere unchanged."""
     return _widened(tensor) if _in_autocast() else tensor
 
 
@@ -71,8 +71,8 @@ def first_derivative_only(backward: Callable[..., Any]) -> Callable[..., Any]:
     """For the `backward` of an autograd.Function that saved its inputs: differentiating the
     gradients again raises a RuntimeError.
 
-    torch's once_differentiable raises where backward() passes. What asks for gradients of some
-    inputs (functional.jvp, functional.hessian) does not find its node, and says 0.
+    torch's once_differentiable raises where backward() passes. Functions that ask for gradients of
+    some inputs (functional.jvp, functional.hessian) do not find its node, and return 0.
     """
     @functools.wraps(backward)
     def refusing(ctx: Any, *d_outputs: Optional[torch.Tensor]) -> Any:

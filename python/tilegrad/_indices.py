@@ -10,7 +10,7 @@ import numpy as np
 
 from tilegrad import _arrays
 
-_copies: dict[int, tuple[Any, Any]] = {}  # of arrays by id: who it is, and its copy
+_copies: dict[int, tuple[Any, Any]] = {}  # by id of an array: a weak reference to it, and its copy
 
 
 def as_indices(function: str, argument: str, value: Any, shape: Sequence[_arrays.Axis],
@@ -39,7 +39,7 @@ def _keep_copy(value: Any, copy: np.ndarray) -> None:
         if _copies.get(key, (None, None))[0] is reference:
             del _copies[key]
 
-    copy.flags.writeable = False  # others may have it, too
+    copy.flags.writeable = False  # others may share it
     try:
         _copies[key] = (weakref.ref(value, forget), copy)
     except TypeError:  # without a weak reference

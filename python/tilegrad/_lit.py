@@ -12,7 +12,7 @@ from tilegrad._camera import Camera
 from tilegrad._renderer import Frame, PASSED_ON, Renderer
 from tilegrad._scene import Light
 
-_SOFT_PIXELS = 0.6  # how far outlines fade, so that they do not look like stairs
+_SOFT_PIXELS = 0.6  # how far outlines fade, as anti-aliasing
 # Towards lights, in the camera's axes: from above on the left, from the right, and from behind it.
 _LIGHTS = ((-0.4, 0.6, 1.0), (1.0, -0.1, 0.4), (0.0, 0.0, 1.0))
 _INTENSITIES = (0.65, 0.2, 0.2)
@@ -22,7 +22,7 @@ _renderers: dict[tuple[int, int], Renderer] = {}  # of this process, by threads
 def lit(mesh: Any, camera: Camera, size: tuple[int, int], *,
         background: Optional[Sequence[float]] = None,
         outputs: Sequence[str] = ("color", "alpha"), threads: int = 0, **arguments: Any) -> Frame:
-    """A picture of a `tilegrad.meshes.Mesh`; background and arguments as of `tilegrad.render`."""
+    """A picture of a `tilegrad.meshes.Mesh`; background and arguments as in `tilegrad.render`."""
     width, height = size
     options = {name: arguments.pop(name) for name in list(arguments) if name in PASSED_ON}
     options.setdefault("delta", (_SOFT_PIXELS * 2 / max(width, height)) ** 2)

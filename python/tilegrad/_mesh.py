@@ -26,9 +26,9 @@ class Material:
 
     base_color: r, g, b, a, 0 to 1; multiplies the texture. texture: index into Mesh.textures, -1:
     none. wrap: "repeat", "mirror" or "clamp"; "repeat clamp" and the like: one way along u, another
-    along v. nearest: texels as squares. alpha_mode: "opaque", "mask" (cut out where alpha is below
-    alpha_cutoff) or "blend"; `scene` draws all three opaque. double_sided: False: viewers do not
-    draw back faces. unlit: the colour ignores the light.
+    along v. nearest: nearest-neighbour sampling. alpha_mode: "opaque", "mask" (cut out where alpha
+    is below alpha_cutoff) or "blend"; `scene` draws all three opaque. double_sided: False: viewers
+    do not draw back faces. unlit: the colour ignores the light.
     """
 
     name: str = ""
@@ -42,7 +42,7 @@ class Material:
     unlit: bool = False
 
     def checked(self, function: str) -> dict[str, Any]:
-        """Its members for C++. TypeError and ValueError in the name of `function`."""
+        """Its members for C++. TypeError and ValueError name `function`."""
         place = f"material {self.name!r}: "
         _arrays.check_choice(function, place + "wrap", self.wrap, _core.WRAPS)
         _arrays.check_choice(function, place + "alpha_mode", self.alpha_mode, _ALPHA_MODES)
@@ -70,7 +70,7 @@ class MeshTexture:
 @dataclasses.dataclass
 class MeshCamera:
     """A perspective camera that a glTF file holds: node_to_world (4, 4) float64, OpenGL's axes;
-    yfov: radians, the whole vertical field of view; aspect_ratio: of the field of view, 0: that of
+    yfov: radians, the full vertical field of view; aspect_ratio: of the field of view, 0: that of
     the image; znear: world units."""
 
     name: str
@@ -103,7 +103,7 @@ class MeshTables:
 
 @dataclasses.dataclass(eq=False, repr=False)
 class Mesh:
-    """A triangle mesh: V vertices, F faces; None where there is nothing.
+    """A triangle mesh: V vertices, F faces; None where absent.
 
     positions: (V, 3) float32. faces: (F, 3) int32; counter-clockwise seen from outside.
     normals: (V, 3) float32, unit. colors: (V, 4) or (V, 3) float32, 0 to 1, sRGB.
@@ -112,10 +112,11 @@ class Mesh:
         instead of colors.
     face_materials: (F,) int32, indices into materials; all 0 if None.
     warnings: what a file lacked, and its substitute. cameras: those of a glTF file.
-    tables: the lists of an OBJ file that corner_uvs and corner_normals were looked up in; nothing
-        follows changes to them.
+    tables: the lists of an OBJ file from which corner_uvs and corner_normals were looked up;
+        changes to them have no effect.
     origin: (3,) float64: what was subtracted from the file's coordinates, because they are too far
-        from the origin for float32; `positions + origin` is the place in the world. Almost always 0.
+        from the origin for float32; `positions + origin` is the position in the world. Almost
+        always 0.
     """
 
     positions: np.ndarray
@@ -138,10 +139,10 @@ class Mesh:
         """The arguments of a `Scene` other than positions, faces, camera and light:
         colours, uvs, textures, surfaces, normals.
 
-        color_space: "srgb": colours are the numbers of the file, as training takes them; "linear":
-            they are decoded, as viewers do, so that the picture has to be encoded in the end.
+        color_space: "srgb": colours are the numbers of the file, as in training; "linear": decoded,
+            as in viewers, so that the picture must be encoded in the end.
         normals: "auto" (the mesh's own; flat if it has none), "smooth" or "flat".
-        ValueError: what Mesh says of shapes does not hold, or an index is out of range.
+        ValueError: an array violates the shapes of Mesh, or an index is out of range.
         """
         linear = _arrays.check_choice("Mesh.scene", "color_space", color_space, _COLOR_SPACES) == 1
         _arrays.check_choice("Mesh.scene", "normals", normals, _NORMALS)
@@ -158,8 +159,8 @@ class Mesh:
 
     def scene(self, camera: Camera, *, color_space: str = "srgb", normals: str = "auto",
               **arguments: Any) -> Scene:
-        """A scene of this mesh. color_space, normals: as of `scene_arguments`; further arguments
-        are the Scene's own (lighting, lights, ...) and go before the mesh's."""
+        """A scene of this mesh. color_space, normals: as in `scene_arguments`; further arguments
+        are the Scene's own (lighting, lights, ...) and override the mesh's."""
         own = self.scene_arguments(color_space=color_space, normals=normals)
         return Scene(self.positions, self.faces, camera, **changed(own, arguments))
 
@@ -171,13 +172,15 @@ class Mesh:
         _tools.save_mesh(name_of(path), self._checked("save_mesh"))
 
     def to_trimesh(self, trimesh: Any) -> Any:
-        """The module trimesh's Trimesh of it, with vertex colours; `trimesh`: the module."""
+        """The mesh as a Trimesh of the module trimesh, with vertex colours; `trimesh`: the
+        module."""
         return trimesh.Trimesh(vertices=self.positions, faces=self.faces,
                                vertex_normals=self.normals, vertex_colors=self.colors,
                                process=False)
 
     def to_open3d(self, open3d: Any) -> Any:
-        """The module open3d's TriangleMesh of it, with vertex colours; `open3d`: the module."""
+        """The mesh as a TriangleMesh of the module open3d, with vertex colours; `open3d`: the
+        module."""
         vectors = open3d.utility
         mesh = open3d.geometry.TriangleMesh(
             vectors.Vector3dVector(np.asarray(self.positions, np.float64)),

@@ -22,7 +22,7 @@ def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
 
 def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
     """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is expected: most
-    of those that are not black exceed 1. Highlights may. About 4096 numbers are checked."""
+    of those that are not black exceed 1. Highlights may. Checks about 4096 numbers."""
     sample = np.ravel(array)[::max(1, array.size // 4096)]
     colored = sample[sample > 0]
     if colored.size == 0 or not 2 < colored.max() <= 255 or np.mean(colored > 1) <= 0.5:
@@ -33,7 +33,7 @@ def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
 
 def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[_arrays.Axis],
               sizes: _arrays.Sizes) -> np.ndarray:
-    """As `as_batched`; bytes are refused, numbers that look like them warn."""
+    """As `as_batched`; refuses bytes, and warns of numbers that look like them."""
     refuse_bytes(function, argument, value, dtype)
     array = _arrays.as_batched(function, argument, value, dtype, shape, sizes)
     warn_of_bytes(function, argument, array)

@@ -42,7 +42,7 @@ class Packed:
 
     @classmethod
     def of_numbers(cls: type[Record], numbers: np.ndarray) -> Record:
-        """Of an array (..., size), which is not copied."""
+        """From an array (..., size), without a copy."""
         record = cls.__new__(cls)
         record.numbers = numbers
         return record

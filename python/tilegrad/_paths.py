@@ -10,7 +10,7 @@ Path = Union[str, bytes, "os.PathLike[Any]"]
 
 
 def name_of(path: Path) -> str:
-    """The name of a file or folder, as C++ takes it. ValueError: no file can be called that."""
+    """The name of a file or folder, as C++ takes it. ValueError: not a possible file name."""
     name = os.fsdecode(path)
     try:
         if b"\0" not in os.fsencode(name):

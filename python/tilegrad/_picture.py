@@ -24,8 +24,7 @@ class Pictured:
         return pixels_of(self, index, getattr(self, "background", None))
 
     def save(self, path: Any, index: int = 0) -> None:
-        """Writes `picture(index)` as .png, or as another format that `tilegrad.images.save_image`
-        has."""
+        """Writes `picture(index)` as .png, or in another format of `tilegrad.images.save_image`."""
         from tilegrad.images import save_image
         save_image(path, self.picture(index))
 
@@ -52,7 +51,7 @@ def pixels_of(frame: Any, index: int, background: Optional[Sequence[float]]) -> 
 
 
 def _extended(color: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """Colours carried outward by two pixels, where alpha fades: what is not drawn is black."""
+    """Colours extended outward by two pixels, where alpha fades: undrawn pixels are black."""
     color, known = color.copy(), drawn.copy()
     for _ in range(2):
         total, count = np.zeros_like(color), np.zeros(known.shape, np.float32)

@@ -9,7 +9,7 @@ import sys
 import time
 from typing import Any, Mapping, Optional, TextIO
 
-_INTERVAL = 0.2  # seconds between two drawings of a stage
+_INTERVAL = 0.2  # seconds between redraws of a stage
 _COLUMNS, _NOTEBOOK_COLUMNS = 80, 100
 
 
@@ -32,10 +32,11 @@ class ProgressLine:
     stages = True
 
     def __init__(self, stream: TextIO, columns: Optional[int] = None) -> None:
-        """stream: a terminal, or what takes a carriage return like one and is `columns` wide."""
+        """stream: a terminal, or a stream that handles carriage returns like one and is `columns`
+        wide."""
         self._stream, self._columns = stream, columns
         self._stage, self._begun, self._first, self._drawn = "", 0.0, 0, 0.0
-        self._length = 0  # of what stands in the line
+        self._length = 0  # of the text in the line
 
     def __call__(self, at: Progress) -> None:
         now = time.monotonic()
@@ -48,7 +49,7 @@ class ProgressLine:
         self._draw(self._text(at, now - self._begun))
 
     def finish(self) -> None:
-        """Leaves the line."""
+        """Ends the line."""
         if self._length:
             self._write("\n")
         self._stage, self._length = "", 0

@@ -27,7 +27,7 @@ def _choice(choices: Sequence[str]) -> _Reader:
 
 
 def _option(name: str, choices: Optional[Sequence[str]] = None) -> tuple[Any, _Reader]:
-    """C++'s default of an option, and what checks another value."""
+    """C++'s default of an option, and the function that checks other values."""
     value = getattr(_core.RenderOptions(), name)
     return (choices[value], _choice(choices)) if choices else (value, _number(type(value)))
 
@@ -45,7 +45,7 @@ PASSED_ON = frozenset(_OPTIONS) - {"width", "height"}
 
 
 def options_of(*values: Any) -> _core.RenderOptions:
-    """Of a value for each option, which is checked if it is not the default itself."""
+    """The options from a value for each; checks those that are not the default itself."""
     options = _core.RenderOptions()
     for (name, (default, read)), value in zip(_OPTIONS.items(), values):
         if value is not default:
@@ -113,7 +113,7 @@ class Frame(Pictured):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The names of the images that it has, beside face_ids."""
+        """The names of its images other than face_ids."""
         return self._outputs
 
     @property
@@ -122,8 +122,8 @@ class Frame(Pictured):
         return np.dtype(np.float64 if isinstance(self._frame, _core.Frame64) else np.float32)
 
     def shared(self, name: str) -> np.ndarray:
-        """The image of that name as an array that numpy allows to be written to, for libraries that
-        take no other (torch.from_numpy). What is written changes what backward computes."""
+        """The image of that name as a writable array, for libraries that accept no other
+        (torch.from_numpy). Writing to it changes what backward computes."""
         self._view(name)
         return self._frame.view(name, True)
 
@@ -176,7 +176,7 @@ class Gradients:
 class Renderer:
     """Renders scenes, and their gradients.
 
-    Owns threads, which start with the first call, and memory, which is reused: keep a renderer. The
+    Owns threads, which start with the first call, and memory, which it reuses: keep a renderer. The
     same input gives the same bits for any number of threads. Calls of one renderer from several
     Python threads run one at a time. After a fork a renderer works in both processes.
 
@@ -200,22 +200,22 @@ class Renderer:
                interpolation: str = _D["interpolation"], culling: str = _D["culling"],
                alpha_rule: str = _D["alpha_rule"], paper_box: float = _D["paper_box"],
                paper_faces: int = _D["paper_faces"]) -> Frame:
-        """The images of a scene, or of a list of scenes one behind the other.
+        """The images of a scene, or of a list of scenes one after the other.
 
-        width, height: pixels, 1 to 16384, of all images; None: what the cameras are for
-            (`Camera.size`), or 64 where they do not say.
+        width, height: pixels, 1 to 16384, of all images; None: the size of the cameras
+            (`Camera.size`), or 64 if unknown.
         outputs: the images to compute, of "color", "alpha", "attributes", "depth", "normals",
             "uv", "barycentrics"; others are not computed. face_ids are always computed.
         delta: > 0, how soft silhouettes are: alpha = 1 - prod over faces (1 - exp(-d^2 / delta))
             with d the distance to the face in NDC, in which the image spans [-1, 1] in each axis.
-        max_alpha_error: [0, 1], of alpha, absolute: larger is faster, 0 drops nothing.
+        max_alpha_error: [0, 1], absolute error of alpha: larger is faster, 0 drops nothing.
         interpolation: "perspective", or "screen_linear" as in the paper's implementation.
-        culling: "none", or "back": clockwise faces are not drawn, but take part in alpha.
-        alpha_rule: "all_faces", or "paper": faces whose box, grown by paper_box (NDC, >= 0), holds
-            the pixel, and of these the first paper_faces; slow, for comparisons.
+        culling: "none", or "back": clockwise faces are not drawn, but count for alpha.
+        alpha_rule: "all_faces", or "paper": faces whose box, grown by paper_box (NDC, >= 0),
+            contains the pixel, and of these the first paper_faces; slow, for comparisons.
 
-        Errors: TypeError, ValueError; MemoryError. The scenes of a list must be alike: the same
-        dtype, and what is None in one is None in all.
+        Errors: TypeError, ValueError; MemoryError. The scenes of a list must agree in dtype and in
+        which arguments are None.
         """
         single = isinstance(scenes, Scene)
         checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
@@ -244,12 +244,12 @@ class Renderer:
         wrt: the gradients to compute: names of the Scene's arguments that are real numbers
             ("positions", "camera", "colors", ...); others are not computed. Default:
             those of `out`, or positions.
-        out: what an earlier backward of such scenes returned, to be overwritten.
+        out: the result of an earlier backward of such scenes, to overwrite.
         accumulate: add to `out` instead.
 
         Returns Gradients for a scene, a list of them for a list of scenes. The scenes' arrays must
-        be as they were in render. Errors: TypeError, ValueError; then `out` holds anything, or with
-        `accumulate` what it held.
+        be unchanged since render. Errors: TypeError, ValueError; `out` is then undefined or, with
+        `accumulate`, unchanged.
         """
         if not isinstance(frame, Frame):
             raise TypeError(f"backward: frame must be a Frame, got {type(frame).__name__}")

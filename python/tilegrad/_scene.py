@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is rendered: a mesh, what gives it colour, and a camera; one image or a batch."""
+"""Scenes to render: a mesh, its appearance, and a camera; one image or a batch."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _S, _L = _core.SURFACE, _core.LIGHT
 
 
 class Surface(Packed):
-    """What light does at a surface, or at S of them::
+    """The material of a surface, or of S of them::
 
         colour = base_color * texture * vertex colour * (ambient + diffuse * light)
                  + specular * highlight
 
     base_color, ambient, diffuse, specular: (3,) or (S, 3). Spherical harmonics use base_color only;
-        specular and shininess are of Phong lighting.
+        specular and shininess apply to Phong lighting only.
     shininess: number or (S,), 0 to 1e6.
     texture: index into the scene's textures, or S of them; -1: none.
     """
@@ -50,7 +50,7 @@ class Surface(Packed):
 
     @classmethod
     def of_numbers(cls, numbers: np.ndarray) -> "Surface":
-        """Of an array (..., 13), which is not copied; without textures."""
+        """From an array (..., 13), without a copy; without textures."""
         surface = super().of_numbers(numbers)
         surface.texture = np.array(-1, np.int32)
         return surface
@@ -93,7 +93,7 @@ class Light(Packed):
 
 
 class Texture:
-    """Texels with the rules by which they are looked up.
+    """Texels, and how they are sampled.
 
     texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image, 0 to 1; row 0 on top;
         (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
@@ -114,23 +114,24 @@ class Texture:
 class Scene:
     """A mesh with a camera: one image, or a batch of N images that share faces.
 
-    Shapes: V vertices, F faces, C channels. Any array but `faces` and `face_surfaces` may have a
-    leading axis N more, which holds each image's own; without it all images share the array. A
-    batch of different meshes is a list of scenes.
+    Shapes: V vertices, F faces, C channels. Any array but `faces` and `face_surfaces` may have an
+    additional leading axis N, with each image's own; without it all images share the array. A batch
+    of different meshes is a list of scenes.
 
-    Arrays that are C-contiguous and of the scene's dtype are used where they are, not copied: they
-    must stay as they are from a render to its last backward. Everything else is copied once, here
-    (`tilegrad.stats` counts that); faces of another whole type once for all scenes of that array.
+    Arrays that are C-contiguous and of the scene's dtype are used in place, not copied: they must
+    not change from a render to its last backward. Everything else is copied once, here
+    (`tilegrad.stats` counts that); faces of another integer type once for all scenes with that
+    array.
 
     positions: (V, 3), world. Their dtype is the scene's: an array of float64 makes a scene for the
         scalar reference in double precision, which is for checks and slow; everything else is
         float32, for the engine.
     faces: (F, 3) int32, indices of vertices; counter-clockwise is the front.
     camera: Camera, of one view or of N.
-    colors: (V, 3), 0 to 1; bytes are refused, in textures, too.
+    colors: (V, 3), 0 to 1; bytes are refused, also in textures.
     uvs: (V, 2); (0, 0) is the lower left corner of a texture.
     textures: Texture or an array (Ht, Wt, 3), or a list of them.
-    surfaces: Surface or a list of them; without any, one of C++'s defaults that has texture 0.
+    surfaces: Surface or a list of them; without any, one with C++'s defaults and texture 0.
     face_surfaces: (F,) int32, the surface of each face; all 0 if None.
     lighting: "none" (colours as they are), "lambert", "phong" or "spherical_harmonics".
     normals: "smooth" (of vertices, from positions), "flat" (of faces), or an array (V, 3) of any
@@ -142,10 +143,10 @@ class Scene:
     sh: (9,), orthonormal real spherical harmonics 1, -y, z, -x, xy, -yz, 3z^2-1, -xz, x^2-y^2.
     attributes: (V, C), anything else to interpolate.
     per_corner: names of those of colors, uvs, normals, attributes that are given for the corners of
-        faces, (F, 3, C), so that seams need no doubled vertices; an error if there are none.
+        faces, (F, 3, C), so that seams need no doubled vertices; an error if the scene lacks one.
 
-    Errors: TypeError and ValueError with the argument's name, what was expected and got. Numbers
-    that are not finite and indices out of range are found by render.
+    Errors: TypeError and ValueError with the argument's name, what was expected and got. render
+    reports numbers that are not finite and indices out of range.
     """
 
     __slots__ = ("_arguments", "_fields", "_textures", "_surface", "_record", "_dtype", "_count",
@@ -283,8 +284,8 @@ class Scene:
         return self._fields.get(name)
 
     def replace(self, **changes: Any) -> "Scene":
-        """The same scene with some arguments changed: scene.replace(positions=moved). What becomes
-        None leaves per_corner, too."""
+        """The same scene with some arguments changed: scene.replace(positions=moved). Arguments set
+        to None also leave per_corner."""
         unknown = sorted(set(changes) - set(self._arguments))
         if unknown:
             raise TypeError(f"Scene.replace: no argument {unknown[0]!r}")
@@ -299,8 +300,8 @@ class Scene:
 
 
 def changed(arguments: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Arguments of a scene with changes. `per_corner`, unless it is among these, loses the names of
-    what they take away."""
+    """Arguments of a scene with changes. Unless `per_corner` is among them, it loses the names of
+    removed arguments."""
     merged = {**arguments, **changes}
     if "per_corner" not in changes:
         gone = [name for name, value in changes.items() if value is None or isinstance(value, str)]

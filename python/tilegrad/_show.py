@@ -25,8 +25,8 @@ def render(mesh: Any, camera: Optional[Camera] = None, *, width: Optional[int] =
         `tilegrad.meshes.as_mesh` takes.
     camera: None: `Camera.framing` of the mesh, from azimuth and elevation (degrees; numbers, or
         (N,) for N pictures).
-    width, height: pixels; None: what the camera is for (`Camera.size`), or 512.
-    background: r, g, b of what `save` draws the object over; None: transparent.
+    width, height: pixels; None: the size of the camera (`Camera.size`), or 512.
+    background: r, g, b behind the object in `save`; None: transparent.
     arguments: those of `Scene` (lighting, lights, colors, ...) and of `Renderer.render` (delta,
         max_alpha_error, ...); without them Lambert light from behind the camera.
     Returns a Frame, which notebooks show, `save` writes, and `Renderer.backward` takes.

@@ -12,8 +12,8 @@ _VARIABLES = ("TILEGRAD_THREADS", "TILEGRAD_NUM_THREADS")  # the second is of ea
 
 
 def thread_count(function: str, threads: int) -> int:
-    """`threads` checked; 0 becomes what TILEGRAD_THREADS says, or stays 0 (one thread for each core
-    that the process may use) where that is not set."""
+    """`threads`, checked; 0 becomes the value of TILEGRAD_THREADS, or stays 0 (one thread for each
+    core that the process may use) if that is not set."""
     threads = _arrays.as_number(function, "threads", threads, int)
     if not 0 <= threads <= _MOST:
         raise ValueError(f"{function}: threads is {threads}, must be in 0..{_MOST}")

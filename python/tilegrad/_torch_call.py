@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A call of `tilegrad.torch.render`: which of its arguments are tensors, of which mesh, and where their
+"""A call of `tilegrad.torch.render`: which arguments are tensors, of which mesh, and where their
 gradients go."""
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _INDICES = ("faces", "face_surfaces")  # a Scene takes their tensors as they are
 
 
 class Place(NamedTuple):
-    """Where a tensor stands: in which scene, in which argument, and of textures in which."""
+    """The place of a tensor: its scene, its argument, and for textures which one."""
 
     scene: int
     name: str
@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 class Call:
-    """A render: its tensors, and all the rest with places for them."""
+    """A render: its tensors, and the other arguments with placeholders for them."""
 
     def __init__(self, scenes: Sequence[dict[str, Any]], options: dict[str, Any],
                  threads: int) -> None:
@@ -59,7 +59,7 @@ class Call:
         self.tensors.append(value)
 
     def frame(self, tensors: Sequence[torch.Tensor]) -> Frame:
-        """Renders, with the memory of the tensors where the renderer can take it as it is."""
+        """Renders, in the tensors' own memory where the renderer can use it."""
         scenes = [dict(scene) for scene in self.scenes]
         for scene in scenes:
             if scene.get("textures") is not None:
@@ -80,7 +80,7 @@ class Call:
             scene[name] = array
 
     def _record(self, place: Place, array: np.ndarray) -> Packed:
-        """The numbers of a camera, of lights or of surfaces as those."""
+        """The numbers of a camera, lights or surfaces as a Camera, Light or Surface."""
         kind = RECORDS[place.name]
         if array.ndim < 1 or array.shape[-1] != kind._SIZE:
             raise ValueError(f"render: {place.name} has shape {array.shape}, expected "
@@ -110,7 +110,7 @@ class Call:
 
 
 def scenes_of(arguments: dict[str, Any]) -> list[dict[str, Any]]:
-    """The arguments of each mesh, where positions are a list of them."""
+    """The arguments of each mesh, if positions is a list."""
     positions = arguments["positions"]
     several = isinstance(positions, (list, tuple)) and len(positions) > 0
     if not several or not all(getattr(mesh, "ndim", 0) >= 2 for mesh in positions):
@@ -126,7 +126,7 @@ def scenes_of(arguments: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _is_of_each(value: Any) -> bool:
-    """Whether it is a list, of something else than numbers and names."""
+    """Whether it is a list of anything but numbers and names."""
     return isinstance(value, list) and not all(isinstance(v, (int, float, str)) for v in value)
 
 
@@ -141,7 +141,7 @@ def _with_textures(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def _surface_textures(arguments: dict[str, Any]) -> np.ndarray:
-    """Takes them out of the arguments, as Surface has them: one -1 for all surfaces if there are
+    """Removes them from the arguments, in the form of Surface: one -1 for all surfaces if there are
     none."""
     given = arguments.pop("surface_textures")
     indices = _arrays.contiguous("render", "surface_textures", given, np.int32)

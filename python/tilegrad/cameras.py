@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of cameras: COLMAP, NeRF, OpenCV. Cameras of those programs in arrays, and of OpenGL,
-Kaolin and PyTorch3D, become a `tilegrad.Camera` by its own from_... and to_..."""
+"""Camera files of COLMAP, NeRF and OpenCV. For arrays of those programs' cameras, and of OpenGL's,
+Kaolin's and PyTorch3D's, `tilegrad.Camera` has from_... and to_..."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def load_cameras(path: Path, *, width: int = 0, height: int = 0,
     """The cameras of a COLMAP folder (cameras and images, .txt or .bin), of NeRF's transforms.json,
     or of a JSON file with OpenCV's K (docs/rendering.md).
 
-    width, height: of the images, pixels, where the file does not say. opencv_centre: "integer" or
-    "half", as pixel_centre of `Camera.from_opencv`.
+    width, height: of the images, pixels, if the file lacks them. opencv_centre: "integer" or
+    "half", as pixel_centre in `Camera.from_opencv`.
     OSError, ValueError: name the file, and the line or frame. Lens distortion is refused.
     """
     half = _arrays.check_choice("load_cameras", "opencv_centre", opencv_centre, _CENTRES) == 1
@@ -60,7 +60,7 @@ def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = N
 
 
 def rotation_from_vector(rvec: Any) -> np.ndarray:
-    """(3, 3) from OpenCV's rotation vector (3,), axis times angle in radians, as solvePnP has
+    """(3, 3) from OpenCV's rotation vector (3,), axis times angle in radians, as solvePnP returns
     it."""
     return _tools.rotation_from_vector(
         _arrays.as_array("rotation_from_vector", "rvec", rvec, np.float64, (3,)))

@@ -5,7 +5,7 @@
     for batch in data.batches(64, steps=1000):
         batch["images"], batch["masks"], batch["cameras"]      # (64, 2, 3, H, W), ...
 
-A Dataset has a length and items, so torch.utils.data.DataLoader takes it as it is.
+A Dataset has a length and items, so torch.utils.data.DataLoader accepts it directly.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Dataset:
     views: K views of each item, distinct and at random, by seed, epoch (`set_epoch`) and item;
         None: all views in their order.
     seed: of every random choice, >= 0.
-    in_memory: read all images now, as bytes, with `threads` threads (as of `tilegrad.Renderer`)
+    in_memory: read all images now, as bytes, with `threads` threads (as in `tilegrad.Renderer`)
         instead of one file for each item.
 
     Can be pickled, and read from forked workers. Errors: OSError and ValueError name the file and
@@ -103,13 +103,13 @@ class Dataset:
 
     @property
     def cameras(self) -> Camera:
-        """Of all views, the same for every model; where each has its own (items have those), what
-        they are like."""
+        """Of all views, the same for every model; if each has its own (items have those), typical
+        ones."""
         return Camera.of_numbers(self._files.cameras, (self.image_size, self.image_size))
 
     def set_epoch(self, epoch: int) -> None:
-        """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was
-        set before they started."""
+        """Selects the epoch, >= 0, and with it the views of items. Workers of a DataLoader use the
+        epoch set before they started."""
         self._epoch = _counting("set_epoch", "epoch", epoch)
 
     def __len__(self) -> int:
@@ -132,7 +132,7 @@ class Dataset:
         on: every epoch shows each model once in a new order, and the last batch of an epoch runs
         into the next. Arrays get a leading axis; class, split and model become (size,) int64.
 
-        What a step sees depends on (seed, step) only. steps: how many; None: without end.
+        A batch depends on (seed, step) only. steps: number of batches; None: endless.
         """
         size = _arrays.as_number("batches", "size", size, int)
         first = _arrays.as_number("batches", "first_step", first_step, int)
@@ -143,7 +143,7 @@ class Dataset:
                              else itertools.count(first))
 
     def truth(self, index: int) -> Truth:
-        """Solid, surface and mesh of item `index`."""
+        """Occupancy, surface points and mesh of item `index`."""
         data = self._files.load_truth(self._indices[self._checked_index(index)])
         mesh = data["mesh"]
         return Truth(data["occupancy"].astype(bool), data["points"],
@@ -166,7 +166,7 @@ class Dataset:
                 "split": _SPLITS.index(self.models[model].split), "model": model}
 
     def _checked_index(self, index: int) -> int:
-        """From 0 on."""
+        """The index, counted from 0."""
         index = _arrays.as_number("Dataset", "item", index, int)
         if not -len(self) <= index < len(self):
             raise IndexError(f"Dataset: item {index} of {len(self)}")

@@ -20,11 +20,11 @@ from tilegrad._threads import thread_count
 
 
 class Fragments(NamedTuple):
-    """N images of H x W pixels with K layers, near ones first; -1 in all of them behind the last
-    face of a pixel.
+    """N images of H x W pixels with K layers, nearest first; -1 in all arrays after the last face
+    of a pixel.
 
-    pix_to_face: (N, H, W, K) int64, index of the face among the faces of all images, one image's
-        behind the other's.
+    pix_to_face: (N, H, W, K) int64, index of the face among the faces of all images, one image
+        after the other.
     zbuf: (N, H, W, K), depth in the camera, world units.
     bary_coords: (N, H, W, K, 3), weights of the face's corners.
     dists: (N, H, W, K), squared distance to the face's boundary, NDC; negative inside.
@@ -43,17 +43,18 @@ def to_fragments(source: Union[Frame, Scene, Sequence[Scene]], faces_per_pixel: 
                  threads: int = 0) -> Fragments:
     """The faces_per_pixel nearest faces of every pixel of a frame, or of scenes.
 
-    source: a Frame, whose scenes and size are taken; or a Scene or a list of them, with width and
-        height in pixels, or cameras that know these (`Camera.size`).
+    source: a Frame, with its scenes and size; or a Scene or a list of them, with width and height
+        in pixels, or with cameras that have them (`Camera.size`).
     faces_per_pixel: K, 1..1024.
-    blur_radius: NDC^2, >= 0: a pixel lists faces whose boundary is nearer than its root, too.
+    blur_radius: NDC^2, >= 0: a pixel also lists faces whose boundary is nearer than its square
+        root.
     perspective_correct: whether barycentrics are linear on the face or on the screen.
-    clip_barycentric_coords: whether those outside of a face are moved to its boundary; None: where
-        blur_radius > 0, as PyTorch3D does.
-    cull_backfaces: whether faces seen from behind are left out.
-    threads: as of Renderer.
+    clip_barycentric_coords: whether to move those outside of a face to its boundary; None: if
+        blur_radius > 0, as in PyTorch3D.
+    cull_backfaces: whether to drop faces seen from behind.
+    threads: as in Renderer.
 
-    Faces that reach behind the camera are left out, not cut. Errors: TypeError, ValueError.
+    Faces that reach behind the camera are dropped, not clipped. Errors: TypeError, ValueError.
     """
     scenes, width, height = _scenes_of(source, width, height)
     options = layered_options("to_fragments", height, width, faces_per_pixel, blur_radius,
@@ -117,6 +118,6 @@ def _face_vertices(scene: Scene, width: int, height: int) -> np.ndarray:
         y = each.cy - each.fy * seen[..., 1] / depth
     per_pixel = 2 / min(width, height)
     ndc = np.stack([(width / 2 - x) * per_pixel, (height / 2 - y) * per_pixel, depth], axis=-1)
-    ndc[depth <= 0] = 0  # left out, whatever else
+    ndc[depth <= 0] = 0  # dropped in any case
     corners = np.broadcast_to(ndc, (len(scene), *ndc.shape[1:]))[:, scene.faces]
     return corners.astype(scene.dtype)

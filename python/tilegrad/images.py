@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images from files and to files, as arrays (height, width, channels), row 0 on top."""
+"""Reads and writes image files as arrays (height, width, channels), row 0 on top."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
     """Reads an image.
 
     PNG, JPEG, BMP, TGA, PNM, SGI: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
-    float32, of its channels R, G, B, A or Y, A or the only one there is. NPY: the array as it is.
-    max_bytes: as of `load_mesh`.
+    float32, of its channels R, G, B, A or Y, A or its only one. NPY: the array as it is.
+    max_bytes: as in `load_mesh`.
     OSError, ValueError: name the file and what is wrong with it.
     """
     ending = ending_of(path)
@@ -41,7 +41,7 @@ def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
 
 def load_layers(path: Path, *, max_bytes: Optional[int] = None) -> dict[str, np.ndarray]:
     """Every channel of an EXR image by its name, (H, W) float32: its display window, 0 where the file
-    has no data. What it has outside is left out with a warning. max_bytes: as of `load_mesh`."""
+    has no data. Drops what lies outside with a warning. max_bytes: as in `load_mesh`."""
     limit = _arrays.as_limit("load_layers", max_bytes)
     names, planes, left_out = _tools.load_exr(name_of(path), limit)
     for text in left_out:
@@ -52,8 +52,8 @@ def load_layers(path: Path, *, max_bytes: Optional[int] = None) -> dict[str, np.
 def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
     """Writes an image, whole or not at all; its format follows the ending.
 
-    .png: 8 bits; real numbers 0 to 1 become 0 to 255, what is beyond is cut. .exr: float32, every
-    bit. .npy: the array as it is, of any shape.
+    .png: 8 bits; real numbers 0 to 1 become 0 to 255, what is beyond is clamped. .exr: float32,
+    every bit. .npy: the array as it is, of any shape.
     image: (H, W) or (H, W, 1 to 4); with planar (1 to 4, H, W), as renders are.
     ValueError: another ending, shape, or a number that is not finite (PNG). OSError: not written.
     """

@@ -5,7 +5,7 @@
     losses.edge_length(positions, faces).backward()                 # torch tensors, if one is given
 
 Real numbers are float32 unless an array of float64 is given. Gradients are with respect to the
-first argument, of `chamfer` to both. Numbers that are not finite are errors.
+first argument, for `chamfer` to both. Numbers that are not finite are errors.
 """
 
 from __future__ import annotations
@@ -42,14 +42,15 @@ def edge_length(positions: Any, faces: Any) -> Any:
 
 def normal_consistency(positions: Any, faces: Any) -> Any:
     """The sum over edges of (cos(n1, n2) - 1)^2 with the unit normals of the two faces. Boundary
-    edges take no part. Arguments as of `edge_length`."""
+    edges do not count. Arguments as in `edge_length`."""
     return _of_mesh("normal_consistency", positions, faces)
 
 
 def laplacian(positions: Any, faces: Any, start: Optional[Any] = None) -> Any:
     """The sum over vertices of |mean of the neighbours - vertex|^2, with uniform weights.
 
-    start: (V, 3): of the movement positions - start, as section 4.1 of the DIB-R paper has it.
+    start: (V, 3): applies it to the movement positions - start, as in section 4.1 of the DIB-R
+        paper.
     """
     if start is not None:
         positions = positions - _like(positions, start)
@@ -58,7 +59,7 @@ def laplacian(positions: Any, faces: Any, start: Optional[Any] = None) -> Any:
 
 def iou(alpha: Any, truth: Any) -> Any:
     """Equation 12: the mean over images of 1 - |S S'|_1 / |S + S' - S S'|_1. alpha, truth: (N, H, W)
-    or (H, W), 0 to 1. The gradient is of alpha."""
+    or (H, W), 0 to 1. The gradient is with respect to alpha."""
     def compute(a: np.ndarray, s: np.ndarray) -> tuple[float, np.ndarray]:
         if a.shape != s.shape or a.ndim not in (2, 3):
             raise ValueError(f"iou: alpha has shape {a.shape}, truth {s.shape}; expected the same, "
@@ -77,7 +78,7 @@ def iou(alpha: Any, truth: Any) -> Any:
 def chamfer(a: Any, b: Any, *, threads: int = 0) -> Any:
     """The mean squared distance of a's points to the nearest of b, plus the same the other way.
     a: (N, 3). b: (M, 3), of the same dtype. The nearest points are found by the k-d tree that scores
-    predictions. Returns value and both gradients; of tensors a scalar."""
+    predictions. Returns value and both gradients; for tensors a scalar."""
     count = thread_count("chamfer", threads)
     if _torch_of(a, b):
         return _on_tape(lambda p, q: _chamfer(p, q, count), a, b)

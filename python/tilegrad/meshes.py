@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes from files and to files, as arrays that go into a `tilegrad.Scene`.
+"""Reads and writes mesh files as arrays for a `tilegrad.Scene`.
 
     mesh = load_mesh("chair.glb")
     frame = tilegrad.Renderer().render(mesh.scene(camera), width=256, height=256)
@@ -22,10 +22,11 @@ __all__ = ["Material", "Mesh", "MeshCamera", "MeshTables", "MeshTexture", "as_me
 
 def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
     """Reads a mesh: glTF and GLB with materials and textures, OBJ with MTL, PLY, OFF, STL, AC3D,
-    3DS, Collada, FBX and others (`mesh_endings`). All parts are merged, polygons split.
+    3DS, Collada, FBX and others (`mesh_endings`). Merges all parts and splits polygons into
+    triangles.
 
-    max_bytes: memory limit of the file and all files that it references; None: what the
-    environment's TILEGRAD_READ_LIMIT says, or else 4 GiB.
+    max_bytes: memory limit of the file and all files that it references; None: TILEGRAD_READ_LIMIT
+    of the environment, or else 4 GiB.
     OSError, ValueError: name the file, the place in it and what to do. A missing texture is a
     warning of the mesh.
     """
@@ -43,11 +44,11 @@ def mesh_endings() -> list[str]:
 
 
 def as_mesh(mesh: Any) -> Mesh:
-    """A Mesh of whatever holds one: a Mesh; a file's path; (positions, faces); an object of trimesh
+    """A Mesh from any of: a Mesh; a file's path; (positions, faces); an object of trimesh
     (vertices, faces) or Open3D (vertices, triangles), with its colours and normals per vertex and,
-    of trimesh, its texture. Neither library is imported.
+    for trimesh, its texture. Neither library is imported.
 
-    TypeError: it is none of them. ValueError: polygons that are no triangles.
+    TypeError: it is none of them. ValueError: polygons other than triangles.
     """
     if isinstance(mesh, (str, bytes, os.PathLike)):
         return load_mesh(mesh)
@@ -55,7 +56,7 @@ def as_mesh(mesh: Any) -> Mesh:
 
 
 def _of_object(mesh: Any) -> Mesh:
-    """Of what is no file."""
+    """From an object that is not a file."""
     if isinstance(mesh, Mesh):
         return mesh
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
@@ -86,7 +87,7 @@ def _positions_faces(positions: Any, faces: Any) -> tuple[np.ndarray, np.ndarray
 
 
 def _vertex_rows(mesh: Mesh, values: Any, widths: tuple[int, ...]) -> Optional[np.ndarray]:
-    """(V, width) float32, 0 to 1 of bytes; None where the object has none."""
+    """(V, width) float32, bytes scaled to 0 to 1; None where the object has none."""
     array = np.asarray(values) if values is not None else np.empty(0)
     if array.ndim != 2 or len(array) != len(mesh.positions) or array.shape[1] not in widths:
         return None

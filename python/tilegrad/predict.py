@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes from images, by a network that `tilegrad train` has trained.
+"""Predicts meshes from images with a network trained by `tilegrad train`.
 
     predictor = Predictor("runs/demo")                     # or Predictor(): installed weights
     mesh = predictor.predict(load_image("chair.png"))      # a cut-out: RGBA
@@ -26,9 +26,9 @@ class Predictor:
     Calls from several Python threads run one at a time. Can be pickled (as its path); in a forked
     process it is loaded again at the first call, with one thread.
 
-    path: a run folder, whose newest whole checkpoint is taken, one checkpoint, a file of weights, or
+    path: a run folder (uses its newest complete checkpoint), a checkpoint, a file of weights, or
         the name of installed weights. None: the installed ones for cut-outs.
-    threads: as of `tilegrad.Renderer`; the result does not depend on it.
+    threads: as in `tilegrad.Renderer`; the result does not depend on it.
     OSError, ValueError: name the file and what is wrong.
     """
 
@@ -60,16 +60,16 @@ class Predictor:
         return self._loaded.description
 
     def template(self) -> Mesh:
-        """The sphere that predictions are deformed from."""
+        """The sphere that predictions deform."""
         return mesh_of_dict(self._loaded.template_mesh())
 
     def prepare(self, image: Any, mask: Any = None, *, keep_framing: bool = False) -> np.ndarray:
-        """What the network sees of a picture: (4, size, size) uint8, RGB over black and alpha.
+        """The network's input for a picture: (4, size, size) uint8, RGB over black and alpha.
 
         image: (H, W, 4), an object cut out by its alpha; or any picture with a mask. uint8, or real
             numbers from 0 to 1. mask: (H, W), white is the object.
         keep_framing: only resize: the picture is already framed like the training images. Otherwise
-            the object is moved to the middle and scaled as training images show theirs.
+            the object is centred and scaled as in the training images.
         ValueError: no alpha and no mask, nothing or everything opaque, sizes that differ.
         """
         pixels, cutout = self._pixels(image, mask)
@@ -77,11 +77,11 @@ class Predictor:
 
     def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False,
                 refine: Optional[int] = None) -> Mesh:
-        """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
-        half-extent is 0.45, its middle the origin.
+        """The mesh of a picture, with vertex colours; arguments as in `prepare`. It is centred at
+        the origin, with largest half-extent 0.45.
 
         refine: gradient-descent steps that refine the prediction on the picture, 0 to 100,000;
-            0: the network's output, with the faces of the template. None: 800, or 0 of a network
+            0: the network's output, with the faces of the template. None: 800, or 0 for a network
             that predicts texture maps."""
         refine = self._loaded.refine_steps if refine is None else refine
         if not 0 <= refine <= 100_000:
@@ -99,8 +99,8 @@ class Predictor:
         return pixels, None if mask is None else as_bytes("prepare", "mask", mask)
 
     def predict_prepared(self, images: Any) -> list[Mesh]:
-        """The meshes of N pictures (N, 4, size, size) uint8, as `prepare` and datasets have them.
-        All have the faces of the template."""
+        """The meshes of N pictures (N, 4, size, size) uint8, as from `prepare` or a dataset. All
+        have the faces of the template."""
         size = self.image_size
         array = _arrays.as_array("predict_prepared", "images", images, np.uint8,
                                  ("N", 4, size, size))

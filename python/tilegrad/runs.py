@@ -75,7 +75,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
     images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or on a plain background;
-        uint8, or real numbers 0 to 1. Or a folder, as of the command: with transforms.json, of
+        uint8, or real numbers 0 to 1. Or a folder, as for the command: with transforms.json, of
         COLMAP, of pictures alone, or a dataset with `model` "CLASS/ID".
     cameras: a Camera of N views, in pixels of the images. None: the folder's, or if it has none,
         cameras are estimated from the images, whose longer side spans `fov` degrees.
@@ -89,7 +89,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     hold_out: every hold_out-th image is held out for evaluation; 0: none.
     start: the initial mesh; truth: the ground truth to score against; what `as_mesh` takes.
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
-        and texture, or the colours that `start` has. lighting: as of `Scene`.
+        and texture, or the colours that `start` has. lighting: as in `Scene`.
     material: "unlit"; "lambert" and "phong" fit a light as well as the colours.
     quality: "fast", "normal" or "best": 300, 1000 or 3000 steps, unless `steps` says how many.
     out: the run's folder; None: a temporary one. resume: continues the fit in it; more steps
@@ -126,7 +126,7 @@ def train(config: Path = "quick", *, data: Path, out: Path,
 
     config: a name (`config_names`) or a TOML file. data: a dataset's folder. out: the run's.
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
-    resume, callback, threads, errors: as of `fit`; more steps: set={"schedule.steps": ...}.
+    resume, callback, threads, errors: as in `fit`; more steps: set={"schedule.steps": ...}.
     """
     request = {"config": name_of(config), "data": name_of(data), "out": name_of(out),
                "overrides": _words(set or {}), "resume": bool(resume),

@@ -7,7 +7,7 @@
 
 float32 tensors are rendered by the engine, float64 ones by the scalar reference in double
 precision, which is for `torch.autograd.gradcheck`. Tensors are on the CPU. Any tensor of a scene
-may ask for a gradient; what does not is not computed. The first derivative only.
+may require a gradient; others are not computed. First derivatives only.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ _CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
 
 
 class Images(NamedTuple):
-    """What a render gives, as `tilegrad.Frame` has it; None if not requested. Their
-    memory is the renderer's; torch reports an in-place change before backward as an error."""
+    """The images of a render, as in `tilegrad.Frame`; None if not requested. Their memory is the
+    renderer's; torch reports an in-place change before backward as an error."""
 
     color: Optional[torch.Tensor] = None
     alpha: Optional[torch.Tensor] = None
@@ -48,28 +48,28 @@ class Images(NamedTuple):
 def render(positions: Union[torch.Tensor, Sequence[torch.Tensor]], faces: Array, camera: Any, *,
            width: int, height: int, outputs: Sequence[str] = ("color", "alpha"),
            threads: int = 0, surface_textures: Sequence[int] = (), **arguments: Any) -> Images:
-    """Images (N, ...) of a scene, of a batch of N, or of a list of meshes behind each other.
+    """Images (N, ...) of a scene, of a batch of N, or of a list of meshes one after the other.
 
     positions: (V, 3) or (N, V, 3); its dtype is that of the images, to which other tensors are
         converted. faces: (F, 3) whole numbers.
-    camera: a Camera, or a tensor ([N,] 17) of `camera`. Images of another size than a Camera is
-        for are an error; the numbers in a tensor are for an image of width and height.
-    width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always computed.
-    threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_THREADS says, or as many as torch uses:
-        one in a worker of a DataLoader.
-    surface_textures: the texture of each surface, -1: none, where `surfaces` is a tensor.
+    camera: a Camera, or a tensor ([N,] 17) of `camera`. A size other than the Camera's is an error;
+        the numbers in a tensor are for an image of width and height.
+    width, height, outputs: as in `tilegrad.Renderer.render`; face_ids are always computed.
+    threads: as in `tilegrad.Renderer`; 0: TILEGRAD_THREADS, or as many as torch uses: one in a
+        worker of a DataLoader.
+    surface_textures: the texture of each surface, -1: none, if `surfaces` is a tensor.
     arguments: those of `tilegrad.Scene` (colors, uvs, textures, surfaces, lights, lighting, sh,
         attributes, ...), each array also as a tensor, Texture with texels in a tensor, lights a
         tensor ([N,] L, 4) of `lights`, surfaces a tensor (S, 13) of `surfaces`; and options of
         `tilegrad.Renderer.render` (delta, max_alpha_error, culling, ...).
 
     Different meshes in one call: positions are a list of (V, 3) or (N, V, 3). Every other argument
-    that is a list (faces, camera, colors, ...) has one for each of them, too; what is no list, but
-    a tensor, a tuple, a number, is for all. They must be alike: what one has, all have.
+    that is a list (faces, camera, colors, ...) has one item for each of them, too; a tensor, a
+    tuple or a number is for all. All meshes must have the same arguments.
 
-    In torch.autocast tensors of bfloat16 are rendered in float32; elsewhere they are an error.
+    Under torch.autocast tensors of bfloat16 are rendered in float32; elsewhere they are an error.
 
-    Errors: TypeError for tensors that are not on the CPU; what Scene and Renderer raise.
+    Errors: TypeError for tensors that are not on the CPU; those of Scene and Renderer.
     """
     outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     scene = {"positions": positions, "faces": faces, "camera": camera,
@@ -83,7 +83,7 @@ def render(positions: Union[torch.Tensor, Sequence[torch.Tensor]], faces: Array,
 
 
 class Renderer(torch.nn.Module):
-    """`render` with options that stay the same, to put into a model.
+    """`render` as a module with fixed options, for use in a model.
 
     width, height: pixels. Further arguments: those of `render` that hold for every call.
     """
@@ -94,7 +94,7 @@ class Renderer(torch.nn.Module):
 
     def forward(self, positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Tensor],
                 **arguments: Any) -> Images:
-        """Images of a scene; further arguments as of `render`, before those of the renderer."""
+        """Images of a scene; further arguments as in `render`, which override the renderer's."""
         return render(positions, faces, camera, **{**self.arguments, **arguments})
 
     def extra_repr(self) -> str:
@@ -106,10 +106,10 @@ def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
            translation: Value = (0.0, 0.0, 0.0), fx: Value = _core.CAMERA[12],
            fy: Value = _core.CAMERA[13], cx: Value = _core.CAMERA[14],
            cy: Value = _core.CAMERA[15], near_plane: Value = _core.CAMERA[16]) -> torch.Tensor:
-    """A camera of tensors, ([N,] 17), through which gradients go back to each of them.
+    """A camera from tensors, ([N,] 17), differentiable with respect to each of them.
 
-    rotation: ([N,] 3, 3), for example of `rotation_6d`; translation: ([N,] 3); fx, fy, cx, cy:
-    numbers or (N,). Meanings as of `tilegrad.Camera`. Numbers may stand for tensors.
+    rotation: ([N,] 3, 3), for example from `rotation_6d`; translation: ([N,] 3); fx, fy, cx, cy:
+    numbers or (N,). Meanings as in `tilegrad.Camera`. Numbers may replace tensors.
     """
     return _packed(rotation=(rotation, (3, 3)), translation=(translation, (3,)), fx=(fx, ()),
                    fy=(fy, ()), cx=(cx, ()), cy=(cy, ()), near_plane=(near_plane, ()))
@@ -117,7 +117,7 @@ def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @full_precision
 def lights(direction: Value, intensity: Value = 1.0) -> torch.Tensor:
-    """Directional lights of tensors, ([N,] L, 4): direction ([N,] L, 3), from the surface to the
+    """Directional lights from tensors, ([N,] L, 4): direction ([N,] L, 3), from the surface to the
     light, world, not 0; intensity ([N,] L) or a number."""
     return _packed(direction=(direction, (3,)), intensity=(intensity, ()))
 
@@ -126,7 +126,7 @@ def lights(direction: Value, intensity: Value = 1.0) -> torch.Tensor:
 def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.0),
              diffuse: Value = (1.0, 1.0, 1.0), specular: Value = (0.4, 0.4, 0.4),
              shininess: Value = 10.0) -> torch.Tensor:
-    """Surfaces of tensors, (S, 13): (S, 3) each and shininess (S,), as of `tilegrad.Surface`;
+    """Surfaces from tensors, (S, 13): (S, 3) each and shininess (S,), as in `tilegrad.Surface`;
     numbers and arrays without the axis S are shared by all."""
     numbers = _packed(base_color=(base_color, (3,)), ambient=(ambient, (3,)),
                       diffuse=(diffuse, (3,)), specular=(specular, (3,)),
@@ -136,7 +136,7 @@ def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.
 
 
 class _Render(torch.autograd.Function):
-    """Each call has its own frame, so that renders may follow each other before backward."""
+    """Each call has its own frame, so that several renders may precede backward."""
 
     @staticmethod
     def forward(ctx: Any, call: Call,  # type: ignore[override]
@@ -168,8 +168,8 @@ class _Render(torch.autograd.Function):
 
 
 def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
-    """The parts of records behind each other, their leading axes broadcast. In the dtype of their
-    tensors; numbers alone are kept in float64, as Camera keeps them, until a scene rounds them."""
+    """The parts of records, concatenated, with broadcast leading axes. In the dtype of their
+    tensors; numbers alone are kept in float64, as in Camera, until a scene rounds them."""
     given = [value.dtype for value, _ in parts.values()
              if isinstance(value, torch.Tensor) and value.is_floating_point()]
     dtype = functools.reduce(torch.promote_types, given,
@@ -199,8 +199,9 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
 
 @full_precision
 def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
-    """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
-    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).
+    """Rotations (..., 3, 3) from six unconstrained numbers (..., 6): their first two rows, made
+    orthonormal (Y. Zhou et al.: On the continuity of rotation representations in neural networks,
+    2019).
 
     TypeError if they are not real numbers, ValueError if they are not six, or where the first three
     are 0 or the last three parallel to them.

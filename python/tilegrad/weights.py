@@ -14,7 +14,7 @@ from tilegrad._paths import Path, ending_of, name_of
 
 
 class Weights(dict[str, np.ndarray]):
-    """Arrays by name, and the texts that a safetensors file holds beside them."""
+    """Arrays by name, and the metadata texts of a safetensors file."""
 
     def __init__(self, arrays: Mapping[str, np.ndarray] = {},
                  metadata: Optional[Mapping[str, str]] = None) -> None:
@@ -23,7 +23,7 @@ class Weights(dict[str, np.ndarray]):
 
 
 def load_weights(path: Path, *, max_bytes: Optional[int] = None) -> Weights:
-    """Reads a .safetensors or .npz file, float16 as float32. max_bytes: as of `load_mesh`. OSError,
+    """Reads a .safetensors or .npz file, float16 as float32. max_bytes: as in `load_mesh`. OSError,
     ValueError: name the file and what is wrong."""
     ending = _ending("load_weights", path)
     limit = _arrays.as_limit("load_weights", max_bytes)
@@ -69,7 +69,7 @@ class Checkpoint:
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
-    """Reads a checkpoint of `tilegrad train`: one file, or the newest whole one of a run folder.
+    """Reads a checkpoint of `tilegrad train`: one file, or the newest complete one of a run folder.
     OSError, ValueError: name the file and what is wrong."""
     found = _tools.load_checkpoint(name_of(path))
     found["weights"] = Weights(found.pop("tensors"))

@@ -14,8 +14,8 @@
 namespace tilegrad::cli {
 namespace {
 
-// In single quotes of bash, zsh and fish: what is within is literal, but for the quote itself (and,
-// in fish, the backslash, which help texts do not use).
+// Quotes for bash, zsh and fish: single quotes make all literal but the quote itself (and, in fish,
+// the backslash, which help texts do not use).
 std::string Quoted(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -53,7 +53,7 @@ std::string BashValues(const CommandNode& command) {
 
 // ---- zsh
 
-// What _arguments takes for special in a specification.
+// Escapes what _arguments treats as special in a specification.
 std::string ZshEscaped(const std::string& text) {
   std::string out;
   for (const char c : text) {

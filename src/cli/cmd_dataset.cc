@@ -104,7 +104,7 @@ bool HoldsPictures(const std::string& name) {
   return name == "nmr" || name == "choy" || name == "dvr" || name == "dibr";
 }
 
-// An option that would do nothing is a mistake: somebody expects a split that there will not be.
+// An option without effect is an error: the user expects a split that there will not be.
 Status CheckEffects(const DatasetOptions& options) {
   const std::string name = options.Name();
   if (!options.masks.empty()) return InvalidArgument("--masks: not for --source {}", name);

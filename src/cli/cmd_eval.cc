@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad eval: how good a run is on models that it never saw, beside three baselines.
+// tilegrad eval: how good a run is on held-out models, with three baselines.
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>

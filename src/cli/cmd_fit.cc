@@ -101,7 +101,7 @@ void PrintFit(const train::FitOutcome& outcome, const Path& out, std::int64_t st
   PrintJson(outcome, out);
 }
 
-// The words of tilegrad fit that name what is fitted. Errors say which word, and what there is.
+// The words of tilegrad fit that name what is fitted. Errors name the word and the known ones.
 
 using train::Parameter;
 

@@ -19,7 +19,7 @@ namespace {
 
 using Pages = std::map<std::string, std::string>;  // by command; "": the program's
 
-// What roff would take for its own: a backslash, a hyphen that is to stay one, a control character
+// Escapes what roff would interpret: a backslash, a hyphen that is to stay one, a control character
 // at the beginning of a line.
 std::string Roff(const std::string& text) {
   std::string out;

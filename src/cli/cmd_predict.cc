@@ -136,8 +136,8 @@ Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& worke
       {.frame_ms = kTurntableFrameMilliseconds, .quality = kTurntableQuality, .watch = watch});
 }
 
-// What the picture, planar RGBA of kRefineSize, shows; the network's mesh and the refined one, from
-// where it was taken.
+// Draws the picture, planar RGBA of kRefineSize, beside the network's mesh and the refined one,
+// seen from its camera.
 Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
                  const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
   constexpr int size = train::kRefineSize;

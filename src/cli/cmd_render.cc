@@ -219,7 +219,7 @@ MeshSceneOptions SceneOptionsOf(const RenderSettings& settings) {
   return options;
 }
 
-// What is drawn otherwise than a viewer of the file would.
+// Notes on what differs from a viewer's picture of the file.
 std::vector<std::string> MaterialNotes(const Mesh& mesh, bool soft) {
   std::vector<std::string> notes;
   for (const Material& m : mesh.materials) {

@@ -52,7 +52,7 @@ void PrintJson(const train::RunOutcome& outcome, const TrainOptions& options) {
                {"seconds", outcome.seconds}});
 }
 
-// --resume RUN: what is not named is what the run was started with.
+// --resume RUN: options not given default to those that the run was started with.
 Status TakeFromRun(TrainOptions* options) {
   const Path run = options->resume;
   std::error_code error;

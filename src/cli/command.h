@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The commands of the program and their options, as plain records. Each command lives in its own
-// file cmd_<name>.cc; command_line.cc declares it to CLI11. What it does returns a Status whose
-// message the program prints; main.cc alone maps it to an exit code.
+// file cmd_<name>.cc; command_line.cc declares it to CLI11. Its action returns a Status, whose
+// message the program prints; only main.cc maps it to an exit code.
 #pragma once
 
 #include <cstdint>
@@ -21,28 +21,28 @@
 
 namespace tilegrad::cli {
 
-// The number that all of the word is, as CLI11 reads options: also "+.5", "0x10", "inf" and "nan".
+// Parses a whole word as a number, as CLI11 reads options: also "+.5", "0x10", "inf" and "nan".
 std::optional<double> RealNumber(const std::string& word);
 
-// "a,b" is a and b.
+// Splits "a,b" into a and b.
 std::vector<std::string> PartsBetweenCommas(const std::string& text);
 
-// Looks at a word of an option. Says what is wrong with it, or nothing.
+// Checks a word of an option. Returns what is wrong with it, or an empty text.
 struct WordCheck {
   std::function<std::string(const std::string& word)> fault;
-  std::string description;  // in the help, behind the type; empty: none
+  std::string description;  // in the help, after the type; empty: none
 };
 WordCheck AboveZero();
 WordCheck NotNegative();
-// Refuses names that end otherwise: pic.jpg would be a PNG that programs take for something else.
-// Names without an ending, as of devices, are fine.
+// Refuses names with another ending: programs would misread a PNG named pic.jpg. Names without an
+// ending, such as devices, are fine.
 WordCheck EndsIn(const std::string& ending);
 
-// What else there is to say of an option.
+// Further traits of an option.
 struct Required {};
-struct Hidden {};         // the help has nothing of it
-struct NoDefault {};      // the help does not show the value that is there before parsing
-struct SplitAtCommas {};  // of a vector: a word with commas is several values
+struct Hidden {};         // not in the help
+struct NoDefault {};      // the help does not show the default
+struct SplitAtCommas {};  // for a vector: a word with commas is several values
 struct Numbers {          // of a vector: "0 -.5 4" or, as one word, "0,-.5,4"
   int count;
 };
@@ -56,7 +56,7 @@ struct TypeName {
   std::string name;  // in the help
 };
 struct ValueMayLack {
-  std::string value, text;  // the value then; what the help shows for it
+  std::string value, text;  // the value if it is missing; what the help shows for that
 };
 struct Needs {
   std::string option;  // that is added before
@@ -67,14 +67,14 @@ struct Excludes {
 using Trait = std::variant<Required, Hidden, NoDefault, SplitAtCommas, Numbers, Range, OneOf,
                            TypeName, ValueMayLack, Needs, Excludes, WordCheck>;
 
-// Where the values of an option go. A bool makes it a flag, a vector one that may be repeated; a
-// WordCheck keeps the word itself.
+// Where an option's values are stored. A bool makes it a flag, a vector makes it repeatable; a
+// WordCheck stores the word itself.
 using Target =
     std::variant<bool*, int*, std::int64_t*, std::uint64_t*, float*, double*, std::string*,
                  std::vector<float>*, std::vector<double>*, std::vector<std::string>*,
                  std::vector<std::tuple<float, float, float, float>>*, WordCheck>;
 
-// A value of an enumeration by its name, in upper or lower case.
+// Sets an enumeration by name, in upper or lower case.
 template <class T>
 WordCheck Choice(T* target, const std::map<std::string, T>& values) {
   std::string names;
@@ -89,18 +89,18 @@ WordCheck Choice(T* target, const std::map<std::string, T>& values) {
 }
 
 struct Option {
-  std::string names;  // "--start,--mesh"; "run": a word that no option stands before
+  std::string names;  // "--start,--mesh"; "run": a positional argument
   Target target;
   std::string help;
   std::vector<Trait> traits = {};
-  // Once the command line is read: what was given, and as what it counts where nothing was.
+  // After parsing: the words given, and the default that counts if there are none.
   std::vector<std::string> words = {};
   std::string initial = {};
 
   std::string FirstName() const { return names.substr(0, names.find(',')); }
 };
 
-// What a chosen command does once options are parsed.
+// The action of a chosen command, after options are parsed.
 using Action = std::function<Status()>;
 
 struct Command {
@@ -110,13 +110,13 @@ struct Command {
 
   void Add(const std::string& names, const Target& target, const std::string& text,
            const std::vector<Trait>& traits = {});
-  // Whether the command line, once it is read, has the option of this first name.
+  // Whether the parsed command line has the option with this first name.
   bool Given(const std::string& option) const;
 };
 // A reference to a command stays valid when others are added.
 using CommandList = std::deque<Command>;
 
-// Adds a command that calls `run` with options, to which those of the command line are to be
+// Adds a command that calls `run` with the returned options, to which the command line's are to be
 // written.
 template <class Options>
 std::pair<Command*, Options*> AddCommand(CommandList* list, const char* name, const char* help,

@@ -142,8 +142,7 @@ std::string ExplainExtra(const CLI::App& command) {
   return fmt::format("unknown option {}{}", name, DidYouMean(name, known));
 }
 
-// What is printed for a sentence of CLI11's: {0} is what it has between `before` and `mark`, {1}
-// the rest.
+// Our text for a sentence of CLI11's: {0} is its part between `before` and `mark`, {1} the rest.
 struct Sentence {
   std::string_view before, mark, ours;
 };
@@ -239,7 +238,7 @@ ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands) {
 
 namespace {
 
-// Of "TEXT:{none,lambert}" what stands in the braces.
+// The part in braces of "TEXT:{none,lambert}".
 std::vector<std::string> ChoicesOf(const std::string& type) {
   const auto open = type.find('{'), close = type.find('}');
   if (open == std::string::npos || close == std::string::npos) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands as CLI11 knows them, and what it makes of a command line.
+// The commands as CLI11 knows them, and parsing of a command line.
 #pragma once
 
 #include <map>
@@ -12,9 +12,9 @@
 
 namespace tilegrad::cli {
 
-// Lists whose words stand apart, in the words of a command line, joined by commas: those that are
-// of the list's kind. "--errors 0 1e-3 mesh.obj" becomes "--errors 0,1e-3 mesh.obj"; the same for
-// --up of three numbers, which may also be a word.
+// Joins lists given as separate words of a command line by commas, as long as words are of the
+// list's kind. "--errors 0 1e-3 mesh.obj" becomes "--errors 0,1e-3 mesh.obj"; the same for --up of
+// three numbers, which may also be a word.
 std::vector<std::string> JoinLists(std::vector<std::string> words);
 
 struct ParsedLine {
@@ -22,19 +22,19 @@ struct ParsedLine {
   int exit_code = 0;
   std::string out = {}, note = {};  // for standard output and standard error
 };
-// Words behind the program's name. Sets the targets and words of the options of the command that
-// they choose.
+// `words`: those after the program's name. Sets the targets and words of the chosen command's
+// options.
 ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands);
 
-// The commands and options of the program as CLI11 knows them, in plain records: what man pages and
-// completions are written from, so that they cannot say anything else than --help.
+// The commands and options of the program as CLI11 knows them, in plain records: the source of man
+// pages and completions, so that they agree with --help.
 
 struct OptionNode {
-  std::vector<std::string> names;  // "-h", "--help"; of a positional its name alone
+  std::vector<std::string> names;  // "-h", "--help"; a positional has only its name
   bool positional = false, required = false, many = false;
   std::string value;                 // "INT", "TEXT", ...; empty: a flag
-  std::vector<std::string> choices;  // that the value is one of; empty: not a list
-  bool path = false;                 // a text that is not one of `choices`: files may be meant
+  std::vector<std::string> choices;  // the values allowed; empty: any
+  bool path = false;                 // a text without `choices`, which may be a file
   std::string initial;               // its default; empty: none
   std::string help;
 };
@@ -44,13 +44,14 @@ struct CommandNode {
   std::vector<OptionNode> options;  // as --help lists them
 };
 
-// Those that train knows, beside files.
+// The configurations that train knows by name.
 std::vector<std::string> ConfigNames();
 
 // The program's own options first, under the program's name, then its commands.
 std::vector<CommandNode> ReadCommandTree(const CommandList& commands);
 
-// What a command was given, kept beside what it makes: --resume then needs none of it again.
+// The options given to a command, stored beside its output, so that --resume needs none of them
+// again.
 
 // Values of options by their first names; those of a list with commas between.
 using GivenOptions = std::map<std::string, std::string>;
@@ -65,11 +66,11 @@ Result<GivenOptions> ReadGiven(const Path& file);
 struct Continuation {
   GivenOptions then;
   std::set<std::string> may_differ;  // options
-  // Of options that exclude each other: where one is given now, none of then counts.
+  // Mutually exclusive options: if one is given now, none of `then` counts.
   std::set<std::string> instead;
 };
-// Reads the command line again as if all that was given then had been given now. An error names an
-// option that is given otherwise, and both values.
+// Parses the command line again as if the options of `then` had been given, too. An error names an
+// option with another value now, and both values.
 Status ContinueWith(const Continuation& before, Command* command, CommandList* list);
 
 }  // namespace tilegrad::cli

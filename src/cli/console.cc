@@ -53,7 +53,7 @@ std::size_t TerminalColumns() {
   return known ? size.ws_col : kUsualColumns;
 }
 
-// As much of UTF-8 text as surely fits: characters from Hangul on count as wide ones.
+// The longest prefix of UTF-8 text that surely fits: characters from Hangul on count as wide.
 std::string_view FirstColumns(std::string_view text, std::size_t columns) {
   constexpr unsigned char kFirstWide = 0xE1;  // of three bytes or more, U+1000 and above
   std::size_t used = 0;

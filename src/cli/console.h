@@ -18,24 +18,25 @@ namespace tilegrad::cli {
 
 struct Command;
 
-// What the program prints beside errors.
+// What the program prints besides errors.
 enum class Verbosity {
   kFull,
-  kQuiet,  // --quiet: warnings and errors alone
+  kQuiet,  // --quiet: only warnings and errors
   kJson,   // --json: at the end one JSON object on stdout, instead of sentences
 };
 Verbosity CurrentVerbosity();
 // --quiet and --json, for every command that prints results.
 void AddVerbosityOptions(Command* command);
 
-// What a command has done, for programs: printed under --json, else nothing.
+// The result of a command, for programs: printed only under --json.
 void PrintResult(const nlohmann::ordered_json& result);
 
 // Ends the current progress line, so that output starts on a new line.
 void EndProgressLine();
 
-// As fmt::print to stdout, unless --quiet or --json. Names of files and models, and all else
-// that strangers wrote, may hold what a terminal would obey: it is shown instead (EscapeControls).
+// As fmt::print to stdout, unless --quiet or --json. Escapes what a terminal would obey
+// (EscapeControls): names of files and models, and anything else from strangers, may hold such
+// codes.
 template <class... Args>
 void Print(fmt::format_string<Args...> format, Args&&... args) {
   if (CurrentVerbosity() != Verbosity::kFull) return;
@@ -43,8 +44,8 @@ void Print(fmt::format_string<Args...> format, Args&&... args) {
   fmt::print("{}", EscapeControls(fmt::format(format, std::forward<Args>(args)...)));
 }
 
-// The same to stderr, but what cannot be written there (a full disk, a closed stream) is no reason
-// to end hours of work.
+// The same to stderr, but ignores write errors (a full disk, a closed stream), which must not end
+// hours of work.
 template <class... Args>
 void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   const std::string text = EscapeControls(fmt::format(format, std::forward<Args>(args)...));
@@ -52,7 +53,7 @@ void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
-// The same of what is no warning: under --quiet nothing.
+// The same for remarks that are no warnings: silent under --quiet.
 template <class... Args>
 void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
   if (CurrentVerbosity() != Verbosity::kQuiet) PrintNote(format, std::forward<Args>(args)...);
@@ -61,11 +62,11 @@ void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
 // Whether stdout is read interactively.
 bool OutputIsTerminal();
 
-// Says, once, that the system has refused threads.
+// Prints once that the system has refused threads.
 void PrintThreadNotice();
 
-// Opens those of the three standard streams that are closed, on /dev/null: the first files that are
-// opened would get their numbers, and the progress line would be written into a checkpoint.
+// Opens those of the three standard streams that are closed on /dev/null: otherwise the first files
+// opened would get their descriptors, and the progress line would be written into a checkpoint.
 void OpenStandardStreams();
 
 // Makes writing to a closed pipe, or beyond the limit of a file's size, an ordinary error instead
@@ -73,9 +74,9 @@ void OpenStandardStreams();
 void WritesFailWithoutSignals();
 
 // Draws "stage  12/820  1%  0:31 left  note" on stderr. On a terminal at once, rewritten in place
-// and cut to its width as it is then; stages of less than a second leave nothing. Elsewhere a line
-// every ten seconds, and one of each stage of a second or more. --quiet draws nothing at all.
-// Finish() (or a new stage, what is printed, or the destructor) ends the line.
+// and cut to its current width; stages of less than a second leave nothing. Elsewhere a line every
+// ten seconds, and one for each stage of a second or more. Nothing with --quiet. Finish() (or a new
+// stage, any output, or the destructor) ends the line.
 class ProgressLine {
  public:
   ProgressLine();
@@ -109,10 +110,10 @@ std::string FormatDuration(double seconds);
 // and checked by the readers of files. A second signal kills as usual. Signals ignored by the
 // parent (nohup, a shell's background) stay ignored.
 const StopFlag& StopOnSignals();
-// The last one that did; SIGINT if none has.
+// The last signal that set it; SIGINT if none has.
 int StopSignal();
 
-// Of the program, by how its work ended: see main.cc.
+// The program's exit code for the outcome of its work: see main.cc.
 int ExitCode(StatusCode code);
 
 }  // namespace tilegrad::cli

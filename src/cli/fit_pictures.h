@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of tilegrad fit: what it is told about its pictures.
+// The options of `tilegrad fit` that describe its pictures.
 #pragma once
 
 #include <optional>
@@ -20,8 +20,8 @@ struct FitPictures {
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch);
 void AddPictureOptions(Command* command, FitPictures* o);
 
-// Cameras of pictures alone, by COLMAP where it is installed; what it does not place, and where it
-// fails, is said, and the fit's own search comes next.
+// Finds cameras with COLMAP, if installed, for a folder of pictures alone. Prints which it cannot
+// place, or why it fails; then the fit's own search follows.
 Status TryColmap(const FitPictures& pictures, const Path& folder, const Watch& watch);
 
 }  // namespace tilegrad::cli

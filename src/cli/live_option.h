@@ -11,12 +11,12 @@ namespace tilegrad::cli {
 
 void AddLiveOption(Command* command, bool* live);
 
-// A page, once it is started.
+// A page, if started.
 class Live {
  public:
   // In the folder of a run that this process holds.
   Status Start(train::LiveSource source);
-  // What `line` is told, the page is told, too. Valid while this lives.
+  // Forwards progress to `line` and to the page. Valid while this lives.
   ProgressSink Sink(ProgressSink line);
   // As EndPage.
   void Finish(const Status& outcome);
@@ -25,7 +25,7 @@ class Live {
   std::optional<train::LivePage> page_;
 };
 
-// LivePage::Finish; what is wrong with the page is a warning.
+// LivePage::Finish; problems with the page are warnings.
 void EndPage(const Status& outcome, train::LivePage* page);
 // Prints the page's address, and opens it on a desktop.
 void ShowPage(const train::LivePage& page);

@@ -32,14 +32,14 @@ int Report(const Status& status) {
   return ExitCode(status.code());
 }
 
-// Of what was printed and cannot be: a full disk is an error, a reader that has seen enough, as
-// `head`, is none, and ends us as its signal would.
+// The exit code when output cannot be written: a full disk is an error; a reader that has seen
+// enough, such as `head`, ends us as its signal would.
 int OutputLost(int error) {
   if (error != EPIPE) PrintNote("tilegrad: standard output: {}\n", std::strerror(error));
   return error == EPIPE ? 128 + SIGPIPE : 1;
 }
 
-// What was printed may still wait in memory.
+// Output may still be buffered.
 int FlushOutput(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   return OutputLost(errno);
@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     tilegrad::cli::PrintNote("tilegrad: out of memory; try smaller images, batches or networks\n");
     return 1;
-  } catch (const std::system_error& error) {  // what was printed has nowhere to go, for one
+  } catch (const std::system_error& error) {  // for example, output cannot be written
     if (std::ferror(stdout) != 0) return tilegrad::cli::OutputLost(error.code().value());
     tilegrad::cli::PrintNote("tilegrad: system error: {}\n", error.code().message());
     return 1;

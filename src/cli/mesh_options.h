@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a mesh file does not say and a person has to: which axis is up, which image is its texture.
+// What a mesh file does not say and the user must: which axis is up, which image is its texture.
 #pragma once
 
 #include <string>
@@ -14,8 +14,8 @@ namespace tilegrad::cli {
 void AddUpOption(Command* command, UpAxis* up);
 void AddTextureOption(Command* command, std::string* file);
 
-// Puts the image on all materials without a texture, in place of their colour; nothing if `file` is
-// empty. Errors: no such material, no texture coordinates, an image that cannot be read.
+// Puts the image on all materials without a texture, in place of their colour; does nothing if
+// `file` is empty. Errors: no such material, no texture coordinates, an image that cannot be read.
 Status TakeTexture(const std::string& file, io::LoadedMesh* mesh);
 
 }  // namespace tilegrad::cli

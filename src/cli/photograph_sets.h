@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad dataset of photographs: CUB-200 and PASCAL3D+.
+// `tilegrad dataset` for photographs: CUB-200 and PASCAL3D+.
 #pragma once
 
 #include <string>
@@ -19,8 +19,8 @@ struct PhotographSetOptions {
 // Whether a source holds photographs.
 bool IsPhotographSource(const std::string& source);
 
-// Fills one folder, or one for each of several classes in it, of which those without a usable
-// photograph are named and left out.
+// Fills one folder, or a folder in it for each of several classes; names and omits classes without
+// a usable photograph.
 Status MakePhotographSets(const PhotographSetOptions& options);
 
 }  // namespace tilegrad::cli

@@ -29,7 +29,7 @@ class Ranks {
   Status Reportable(const Status& status) const {
     return follows() && status.code() == StatusCode::kCancelled ? Status() : status;
   }
-  // After an error that leaves the others waiting: the message, then the end of all.
+  // After an error that leaves the others waiting: prints the message and ends all.
   void EndIfBroken(const Status& status);
   // The same after work that each rank does by itself, with its own `status`.
   void EndIfFailed(const Status& status);

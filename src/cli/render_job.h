@@ -15,7 +15,7 @@
 namespace tilegrad::cli {
 
 struct ViewSettings {
-  std::string size;         // "W" or "WxH"; empty: what the cameras say, else 512
+  std::string size;         // "W" or "WxH"; empty: from the cameras, else 512
   std::string camera_file;  // COLMAP folder, transforms.json, OpenCV's numbers
   std::string gltf_camera;  // name, index or "all"
   std::string opencv_centre = "integer";
@@ -25,7 +25,7 @@ struct ViewSettings {
   int turntable = 0;  // views around; 0: none
 };
 
-// The camera of a world that is moved.
+// The camera after the world is moved by `by`.
 Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by);
 
 // Cameras of a mesh, as it is loaded (LoadedMesh::origin), in the order of their pictures; names
@@ -50,7 +50,7 @@ struct FileSettings {
 // Fails for an unknown output or format. Sets what the outputs need.
 Status RequestOutputs(const FileSettings& settings, PictureRequest* request);
 
-// The place of a picture without ending: for one picture `out` itself, else NAME in the folder.
+// The path of a picture without ending: `out` itself for a single picture, else NAME in the folder.
 struct PictureName {
   Path stem;
   std::string format;  // png, exr, npy

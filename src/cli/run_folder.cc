@@ -38,7 +38,7 @@ Result<int> ThreadsFromEnvironment() {
 }
 
 void AddWorkersOption(Command* command, int* workers) {
-  const auto threads = ThreadsFromEnvironment();  // main looks at its error
+  const auto threads = ThreadsFromEnvironment();  // main reports its error
   if (threads.ok()) *workers = *threads;
   command->Add("--threads", workers,
                fmt::format("number of threads; 0: one per core; results do not depend on it. "
@@ -97,8 +97,8 @@ namespace {
 
 // The run below runs/ whose last checkpoint is the newest.
 std::optional<Path> NewestRun() {
-  // By when a checkpoint was written, and by name where that is the same moment: a look at an old
-  // run (eval, report) changes its folder, too.
+  // Compares times of checkpoints, then names: time of the folder does not serve, since eval and
+  // report of an old run change it, too.
   std::optional<std::pair<std::filesystem::file_time_type, Path>> newest;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator("runs", error)) {

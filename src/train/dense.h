@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dense linear algebra in double precision, by Eigen. Matrices are square, n x n, row-major.
+// Dense linear algebra in double precision, with Eigen. Matrices are square, n x n, row-major.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ struct NormalEquations {
 
   // Adds (row . x - value)^2.
   void Add(std::span<const double> row, double value);
-  // Cholesky; nothing where `a` is not positive definite.
+  // Cholesky; nullopt if `a` is not positive definite.
   std::optional<std::vector<double>> Solve() const;
   double& Diagonal(std::size_t i) { return a[i * (b.size() + 1)]; }
 
@@ -26,8 +26,8 @@ struct NormalEquations {
 struct Eigenpairs {
   std::vector<double> values, vectors;
 };
-// Of a symmetric matrix, whose lower triangle is read; nothing where the iteration does not
-// converge (NaN).
+// The matrix is symmetric; reads its lower triangle. nullopt if the iteration does not converge
+// (NaN).
 std::optional<Eigenpairs> SymmetricEigenpairs(std::span<const double> a);
 
 // sum over k of f(values[k]) v_k v_k^T.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Typed reading of JSON objects that came from a file: the first thing that is missing or of
-// another type becomes an error that names the place and the key.
+// Typed reading of JSON objects from files: the first missing or mistyped field becomes an error
+// that names the place and the key.
 #pragma once
 
 #include <cstdint>

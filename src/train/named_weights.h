@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Installed weights: networks in a folder that the program and the Python module find by
-// themselves, so that both predict without a training. A file NAME.safetensors for each, as
-// `tilegrad export` writes it (run/checkpoint.h: WriteWeights).
+// Installed weights: networks that the program and the Python module find by themselves, so that
+// both predict without training. One NAME.safetensors for each, as `tilegrad export` writes it
+// (run/checkpoint.h: WriteWeights).
 //
-//   share/tilegrad/weights    in the folder of the program or module, or in one above it
-//   $TILEGRAD_WEIGHTS         another folder, in its place
+//   share/tilegrad/weights    in the folder of the program or module, or in a parent folder
+//   $TILEGRAD_WEIGHTS         another folder instead
 #pragma once
 
 #include <string>
@@ -14,19 +14,19 @@
 
 namespace tilegrad::train {
 
-// What is used where no run is named.
-inline constexpr const char* kCutoutWeights = "furniture";         // a cut-out to a mesh
+// The defaults where no run is named.
+inline constexpr const char* kCutoutWeights = "furniture";         // cut-out to mesh
 inline constexpr const char* kGeneratorWeights = "car-generator";  // noise to meshes
 
 inline constexpr const char* kWeightsVariable = "TILEGRAD_WEIGHTS";
 
-// Sorted; none where the folder is not there.
+// Sorted; empty without a folder of weights.
 std::vector<std::string> NamedWeights();
-// The file of that name. NotFound lists the names that there are, or says where none were found.
+// The file of that name. NotFound lists the installed names or, if there are none, says where it
+// searched.
 Result<Path> WeightsNamed(const std::string& name);
 
-// A run's folder, a checkpoint or a file of weights by its path; if nothing has that path, the
-// weights of that name, as of WeightsNamed.
+// The run folder, checkpoint or file of weights at that path; if there is none, WeightsNamed.
 Result<Path> FindRun(const Path& path_or_name);
 
 }  // namespace tilegrad::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run has trained, ready to predict, whatever its task: the one way in for eval, predict and
+// A trained network of any task, ready to predict: the only entry point for eval, predict and
 // reports.
 #pragma once
 
@@ -21,12 +21,12 @@ namespace tilegrad::train {
 
 class Predictor {
  public:
-  // `path`: a run folder (its newest whole checkpoint is taken), one checkpoint, a file of weights
-  // or the name of installed weights. Errors name the file and what is wrong.
+  // `path`: a run folder (uses its newest complete checkpoint), a checkpoint, a file of weights or
+  // the name of installed weights. Errors name the file and what is wrong.
   static Result<Predictor> Load(const Path& path, const Workers& workers);
 
-  // A file of what predicts, with those credits of its training data and CarriedFiles of its run:
-  // WriteWeights.
+  // Writes the weights that predict (WriteWeights), with the credits of the training data and the
+  // CarriedFiles of the run.
   Status ExportWeights(const Path& file, const std::string& credits, nn::StoredFloats floats) const;
 
   // Newer checkpoints of the run folder that could not be read.
@@ -34,7 +34,7 @@ class Predictor {
   const Path& checkpoint() const { return all_->found.file; }
   int image_size() const { return static_cast<int>(info().image_size); }  // pixels
   double half_extent() const { return info().half_extent; }  // of predictions, world units
-  std::int64_t step() const { return info().step; }          // steps that it has learned for
+  std::int64_t step() const { return info().step; }          // training steps taken
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;  // "quick network, 3,214,902 parameters, step 3000"
@@ -43,7 +43,7 @@ class Predictor {
   Model& model() const { return *all_->model; }      // as the task loads it
 
   // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes with
-  // smooth normals; unlit: their colours hold the light of the training images.
+  // smooth normals; unlit: the light of the training images is baked into their colours.
   Result<std::vector<Mesh>> Predict(std::span<const std::uint8_t> images) const;
 
  private:

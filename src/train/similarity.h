@@ -20,8 +20,8 @@ struct Similarity {
 // rotation, also where the orthogonal matrix nearest to m is a reflection; the identity for m = 0.
 std::array<double, 9> NearestRotation(const std::array<double, 9>& m);
 
-// Scale and offset that bring points `from` onto as many points `to` after the rotation; scale 1
-// where they do not determine a positive one.
+// Least-squares scale and offset that map the rotated points `from` to `to`, of equal count; scale
+// 1 where they determine no positive one.
 Similarity FitSimilarity(const std::array<double, 9>& rotation,
                          std::span<const std::array<double, 3>> from,
                          std::span<const std::array<double, 3>> to);

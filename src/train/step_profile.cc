@@ -17,7 +17,7 @@ constexpr int kWarmUp = 3;  // steps, after which memory has its size
 class Measured {
  public:
   explicit Measured(int workers) : workers_(workers) {}
-  // Recorded, as of that many.
+  // Recorded, as if with that many.
   Measured(int workers, LoopMachine machine)
       : workers_(workers, &trace_), machine_(machine), recorded_(true) {}
 
@@ -30,7 +30,7 @@ class Measured {
     const auto begin = std::chrono::steady_clock::now();
     const double before = ThreadSeconds();
     TILEGRAD_TRY(rehearsal_->Step());
-    // Of a single worker the processor time, as the records are.
+    // Processor time for a single worker, as in the records.
     const double seconds = workers_.count() == 1 ? ThreadSeconds() - before : SecondsSince(begin);
     if (!counts) return {};
     seconds_ = std::min(seconds_, seconds);

@@ -99,8 +99,8 @@ class PortionedUpdate {
     return {};
   }
 
-  // What comes after this rank's portion number i of a step: its next one, or the first of the
-  // step that follows.
+  // The batch after this rank's portion number i of a step: its next one, or its first one of the
+  // following step.
   std::optional<BatchIndex> NextAfter(std::size_t i, std::int64_t step,
                                       std::optional<BatchIndex> following) const {
     const auto& own = sums_->portions();
@@ -201,7 +201,7 @@ class Training : public RunWork {
     return task_.Fingerprint(job_.data, workers);
   }
 
-  // What a rank that does not lead does instead of a run.
+  // The run of a rank other than 0.
   RunOutcome Follow(nn::Context& context) {
     const std::int64_t first_step = job_.group->AwaitOrder();
     if (first_step == kEnd) return {};
@@ -239,7 +239,7 @@ class Training : public RunWork {
   }
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
-  // Returns when nothing runs beside the steps.
+  // Waits for all work beside the steps.
   void Settle() { task_.Settle(); }
 
   // The computing of a step.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Training of a task: a run (run/run.h) whose steps are the task's.
+// Trains a task: a run (run/run.h) whose steps are the task's.
 //
 //   <run>/config.toml    the complete configuration
 //   <run>/run.json       dataset, machine, versions
@@ -21,21 +21,21 @@ struct TrainJob {
   Path data;  // dataset folder
   Path run;   // run folder
   ExistingRun existing = ExistingRun::kRefuse;
-  // Of a run that is continued: `config` may ask for another number of steps than it began with.
-  // What follows a schedule over all steps then follows the new one from where the run is.
+  // Allows `config` of a resumed run to change the number of steps. Schedules over the whole run
+  // then use the new length from the present step on.
   bool extends = false;
-  // > 0: save and stop after this long; a continued run ends in the same bits.
+  // > 0: save and stop after this time; a resumed run ends in the same bits.
   double max_minutes = 0;
   // The ranks that train together, each with this job and a dataset of the same contents; null:
-  // this process alone. Only rank 0 looks at `run`.
+  // this process alone. Only rank 0 uses `run`.
   ProcessGroup* group = nullptr;
-  WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
+  WarningSink warn = nullptr;  // skipped broken checkpoints, and the task's warnings
   PictureSink drawn = nullptr;
-  std::function<Status()> begun = nullptr;  // once the run has its folder
+  std::function<Status()> begun = nullptr;  // called once the run folder exists
 };
 
-// The steps of a training without its run: nothing is written. For measurements: what a step has
-// begun for the next one is done when it returns.
+// Training steps without a run: writes nothing. For measurements: a step returns only when its
+// prefetch for the next one is done.
 class Rehearsal {
  public:
   virtual ~Rehearsal() = default;
@@ -45,7 +45,7 @@ class Rehearsal {
 Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
                                             const ProgressSink& progress, const StopFlag& stop);
 
-// As ExecuteRun. With a group, every rank calls it and rank 0's result tells; after an error with
+// As ExecuteRun. With a group, every rank calls it and rank 0's result counts; after an error with
 // ProcessGroup::broken() the ranks can only be aborted. Two runs have the same configuration if all
 // keys but these are equal: name, schedule.log_every, sample_every, checkpoint_every,
 // keep_checkpoints.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What most tests ask for: a result that is there, a text that says something, and the same on
-// every instruction set.
+// Common expectations: a result without error, a text with certain parts, and the same on every
+// instruction set.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 
 namespace tilegrad {
 
-// The result, which is there: where it is not, the test ends and says why.
+// The result; an error ends the test with its message.
 template <class T>
 Result<T> Ok(Result<T> result) {
   if (!result.ok()) throw std::runtime_error(result.status().message());

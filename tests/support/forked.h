@@ -11,8 +11,9 @@
 
 namespace tilegrad::test {
 
-// Why a child of a process with threads cannot start some; null if it can. ThreadSanitizer ends
-// such a child, and so does qemu-user, for which tests/cross sets the variable.
+// Why a forked child of a process with threads cannot start threads; null if it can.
+// ThreadSanitizer ends such a child, and so does qemu-user, for which tests/cross sets the
+// variable.
 inline const char* WhyNoFork() {
   if (kThreadSanitizer) return "ThreadSanitizer allows no threads after a fork";
   return std::getenv("TILEGRAD_TEST_NO_FORK") == nullptr

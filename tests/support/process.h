@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program in a process of its own.
+// A program in its own process.
 #pragma once
 
 #include <fcntl.h>
@@ -14,8 +14,8 @@
 
 namespace tilegrad {
 
-// Starts the program words[0]; what it prints is appended to `log`. `prepare` is called in the new
-// process before the program is.
+// Starts the program words[0]; appends its output to `log`. `prepare` is called in the new process
+// before the program is.
 inline pid_t StartProcess(
     const std::vector<std::string>& words, const Path& log, void (*prepare)() = [] {}) {
   std::vector<char*> arguments;

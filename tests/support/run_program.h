@@ -30,7 +30,7 @@ inline Outcome RunProgram(const std::string& arguments, const std::string& befor
   return outcome;
 }
 
-// A GAN of two steps, of shapes alone.
+// A GAN of two steps, shapes only.
 inline constexpr const char* kTwoStepGan = R"(name = "gan"
 [task]
 kind = "gan"
@@ -58,26 +58,26 @@ steps = 2
 batch = 2
 )";
 
-// A fixture that calls the program, with a folder of its own.
+// A fixture that runs the program, with its own folder.
 class ProgramTest : public TempFolderTest {
  protected:
   std::string In(const std::string& name) const { return (folder_ / name).string(); }
   bool Exists(const std::string& name) const { return PathExists(folder_ / name); }
 
-  // What it says.
+  // Returns its output.
   static std::string ExpectDone(const std::string& arguments, const std::string& before = "") {
     const Outcome outcome = RunProgram(arguments, before);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
     return outcome.output;
   }
-  // It says all of these.
+  // Its output has all `parts`.
   template <class... Parts>
   static void ExpectRefused(const std::string& arguments, int code, const Parts&... parts) {
     const Outcome outcome = RunProgram(arguments);
     EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
     if constexpr (sizeof...(parts) > 0) ExpectIn(outcome.output, parts...);
   }
-  // With whatever code, but neither by a signal nor for a failure of the shell itself.
+  // Any error code, but neither a signal nor a failure of the shell itself.
   template <class... Parts>
   static void ExpectError(const std::string& arguments, const Parts&... parts) {
     const Outcome outcome = RunProgram(arguments);

@@ -15,7 +15,7 @@ namespace tilegrad {
 using Json = nlohmann::json;
 
 // A file of the independent test data, which is not part of the project: below the folder that
-// TILEGRAD_SHARED names, else in "shared" beside or above the source folder. Nothing where it is
+// TILEGRAD_SHARED names, else in "shared" beside or above the source folder. nullopt if it is
 // absent; such tests skip and say so.
 inline std::optional<Json> SharedVectors(const std::string& name) {
   const Path root = TILEGRAD_SOURCE_DIR;

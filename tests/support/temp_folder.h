@@ -14,7 +14,7 @@
 
 namespace tilegrad {
 
-// A fixture with a folder of its own that is gone afterwards.
+// A fixture with its own folder, removed afterwards.
 class TempFolderTest : public testing::Test {
  protected:
   TempFolderTest()
@@ -25,7 +25,7 @@ class TempFolderTest : public testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
-  // Nothing hidden is left where somebody works.
+  // Expects that no hidden file is left behind.
   ~TempFolderTest() override {
     std::error_code error;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_, error))
@@ -58,8 +58,8 @@ class TempFolderTest : public testing::Test {
   Path folder_;
 };
 
-// `read` gives the status of a file's bytes. Of every beginning of a file, each `step` bytes
-// longer, it is an error that has `part`.
+// `read` gives the status of a file's bytes. Expects an error with `part` for every prefix of the
+// file, each `step` bytes longer.
 template <class Read>
 void ExpectCutsRefused(std::span<const std::uint8_t> whole, const std::string& part,
                        const Read& read, std::size_t step = 1) {

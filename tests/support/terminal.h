@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program on a terminal of so many columns, as a person sees it.
+// The program on a pseudo-terminal of `columns` columns.
 #pragma once
 
 #include <pty.h>
@@ -16,7 +16,7 @@ namespace tilegrad {
 
 class TerminalProgram {
  public:
-  // `arguments`: as RunProgram's, read by a shell that the program takes the place of.
+  // `arguments`: as RunProgram's, read by a shell that then becomes the program.
   TerminalProgram(const std::string& arguments, int columns) {
     const winsize size = SizeOf(columns);
     child_ = ::forkpty(&terminal_, nullptr, nullptr, &size);
@@ -35,7 +35,7 @@ class TerminalProgram {
   TerminalProgram(const TerminalProgram&) = delete;
   TerminalProgram& operator=(const TerminalProgram&) = delete;
 
-  // Whether the program says so before it ends, after the first `from` bytes of what it says.
+  // Whether the program prints `text` before it ends, after the first `from` bytes of its output.
   bool AwaitText(const std::string& text, std::size_t from = 0) {
     while (said_.find(text, from) == std::string::npos && Read()) {
     }
@@ -45,14 +45,14 @@ class TerminalProgram {
     const winsize size = SizeOf(columns);
     ::ioctl(terminal_, TIOCSWINSZ, &size);
   }
-  // As Ctrl-C, and seconds until it has ended.
+  // Interrupts it as Ctrl-C does; seconds until it has ended.
   double Interrupt() {
     const auto start = std::chrono::steady_clock::now();
     ::kill(child_, SIGINT);
     Finish();
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
-  // Waits for its end; what a shell would say of it.
+  // Waits for its end; the exit code as a shell reports it.
   int Finish() {
     while (Read()) {
     }
@@ -63,7 +63,7 @@ class TerminalProgram {
   }
 
   const std::string& said() const { return said_; }
-  // What stood in a line at a time, from the byte `from` of what was said on: between carriage
+  // The successive contents of lines, from byte `from` of the output: the text between carriage
   // returns and line breaks, without the code that erases the rest of a line.
   std::vector<std::string> Lines(std::size_t from = 0) const {
     std::vector<std::string> lines(1);

@@ -70,9 +70,9 @@ def rasterize_meshes(meshes: Any, image_size: Union[int, Sequence[int]] = 256,
     blur_radius: NDC^2.
     bin_size, max_faces_per_bin, cull_to_frustum: without meaning here: no face is ever dropped for
         want of room, and those beyond the image cost nothing.
-    z_clip_value: faces that reach nearer are left out, not cut (a warning says so).
+    z_clip_value: faces that reach nearer are dropped, not clipped, with a warning.
     Returns pix_to_face [N,H,W,K] int64, zbuf [N,H,W,K], bary_coords [N,H,W,K,3], dists [N,H,W,K];
-    -1 behind the last face of a pixel. TypeError, ValueError: as of tilegrad.compat.kaolin.
+    -1 after the last face of a pixel. TypeError, ValueError: as tilegrad.compat.kaolin.
     """
     name = "rasterize_meshes"
     vertices, faces = widened(meshes.verts_packed()), meshes.faces_packed()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Training batches. What step s sees is a pure function of (seed, s): nothing of the data order has
-// to be saved, and a resumed run goes on as if it had never stopped.
+// Training batches. The batch of step s is a pure function of (seed, s): checkpoints store no data
+// order, and a resumed run continues as if it had never stopped.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace tilegrad::train {
 // The images of some models: [models][views][4][size][size] bytes.
 struct ImageStore {
   ScratchBytes bytes;           // of these models, or of more
-  std::vector<int> rows;        // where each is among them; empty: they are these
+  std::vector<int> rows;        // index of each model in `bytes`; empty: its own
   std::vector<Camera> cameras;  // by view, the same for all models, or by model and view
   int models = 0, views = 0, size = 0;
 
@@ -40,7 +40,7 @@ struct ImageStore {
 };
 
 // Loads the images of these models, in order; errors name the file. Stops between models when
-// `stop` is set. More than `in_memory` bytes are mapped from the dataset's picture_pack.h.
+// `stop` is set. Maps more than `in_memory` bytes from the dataset's picture pack (picture_pack.h).
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
                                   const Workers& workers, const ProgressSink& progress,
                                   const StopFlag& stop,
@@ -51,12 +51,11 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
 struct Sample {
   int model = 0;
   std::vector<int> views;
-  // Shown as its mirror image at the plane x = 0: pictures flipped from left to right, cameras with
-  // MirroredCamera.
+  // Mirrored at the plane x = 0: pictures flipped from left to right, cameras with MirroredCamera.
   bool mirrored = false;
 };
 
-// Sees a world mirrored at x = 0 as `camera` sees the world, flipped from left to right; `size`:
+// Sees the world mirrored at x = 0 as `camera` sees the world, flipped from left to right; `size`:
 // pixels a row. Projection is exact: u -> size - u, depth stays.
 Camera MirroredCamera(const Camera& camera, int size);
 
@@ -68,7 +67,7 @@ class BatchOrder {
       : models_(models), views_(views), seed_(seed), mirrored_(mirrored) {}
   // `views` is at most the number of views there are.
   std::vector<Sample> Batch(const Slots& slots, int views);
-  // All of a step.
+  // The whole batch of a step.
   std::vector<Sample> Batch(std::int64_t step, int size, int views) {
     return Batch(SlotsOf(step, size), views);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Members of a set that cannot be used. Each costs itself; too many end the run, because then the
-// folder is another one, or half a download.
+// Unusable members of a set. Each is skipped; too many are an error, because the folder is then a
+// wrong one or an incomplete download.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +20,11 @@ class BrokenMembers {
     members_.emplace_back(name, reason);
   }
   std::size_t count() const { return members_.size(); }
-  // InvalidArgument where more than kMostShare of `total` are broken, unless `allow`: how many, the
-  // first of them, and that --allow-broken goes on without them.
+  // InvalidArgument if more than kMostShare of `total` are broken, unless `allow`: says how many,
+  // names the first of them, and that --allow-broken skips them.
   Status Check(std::size_t total, bool allow) const;
-  // A line for each reason: how many have it, and the first five of them; empty if there are none.
-  // Reasons mostly begin with the file: what is the same in several is what follows it.
+  // A line for each reason: the number of members and the first five; empty if there are none.
+  // Groups reasons without the file name with which most of them begin.
   std::string Summary() const;
 
  private:

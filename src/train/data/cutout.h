@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// People's own pictures, brought into the form of training images.
+// Converts users' own pictures to the form of training images.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 namespace tilegrad::train {
 
 enum class Framing {
-  kFit,   // the object is moved to the middle and scaled as training renders show theirs
-  kKeep,  // the picture is only resized: it is framed like a training image already
+  kFit,   // centres and scales the object as in training renders
+  kKeep,  // only resizes: the picture is framed like a training image already
 };
 
 // image: with straight alpha, RGBA or grey. Returns planar [4][size][size] bytes, RGB composited
@@ -26,12 +26,12 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& image, int size, 
 // 0.4571).
 inline constexpr double kTrainingFill = 0.679;
 
-// The object's share of each pixel, 255 inside: alpha where some of the picture is transparent;
-// else grey, of the first channel, as programs save masks in RGBA files, too.
+// The object's share of each pixel, 255 inside: alpha if any of the picture is transparent; else
+// the first channel as grey, since programs save masks in RGBA files, too.
 std::vector<std::uint8_t> MaskValues(const ImageU8& mask);
 
-// Puts the values of a mask as alpha on an RGB image of the same size; other sizes
-// are an error that says both.
+// Sets a mask as the alpha of an RGB image of the same size; other sizes are an error that names
+// both.
 Result<ImageU8> WithMask(const ImageU8& rgb, const ImageU8& mask);
 
 }  // namespace tilegrad::train

@@ -7,7 +7,7 @@
 //   <folder>/rejected.jsonl            models that could not be used: id, class, file, reason
 //   <folder>/models/<class>/<id>.npz   ModelData: images, occupancy, points, mesh
 //   <folder>/contact_sheet.png         to look at
-//   <folder>/pictures.bin              of large sets, written by trainings (picture_pack.h)
+//   <folder>/pictures.bin              for large sets, written by training (picture_pack.h)
 #pragma once
 
 #include <cstdint>
@@ -40,9 +40,9 @@ struct DatasetInfo {
   std::vector<std::string> classes;  // sorted; ModelInfo::class_index points here
   std::vector<std::string> credits;  // one sentence a source
   std::string input;                 // absolute folder of the models, of "shapenet"; else empty
-  std::string recipe;                // 16 hex digits over all that shapes the model files
-  UpAxis up = UpAxis::kY;            // of the source's meshes; only while the files are made
-  bool own_cameras = false;          // each model has its own; `camera` is what they are like
+  std::string recipe;                // 16 hex digits, a hash of all that determines the model files
+  UpAxis up = UpAxis::kY;            // of the source's meshes; used only while building
+  bool own_cameras = false;          // each model has its own cameras, similar to `camera`
 };
 
 // `count` of `views`, evenly spread: 0, step, 2 step, ...
@@ -56,30 +56,31 @@ struct ModelInfo {
   int class_index = 0;
   Split split = Split::kTrain;
   std::string license, creator;  // empty where unknown
-  int source_faces = 0;          // triangles before anything was done to it
+  int source_faces = 0;          // triangles of the source's mesh
   std::uint64_t geometry = 0;    // equal for copies of one mesh in other colours; 0: no mesh
   std::string shape = {};        // the same for one shape with other textures; empty: its own
 };
 
-// What a model is counted by: its shape where it shares one, else itself. Unique in its class.
+// The unit in which models are counted: the shape that a model shares, else itself. Unique in its
+// class.
 inline const std::string& ShapeOf(const ModelInfo& model) {
   return model.shape.empty() ? model.id : model.shape;
 }
-// Of these models: each shape of a class once.
+// Counts each shape of a class once.
 std::size_t CountShapes(const std::vector<ModelInfo>& models);
 
 inline constexpr int kOccupancyResolution = 32;  // voxels a side
-inline constexpr int kTruthPoints = 2500;        // as the official code takes for the F-score
+inline constexpr int kTruthPoints = 2500;        // as in the official code, for the F-score
 inline constexpr int kTruthFaces = 5000;
 
 struct ModelData {
   // [views][4][size][size], planar RGBA, row 0 on top. RGB is composited over black (premultiplied
   // by the anti-aliased alpha).
   std::vector<std::uint8_t> images;
-  // Of the views; empty unless DatasetInfo::own_cameras (CamerasOf).
+  // By view; empty unless DatasetInfo::own_cameras (CamerasOf).
   std::vector<Camera> cameras = {};
   // [32][32][32] as [x][y][z], 0 or 1: solid occupancy of the mesh scaled to fill the cube
-  // (train/metrics/metrics.h says the rule).
+  // (by which rule: train/metrics/metrics.h).
   std::vector<std::uint8_t> occupancy;
   // kTruthPoints area-weighted samples of the surface; largest half-extent 0.45. Empty where the
   // source has no meshes ("nmr").
@@ -89,13 +90,13 @@ struct ModelData {
   Mesh mesh;
 };
 
-// Of the views of a model that are `own`, or those that all models have.
+// The cameras of a model's views: `own` or, if that is empty, those of all models.
 std::vector<Camera> CamerasOf(const DatasetInfo& info, const std::vector<Camera>& own);
 
 class Dataset {
  public:
   // Reads the two index files; errors name the file and the line or key. Model files are read by
-  // Load. A folder whose making was interrupted has no models.jsonl yet, and the error says so.
+  // Load. An unfinished dataset has no models.jsonl yet, and the error says so.
   static Result<Dataset> Open(const Path& folder);
 
   const Path& folder() const { return folder_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The files of a dataset (dataset.h says which there are): writing them, and reading them back with
-// every size checked.
+// The files of a dataset (listed in dataset.h): writes them, and reads them back with every size
+// checked.
 #pragma once
 
 #include <string>
@@ -17,9 +17,9 @@ struct RejectedModel {
   std::string reason;
 };
 
-// What a model file says about itself besides its data.
+// The metadata of a model file.
 struct ModelStamp {
-  std::string recipe;          // of the dataset that it was made for, DatasetInfo::recipe
+  std::string recipe;          // of its dataset, DatasetInfo::recipe
   std::uint64_t geometry = 0;  // as ModelInfo::geometry
   int source_faces = 0;        // as ModelInfo::source_faces
 };
@@ -32,7 +32,7 @@ Path RejectedPath(const Path& folder);
 Path ContactSheetPath(const Path& folder);
 Path PicturesPath(const Path& folder);  // picture_pack.h
 Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id);
-// Takes away the files of a dataset; others in its folder stay.
+// Removes the files of a dataset and keeps others in its folder.
 Status RemoveDataset(const Path& folder);
 
 Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info);
@@ -47,10 +47,9 @@ Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData&
                      const ModelStamp& stamp);
 Result<ModelData> LoadModelFile(const Path& path, const DatasetInfo& info);
 Result<std::vector<std::uint8_t>> LoadModelImages(const Path& path, const DatasetInfo& info);
-// Of a dataset whose models have cameras of their own.
+// For a dataset with DatasetInfo::own_cameras.
 Result<std::vector<Camera>> LoadModelCameras(const Path& path, const DatasetInfo& info);
-// Reads the whole file, so that a broken one is found; an error if it is, or if it belongs to
-// another recipe.
+// Reads the whole file; an error if it is broken or belongs to another recipe.
 Result<ModelStamp> VerifyModelFile(const Path& path, const DatasetInfo& info);
 
 }  // namespace tilegrad::train

@@ -151,7 +151,7 @@ Path ModelFilePath(const Path& folder, const std::string& class_name, const std:
   return folder / kModelFolder / class_name / (id + kModelEnding);
 }
 
-// What marks the folder as ours last.
+// Removes the file that marks the folder as ours last.
 Status RemoveDataset(const Path& folder) {
   std::vector<Path> files = {ModelsPath(folder), RejectedPath(folder), ContactSheetPath(folder),
                              PicturesPath(folder)};

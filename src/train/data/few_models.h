@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Datasets that are too small for a network to learn anything from but themselves.
+// Datasets so small that a network only memorises them.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace tilegrad::train {
 
-// Fewer training shapes (CountShapes) than this are few; streaming (data/stream) makes variants of
-// each, so that less do.
+// Fewer training shapes (CountShapes) than this are too few; streaming (data/stream) makes variants
+// of each, so that fewer suffice.
 inline constexpr std::size_t kFewShapes = 50, kFewStreamedShapes = 20;
 
-// What to do about it, if the training models among these are few.
+// Advice for the user, if the training models among these are too few.
 std::optional<std::string> AdviceOnFewModels(const std::vector<ModelInfo>& models, bool streamed);
 
 }  // namespace tilegrad::train

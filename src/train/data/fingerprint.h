@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run learns from, as 16 hexadecimal digits: ranks that are to work together compare them.
-// Errors name the file.
+// Fingerprint of training data, 16 hexadecimal digits, which ranks compare before they train
+// together. Errors name the file.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace tilegrad::train {
 
-// Of the index and every model file of a dataset or, if the folder holds photographs, of every
-// picture and of what is known of it.
+// Covers the index and every model file of a dataset or, if the folder holds photographs, every
+// picture and its annotations.
 Result<std::string> DataFingerprint(const Path& folder, const Workers& workers);
-// Of one file, and of a fingerprint that it belongs to.
+// Combines `fingerprint` with that of one file.
 Result<std::string> WithFile(const std::string& fingerprint, const Path& file);
 
 }  // namespace tilegrad::train

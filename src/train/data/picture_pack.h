@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// All pictures of a dataset, unpacked, in one file that trainings map: more than the memory holds,
-// and minutes to unpack at each start.
+// All pictures of a dataset, unpacked, in one file that training maps: they may exceed memory, and
+// unpacking them at each start takes minutes.
 //
 //   <dataset>/pictures.bin   [models][views][4][size][size] bytes in the order of models.jsonl,
 //                            then a line with the format and a checksum over the model files
 //
-// It stands for the model files as long as that line does; the next training writes another.
+// It is valid as long as that line matches the model files; otherwise the next training rewrites
+// it.
 #pragma once
 
 #include <optional>
@@ -19,15 +20,15 @@
 
 namespace tilegrad::train {
 
-// take(i, the images of models[i]), from any thread. Errors: kCancelled; of a
-// model file, which is named; of `take`.
+// Calls take(i, the images of models[i]), from any thread. Errors: kCancelled; those of a model
+// file, which they name; those of `take`.
 Status UnpackPictures(const Dataset& dataset, const std::vector<int>& models,
                       const Workers& workers, const Watch& watch,
                       FunctionRef<Status(std::size_t, std::span<const std::uint8_t>)> take);
 
-// The file's pictures, mapped; it is written first if it is missing, or of other model files. One
-// process writes at a time, and the others wait for it. Nothing where the folder may not be written
-// to, or the disk is too full. Errors: as above.
+// Maps the file's pictures; writes it first if it is missing or does not match the model files. One
+// process writes at a time, and the others wait. nullopt if the folder is not writable or the disk
+// too full. Errors: as above.
 Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset, const Workers& workers,
                                                     const Watch& watch);
 

@@ -20,10 +20,10 @@ struct SplitRule {
 std::uint64_t HashText(std::string_view text, std::uint64_t seed);
 
 // Sets models[i].split. Models of one class with the same `geometry` (not 0) or the same `shape`
-// form a group that is never divided. Groups are put in the order of a hash of seed, class and
-// shape (ShapeOf); the first whose shapes fit into the share are the test set, then validation, and
-// the rest train: a shape with many textures counts once. A class of two
-// groups or more has at least one training model and, if test_share is above 0, one test model.
+// form a group that is never divided. Groups are ordered by a hash of seed, class and shape
+// (ShapeOf); the first whose shapes fit into the share are the test set, then validation, and the
+// rest train: a shape with many textures counts once. A class of two groups or more has at least
+// one training model and, if test_share is above 0, one test model.
 void SplitModels(const std::vector<std::string>& classes, const SplitRule& rule,
                  std::vector<ModelInfo>* models);
 

@@ -27,7 +27,7 @@ std::string TextOf(const Dataset& dataset) {
   return text;
 }
 
-// What the models look like: the cameras of all, and a fingerprint of each file.
+// The contents of the models: the cameras of all, and a fingerprint of each file.
 Result<std::string> ContentsOf(const Dataset& dataset) {
   const DatasetInfo& info = dataset.info();
   const CameraRule& c = info.camera;
@@ -45,8 +45,7 @@ Result<std::string> ContentsOf(const Dataset& dataset) {
   return text;
 }
 
-// What two lines have in common that are of one mesh, in whatever colours; without a mesh, the
-// line.
+// The part that lines of one mesh share, whatever its colours; the whole line without a mesh.
 std::string MeshOf(const std::string& line) {
   return line.starts_with("0000000000000000 ") ? line : line.substr(0, line.find('/'));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which models a run was trained on, in its folder: a dataset can be split anew or made again under
-// the same name, and then neither goes a run on with it, nor are its test models held out.
+// Records in the run folder which models a run was trained on: a dataset may be split again or
+// rebuilt under the same name, and then the run cannot be resumed with it, nor are its test models
+// held out.
 //
 //   <run>/training_models.txt    a line "recipe <hex>", then one "<geometry> <class>/<id>" for each
 //                                model, as the dataset lists them, a line "camera ..." and one
@@ -12,13 +13,13 @@
 
 namespace tilegrad::train {
 
-// Writes the list of a new run, whose `first_step` is 0; compares with that of a run that goes on:
+// Writes the list of a new run (`first_step` 0); compares with that of a resumed run:
 // InvalidArgument names the first model, camera or file that differs. A run of an earlier version
-// has no list, or none of cameras and files, and gets one.
+// without a list, or without cameras and files in it, gets one.
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step);
 
 // InvalidArgument if the run was trained on models of the dataset's `split`, or on other colours of
-// their meshes. Fine for a run without a list. `run`: as of ReadRunFile.
+// their meshes. OK for a run without a list. `run`: as for ReadRunFile.
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split = Split::kTest);
 
 }  // namespace tilegrad::train

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scores of models to those of classes: mean over the models of a shape (ShapeOf), over the shapes
-// of a class, and over classes.
+// Averages scores of models over the models of a shape (ShapeOf), over the shapes of a class, and
+// over classes.
 #pragma once
 
 #include <map>
@@ -32,20 +32,20 @@ class ClassMeans {
   std::vector<int> class_models_;
 };
 
-// How far means over held-out models would move with another draw of models.
+// The sampling error of means over held-out models.
 
 struct ClassedMean {
   double mean = 0;              // over classes of means over shapes
   std::optional<double> error;  // its standard error; none: no class has two shapes
 };
 
-// classes[c]: a number of each shape of a class; classes without any do not count. Classes are
-// fixed and shapes are drawn from them; the spread within a class is taken to be the same in all,
-// since few have more than a handful.
+// classes[c]: a number for each shape of a class; empty classes do not count. Treats classes as
+// fixed and shapes as drawn from them, and pools the variance within classes, since few have more
+// than a handful.
 ClassedMean MeanOverClasses(std::span<const std::vector<double>> classes);
 
-// The errors of all measures, each over the shapes that have it; a measure without one is not
-// there. None where iou, which all have, has none.
+// The standard errors of all measures, each over the shapes that have it, where there is one;
+// nullopt if iou, which all have, has none.
 std::optional<Score> StandardErrors(std::span<const std::vector<Score>> classes);
 
 // Two runs on the same held-out models. Models differ far more than runs do, so the difference of
@@ -54,19 +54,19 @@ std::optional<Score> StandardErrors(std::span<const std::vector<Score>> classes)
 struct PairedDifference {
   const ScoreMeasure* measure;
   ClassedMean difference;  // of the first run minus the second
-  // Less than two standard errors, or one that is not known.
+  // Less than two standard errors, or the error is unknown.
   bool tie() const;
   bool better() const { return (difference.mean > 0) != measure->less_is_better; }
 };
 
 struct PairedComparison {
   std::string predictor;                   // of the second run
-  int models = 0;                          // that both have scores of
+  int models = 0;                          // scored in both
   std::vector<PairedDifference> measures;  // that all of these have in both
 };
 
-// By the models of Evaluation::models that both have: mean over the models of a shape, over shapes
-// and over classes. An error where there are none.
+// Over the models that both have in Evaluation::models: mean over the models of a shape, over
+// shapes and over classes. An error if there are none.
 Result<PairedComparison> ComparePaired(const Evaluation& first, const Evaluation& second);
 
 // A line a measure: "3D IoU  +1.3 ± 0.4  better".

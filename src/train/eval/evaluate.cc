@@ -18,7 +18,7 @@ constexpr int kColorViews = 4;  // that colours are compared in
 // The training models, for the baselines that know nothing else.
 struct TrainingShapes {
   std::vector<std::vector<std::uint8_t>> grids;  // of each shape, once
-  // Of those whose pictures are searched, in the order of `index`.
+  // Of the models whose pictures are searched, in the order of `index`.
   std::vector<Shape> shapes;
   std::vector<std::vector<std::uint8_t>> color_images;  // [kColorViews][4][size][size] each
   ImageIndex index;

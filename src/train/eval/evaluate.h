@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How good a predictor is on models that it never saw: the paper's Table 1 with three baselines
-// (section 5.1).
+// Evaluates a predictor on held-out models: the paper's Table 1 with three baselines (section 5.1).
 #pragma once
 
 #include <functional>
@@ -30,17 +29,17 @@ struct EvaluationJob {
   FitFunction oracle{};      // the row "oracle"; none: no such row
   Mesh template_mesh;        // the baseline "undeformed template"
   int views_per_model = 24;  // evenly spread over the dataset's views; at most all of them
-  // Training models whose pictures are searched for the one nearest to each input; of more models
-  // these are spread evenly over all. With 24 views each a search takes some milliseconds, and the
-  // shapes take 200 MB. 0: that baseline is left out, as it is of training models' scores.
+  // Training models whose pictures are searched for the nearest to each input, spread evenly over
+  // all if there are more. With 24 views each a search takes some milliseconds, and the shapes take
+  // 200 MB. 0: no such baseline; scores of training models never have it.
   int retrieval_models = 1000;
   VoxelJob voxels{};      // with the half-extent of predictions
   std::string predictor;  // Predictor::description, for the heading
   ProcessGroup* group =
-      nullptr;  // of ranks that score models together; only on rank 0 are scores whole
+      nullptr;  // the ranks that score models together; only rank 0 gets complete scores
 };
 
-// One score for each model and view, mean over the views, then over the models of a shape
+// One score for each model and view, averaged over the views, then over the models of a shape
 // (ShapeOf), over the shapes of a class, and over classes. Same bits for any worker count. Errors:
 // no model in the split or none to train on, a model file that cannot be read, a failed prediction;
 // kCancelled when `stop` is set.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scores of a prediction beside baselines: by method and class, and by model. Written by
-// `tilegrad eval`, read by reports.
+// Scores of a prediction and of baselines, by method and class, and by model. Written by `tilegrad
+// eval`, read by reports.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -12,18 +12,18 @@
 
 namespace tilegrad::train {
 
-// The row of tasks that predict light whose light is the same for all pictures.
+// For tasks that predict light: the row with one light for all pictures.
 inline constexpr const char* kMeanLightRow = "mean light";
 
-// By whose rule the voxels of an IoU are made: ours (Voxelize), binvox's as the paper ran it
-// (VoxelizeCarved), or N3MR's (VoxelizeNmr).
+// The voxelization rule of an IoU: ours (Voxelize), binvox's as the paper ran it (VoxelizeCarved),
+// or N3MR's (VoxelizeNmr).
 enum class VoxelRule { kOurs, kBinvox, kNmr };
 inline constexpr const char* kVoxelRuleNames[] = {"ours", "binvox", "nmr"};
 
 inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
 
 struct Score {
-  // What methods are compared by, in [0, 1]; more is better.
+  // The score that compares methods, in [0, 1]; higher is better.
   double main() const {
     if (pck) return *pck;
     if (mask_loss) return 1 - *mask_loss;
@@ -32,18 +32,17 @@ struct Score {
 
   double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; Evaluation::voxels
   std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
-  // Share of pictures whose class was told right, of tasks that classify: `iou` means nothing then.
+  // Share of pictures classified correctly, for tasks that classify; `iou` is meaningless then.
   std::optional<double> accuracy = std::nullopt;
   // As iou, with voxels of VoxelizeCarved: the paper's rule; none: the truth has no mesh.
   std::optional<double> carved_iou = std::nullopt;
   // Mean |difference| of colour, [0, 1], over the channels and the pixels that the object or its
-  // prediction covers, black beyond them, in views of the dataset; none: of a shape without
+  // prediction covers, black beyond them, in views of the dataset; none for a shape without
   // colours.
   std::optional<double> color_l1 = std::nullopt;
-  // The same where both are, each covering half of a pixel or more, of the colours of what covers
-  // it: how well it is painted, whatever its outline (1: nowhere are both). Then this over the
-  // faces of a prediction that are seen in the picture that it was made from, and over its other
-  // faces.
+  // The same over pixels of which both cover half or more, between the colours of what covers them:
+  // the quality of the paint, whatever the outline (1: no such pixel). Then this over the faces of
+  // a prediction that its input picture shows, and over its other faces.
   std::optional<double> shared_color_l1 = std::nullopt, seen_color_l1 = std::nullopt,
                         hidden_color_l1 = std::nullopt;
   // Table 2 of the paper, of tasks that predict texture and light. Mean |difference| over all
@@ -53,7 +52,7 @@ struct Score {
   std::optional<double> texture_l1 = std::nullopt, lit_l1 = std::nullopt,
                         light_angle = std::nullopt;
   // Table 3, of tasks that learn from photographs, with texture_l1: 1 - IoU of silhouettes, and the
-  // share of visible keypoints that are right (metrics/metrics.h). `iou` means nothing then.
+  // share of visible keypoints that are correct (metrics/metrics.h). `iou` is meaningless then.
   std::optional<double> mask_loss = std::nullopt, pck = std::nullopt;
 };
 
@@ -104,7 +103,7 @@ std::string FormatMarkdown(const Evaluation& evaluation);
 // What eval.json holds.
 nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation);
 Status WriteEvaluation(const Path& run, const Evaluation& evaluation);
-// What WriteEvaluation wrote; nothing if there is no eval.json.
+// What WriteEvaluation wrote; nullopt without eval.json.
 Result<std::optional<Evaluation>> ReadEvaluation(const Path& run);
 
 }  // namespace tilegrad::train

@@ -178,7 +178,7 @@ constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
 
 constexpr const char* kThumbnails = "thumbnails.npz";  // of a run
 
-// Which of `count` are taken so that at most `most` are, evenly spread.
+// Indices of at most `most` of `count` items, evenly spread.
 std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
   const std::size_t taken = std::min(count, most);
   std::vector<std::size_t> out;
@@ -312,7 +312,7 @@ Status TrainingPictures::Write(const Path& run) const {
                       {"count", io::MakeNpy<std::int64_t>({1}, {&count_, 1})}});
 }
 
-// What the arrays of a file say of each other.
+// Checks that the arrays of a file agree.
 Status TrainingPictures::Check() const {
   if (pictures_.size() != of_.size() * kPictureBytes || of_.size() > kMostThumbnails)
     return DataLoss("{} bytes of {} pictures", pictures_.size(), of_.size());

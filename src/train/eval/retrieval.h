@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The training picture that is most like another one: a baseline that remembers, and a measure of
-// how unlike its training data an input is.
+// The nearest training picture: a baseline that only memorises, and a measure of how unlike the
+// training data an input is.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@
 
 namespace tilegrad::train {
 
-// Pictures averaged to kThumbnail x kThumbnail, RGBA: smaller differences of pose count less there,
-// and a search takes a sixteenth of the time.
+// Pictures averaged to kThumbnail x kThumbnail, RGBA: small differences of pose matter less, and a
+// search takes a sixteenth of the time.
 inline constexpr int kThumbnail = 16;
 
 // [4][kThumbnail][kThumbnail] of planar RGBA [4][size][size]; `size` is a multiple of kThumbnail,
@@ -38,7 +38,7 @@ class ImageIndex {
 
   // Pictures [views][4][size][size] of one model; models count from 0 in the order of calls.
   void Add(std::span<const std::uint8_t> images, int views, int size);
-  // The first of equals. There is at least one picture.
+  // The first of ties. Needs at least one picture.
   Match Nearest(std::span<const std::uint8_t> image, int size) const;
   std::size_t size() const { return entries_.size(); }
 
@@ -51,36 +51,36 @@ class ImageIndex {
   int models_ = 0;
 };
 
-// The best answer that does not look at the image: the mean shape of the training models.
+// The best prediction that ignores the image: the mean shape of the training models.
 
 struct SingleShape {
-  std::vector<std::uint8_t> occupancy;  // as the grids it was made of
+  std::vector<std::uint8_t> occupancy;  // in the layout of the grids
   double threshold = 0;                 // a voxel is solid if this share of the grids has it
   double mean_iou = 0;                  // over the grids
 };
 
-// Of all thresholds k/256 the one with the best mean IoU over `grids`, which have one size and hold
-// 0 or 1; the lowest of equals. At least one grid.
+// Uses the threshold k/256 with the best mean IoU over `grids`, which have one size and hold 0 or
+// 1; the lowest of ties. At least one grid.
 SingleShape BestSingleShape(std::span<const std::vector<std::uint8_t>> grids);
 
 // The faces between solid and empty voxels of [n][n][n] as a closed mesh in voxel units, outside
-// counter-clockwise. Every solid voxel brings its own corners.
+// counter-clockwise. The squares share no vertices.
 Mesh VoxelSurface(std::span<const std::uint8_t> occupancy, int n);
 
-// The pictures that a run is trained on, small, in its folder: whether another picture is like
-// them can then be said without the dataset.
+// Thumbnails of a run's training pictures, in its folder: other pictures can be compared with them
+// without the dataset.
 //
 //   <run>/thumbnails.npz    written when training starts, some 3 MB; runs of earlier versions have
 //                           none
 
-// At most so many are kept, spread evenly over all: 8 MB before compression.
+// The most thumbnails kept, spread evenly over all: 8 MB before compression.
 inline constexpr std::size_t kMostThumbnails = 8192;
 inline constexpr int kThumbnailSize = 16;  // pixels a side
 
-// A picture is unlike them all when the nearest is further away than kUsualShare of the training
-// pictures have the nearest one of another shape, measured at up to kMostMeasured of them. Held-out
-// models keep that distance as the training models among themselves do: one picture in ten is
-// warned of that need not be.
+// A picture is unlike them all if its nearest one is farther than a limit: the distance within
+// which kUsualShare of the training pictures, of which up to kMostMeasured are measured, have the
+// nearest one of another shape. Held-out models are as far from training models as these are from
+// each other, so one picture in ten gets a needless warning.
 inline constexpr double kUsualShare = 0.9;
 inline constexpr std::size_t kMostMeasured = 1024;
 
@@ -92,23 +92,23 @@ class TrainingPictures {
                           // what either picture covers, at kThumbnailSize pixels a side
   };
 
-  // The dataset's training models, whose images `store` holds in the order of Select. Objects are
-  // moved and scaled as PrepareCutout does with Framing::kFit, so that where an object stands in a
-  // picture makes no difference; pictures where nothing is opaque, or all, are left out.
+  // The dataset's training models, whose images `store` holds in the order of Select. Moves and
+  // scales objects as PrepareCutout does with Framing::kFit, so that their place in the picture
+  // does not matter; skips pictures where nothing is opaque, or all.
   static TrainingPictures Of(const Dataset& dataset, const ImageStore& store,
                              const Workers& workers);
-  // Of a run folder, of that of one checkpoint, or as a file of weights carries them; nothing if
-  // there is no such file. Errors name the file and what is wrong.
+  // From a run folder, from that of a checkpoint, or from a file of weights; nullopt if it has
+  // none. Errors name the file and what is wrong.
   static Result<std::optional<TrainingPictures>> Read(const Path& run);
   Status Write(const Path& run) const;
 
-  // Of pictures that the run was trained on; more than are kept.
+  // The number of the run's training pictures, of which not all may be kept.
   std::int64_t count() const { return count_; }
-  // The distance that kUsualShare keep; none where there is no second shape.
+  // The limit of kUsualShare; nullopt if there is no second shape.
   std::optional<double> usual() const;
-  // Whether it is further away; false where there is nothing to compare with.
+  // Whether it is farther than usual(); false without that.
   bool IsUnlike(const Match& match) const;
-  // image: as PrepareCutout takes it, framed in any way; its errors. None where none is kept.
+  // image: as PrepareCutout takes it, framed in any way; its errors. nullopt if no picture is kept.
   Result<std::optional<Match>> Nearest(const ImageU8& image) const;
 
  private:
@@ -122,7 +122,7 @@ class TrainingPictures {
     std::size_t picture;
     double square;  // of the distance
   };
-  // The first of the nearest among those that may_match(i); none if there is none.
+  // The nearest of those with may_match(i), the first of ties; nullopt if there is none.
   template <class MayMatch>
   std::optional<Found> Search(std::span<const std::uint8_t> small, const MayMatch& may_match) const;
   Status Load(const RunFile& file);
@@ -131,7 +131,7 @@ class TrainingPictures {
 
   std::int64_t count_ = 0;
   std::vector<Model> models_;
-  std::vector<std::int32_t> of_;        // model of each that is kept
+  std::vector<std::int32_t> of_;        // model of each one kept
   std::vector<std::uint8_t> pictures_;  // [kept][4][kThumbnailSize][kThumbnailSize]
   std::vector<float> others_;           // distances to the nearest of another shape, ascending
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a shape is from the truth.
+// Scores a shape against the truth.
 #pragma once
 
 #include <cstdlib>
@@ -15,14 +15,14 @@
 
 namespace tilegrad::train {
 
-// What is compared: both sides normalised to fill the same cube.
+// One side of a comparison; both are normalised to fill the same cube.
 struct Shape {
   std::vector<std::uint8_t> occupancy;  // of Voxelize
   std::vector<std::uint8_t> carved;     // of VoxelizeCarved; empty: unknown
   std::vector<glm::vec3> points;        // of the surface; empty: unknown
 };
 
-// By which the voxels that come with a set are made: DatasetInfo::source.
+// The rule behind the voxels that come with a set, by DatasetInfo::source.
 VoxelRule OwnVoxelRule(const std::string& source);
 
 struct VoxelJob {
@@ -32,22 +32,21 @@ struct VoxelJob {
 
 // `seed`: of the points.
 Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed, const VoxelJob& voxels = {});
-// As the dataset keeps it, which has them by its `own` rule; by another one only where there is a
-// mesh to make them from. An error for a mesh without extent.
+// The truth of a dataset, whose voxels follow its `own` rule; another rule needs a mesh to
+// voxelise. An error for a mesh without extent.
 Result<Shape> TruthShape(const ModelData& data, VoxelRule own = VoxelRule::kOurs,
                          const VoxelJob& voxels = {});
 
 Score Compare(const Shape& shape, const Shape& truth);
-// Of a prediction that has no shape.
+// The score of a prediction without a shape.
 Score WorstScore(const Shape& truth);
-// The mean; a measure that is not there in one is not there in the mean.
+// The mean; it lacks any measure that one of the scores lacks.
 Score MeanScore(std::span<const Score> scores);
 
-// What is known of a pixel of a prediction: whether the picture that it was made from shows this
-// part of it.
+// Whether the input picture shows the part of the prediction at a pixel.
 enum class Side : std::uint8_t { kUnknown, kSeen, kHidden };
 
-// The colour measures of a Score, over pictures that are added one by one.
+// Accumulates the colour measures of a Score, picture by picture.
 struct ColorDifference {
   struct Sum {
     double sum = 0;
@@ -69,7 +68,7 @@ struct ColorDifference {
   void To(Score* score) const;
 };
 
-// Pictures of predictions as a dataset has them of its models: unlit, RGB over black.
+// Draws predictions like a dataset's pictures of its models: unlit, RGB over black.
 class PredictionPictures {
  public:
   PredictionPictures(const DatasetInfo& info, std::vector<int> views);
@@ -94,15 +93,15 @@ class PredictionPictures {
   PictureRenderer renderer_;
 };
 
-// All measures of a Score, in the order in which files and tables have them.
+// All measures of a Score, in the order of files and tables.
 
 struct ScoreMeasure {
   const char* key;                      // of eval.json
   std::optional<double> Score::*value;  // null: `iou`, which every score has
   const char* heading;
-  double factor;  // of the number that people read
-  int digits;     // of it, behind the point
-  bool column;    // has its own column in tables; else it stands in the cells of classes
+  double factor;  // for the number shown to people
+  int digits;     // of that, after the point
+  bool column;    // has its own column in tables; else shown in the cells of classes
   bool less_is_better;
 
   std::optional<double> Of(const Score& score) const {

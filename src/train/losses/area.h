@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The area of a mesh's surface. A face with n = (b - a) x (c - a) has the area |n| / 2, and
-// dA/da = n / |n| x (c - b) / 2, and so on around.
+// dA/da = n / |n| x (c - b) / 2, and cyclically for b and c.
 #pragma once
 
 #include <cmath>
@@ -49,10 +49,10 @@ inline double SurfaceArea(std::span<const Face> faces, std::span<const float> p)
 nn::Var AreaLoss(const nn::Var& positions, std::span<const Face> faces);
 
 // The edge-length regulariser: the variance of the lengths of a mesh's edges over the square of
-// their mean, n sum l^2 / (sum l)^2 - 1. 0 where all are equal; the size of the mesh does not
-// matter, so it never shrinks it.
+// their mean, n sum l^2 / (sum l)^2 - 1. 0 if all are equal; independent of the mesh's size, so it
+// never shrinks it.
 
-// Over all edges; in double, since the loss is what little remains of their quotient.
+// Over all edges; in double, because the loss is the small difference of their quotient from 1.
 struct EdgeSums {
   double length = 0, square = 0;
 };
@@ -81,15 +81,15 @@ double EdgeLengthForward(const Topology& topology, std::span<const T> p, EdgeSum
   return edges * sums->square / (sums->length * sums->length) - 1;
 }
 
-// d_p += scale times the gradient: dL/dl = 2 n (l - square / length) / length^2. An edge without
-// length has no direction and pulls nothing.
+// d_p += scale times the gradient: dL/dl = 2 n (l - square / length) / length^2. An edge of length
+// 0 has no direction and no gradient.
 template <class T>
 void AddEdgeLengthGradient(const Topology& topology, std::span<const T> p, const EdgeSums& sums,
                            T scale, std::span<T> d_p) {
   if (!(sums.length > 0)) return;
   const double factor = 2 * static_cast<double>(scale) *
                         static_cast<double>(topology.edges.size()) / (sums.length * sums.length);
-  const double balance = sums.square / sums.length;  // an edge of this length is left alone
+  const double balance = sums.square / sums.length;  // an edge of this length has no gradient
   for (const Edge& e : topology.edges) {
     const T length = EdgeLength(p, e);
     if (!(length > T(0))) continue;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equation 16: images compared by what the layers of a network make of them,
+// Equation 16: compares images by the features of a network's layers,
 //
 //   L = mean over images of sum over layers i of |F^i(I) - F^i(I')|_1 / N_i,
 //
-// N_i the elements of layer i. With a network trained beforehand it is the perceptual loss, the
-// equation's first sum; with the critic that is being trained it is discriminator feature matching,
-// its second sum.
+// N_i the elements of layer i. With a pretrained network it is the perceptual loss, the equation's
+// first sum; with the critic in training it is discriminator feature matching, its second sum.
 #pragma once
 
 #include <algorithm>
@@ -24,17 +23,17 @@ namespace tilegrad::train {
 using FeatureFunction = std::function<std::vector<nn::Var>(const nn::Var& images)>;
 
 // `predicted` and `truth` are of one shape. A scalar with a gradient with respect to `predicted`;
-// the features of the truth are constants. An optimiser of what made `predicted` leaves the
-// network's own weights alone, as it does not ask for their gradients.
+// the features of the truth are constants. The network's own weights stay fixed: the optimiser of
+// `predicted` does not ask for their gradients.
 nn::Var FeatureL1Loss(const FeatureFunction& features, const nn::Var& predicted,
                       const nn::Tensor& truth);
 
-// The levels of a critic without its scores, which the adversarial loss is about. The critic must
+// The levels of a critic without its scores, which the adversarial loss uses. The critic must
 // outlive the function.
 FeatureFunction FeaturesOf(nn::Critic& critic);
 
-// Equation 13: the L1 loss of colours. As the official code: the sum over the channels of the mean
-// over pixels and images of |I - I'|, that is three times a plain mean for RGB.
+// Equation 13: the L1 loss of colours. As in the official code: the sum over channels of the mean
+// over pixels and images of |I - I'|, which is three times a plain mean for RGB.
 
 // Sum of |a - b| of one image, in double and in order.
 template <class T>
@@ -62,9 +61,9 @@ nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth);
 nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,
                             const nn::Tensor& weight);
 
-// Huber's mixture instead of |d|: d^2 / (2 soft) up to |d| = soft, |d| - soft / 2 beyond. Where
-// something unknown makes colours bright or dark, L1 alone settles for their median, which may be
-// black, and this for nearly their mean.
+// The Huber loss instead of |d|: d^2 / (2 soft) up to |d| = soft, |d| - soft / 2 beyond. Where an
+// unknown makes colours bright or dark, L1 converges to their median, which may be black, and this
+// nearly to their mean.
 template <class T>
 double HuberDifference(std::span<const T> truth, std::span<const T> predicted, double soft) {
   double sum = 0;

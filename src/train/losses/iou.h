@@ -11,7 +11,7 @@ namespace tilegrad::train {
 // Added to the denominator, so that two empty masks give loss 1 and gradient 0.
 inline constexpr double kIouEpsilon = 1e-10;
 
-// Of one image; sums in double, in order.
+// For one image; sums in double, in order.
 template <class T>
 struct IouSums {
   double both = 0, either = 0;
@@ -41,8 +41,8 @@ void IouBackward(const IouSums<T>& sums, std::span<const T> truth, double scale,
 // alpha and truth: [N, ...] of one dtype, values in [0, 1]. A scalar.
 nn::Var IouLoss(const nn::Var& alpha, const nn::Tensor& truth);
 
-// Mean over images of |S' - S|_2^2 / max(|S|_1, 1). Least where both agree also between 0 and 1,
-// while equation 12 wants 0 or 1. Arguments as above.
+// Mean over images of |S' - S|_2^2 / max(|S|_1, 1). Its minimum is at equality even for values
+// between 0 and 1, while equation 12 favours 0 or 1. Arguments as above.
 nn::Var SquaredSilhouetteLoss(const nn::Var& alpha, const nn::Tensor& truth);
 
 }  // namespace tilegrad::train

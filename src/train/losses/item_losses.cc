@@ -57,7 +57,7 @@ struct ImagePair {
   }
 };
 
-// What the images of a batch are held to, and what of it comes out for each.
+// Predictions and targets of a batch, and the loss and gradient of each image.
 template <class T>
 struct ImageLosses {
   ImagePair<T> pair;
@@ -69,8 +69,8 @@ struct ImageLosses {
   }
 };
 
-// Of `grain` images at a time, or fewer at the end: some(images, begin, end). The result is the sum
-// of all losses times `scale`.
+// Computes `grain` images at a time, or fewer at the end, with some(images, begin, end). The result
+// is the sum of all losses times `scale`.
 template <class Some>
 nn::Var ImageLossBySome(const char* name, const nn::Var& predicted, const nn::Tensor& truth,
                         double scale, std::size_t grain, const Some& some) {

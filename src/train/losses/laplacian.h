@@ -13,8 +13,8 @@
 
 namespace tilegrad::train {
 
-// One mesh: m [V,3]. residual [V,3] is filled with L m, with (L m)_i = mean_{j in N(i)} m_j - m_i;
-// a vertex without neighbours has 0. Returns the sum of squares, taken in double.
+// One mesh: m [V,3]. Fills residual [V,3] with L m, (L m)_i = mean_{j in N(i)} m_j - m_i; 0 for a
+// vertex without neighbours. Returns the sum of squares, in double.
 template <class T>
 double LaplacianForward(const Topology& topology, std::span<const T> m, std::span<T> residual) {
   double sum = 0;
@@ -59,17 +59,17 @@ nn::Var LaplacianLoss(const nn::Var& movement, const Topology& topology);
 //
 //   (L v)_i = sum_j w_ij (v_j - v_i),   w_ij = (cot alpha + cot beta) / 2
 //
-// alpha and beta are the angles opposite the edge ij. As in CMR's code, weights are those of one
-// mesh, from which learning starts, and stay.
+// alpha and beta are the angles opposite the edge ij. As in CMR's code, the weights are those of
+// the initial mesh and stay fixed.
 
-// Cotangents are cut here, so that those of slivers are finite.
+// Cotangents are clamped here, so that those of slivers stay finite.
 inline constexpr double kMostCotangent = 20;
 
 struct WeighedEdge {
   std::int32_t i, j;
   double weight;
 };
-// Of a mesh with `positions` [V,3]: an entry for each corner of a face, opposite edges ij.
+// For a mesh with `positions` [V,3]: an entry for each corner of a face, for the opposite edge ij.
 std::vector<WeighedEdge> CotangentWeights(std::span<const Face> faces,
                                           std::span<const double> positions);
 
@@ -86,8 +86,8 @@ void AddLaplacian(std::span<const WeighedEdge> edges, std::span<const T> v, std:
   }
 }
 
-// positions: [B, V, 3]. A scalar, the mean over the batch, too. The gradient of a vertex whose L v
-// is 0 is 0.
+// positions: [B, V, 3]. A scalar, the mean over the batch, too. A vertex with L v = 0 contributes
+// no gradient.
 nn::Var CotangentLaplacianLoss(const nn::Var& positions, std::span<const WeighedEdge> edges);
 
 }  // namespace tilegrad::train

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The regularisers of meshes, for trainings and fits: here each has its weight, its key and its
-// term.
+// The mesh regularisers of training and fits: the weight, key and term of each.
 #pragma once
 
 #include <span>
@@ -24,10 +23,10 @@ struct DeformedMeshes {
   const Topology& topology;
   const nn::Var& positions;
   const nn::Var& movement;
-  double unit_area = 1;  // that areas count in, squared world units
+  double unit_area = 1;  // unit of areas, squared world units
 };
 
-// Terms with the weight 0 are left out.
+// Skips terms with weight 0.
 void AddRegularizers(const RegularizerWeights& weights, const DeformedMeshes& meshes, LossSum* sum);
 
 }  // namespace tilegrad::train

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The smoothness regulariser of section 4.1 ("flatten" in SoftRas): sum over edges of (cos(n1, n2)
 // - 1)^2 with the unit normals of the two faces, mean over the batch. Boundary edges and edges of
-// faces without area take no part.
+// faces without area do not count.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace tilegrad::train {
 template <class T>
 using Vec3 = std::array<T, 3>;
 
-// Inline by word: GCC 12 calls them otherwise.
+// `inline` explicitly: GCC 12 would not inline them otherwise.
 template <class T>
 inline Vec3<T> Cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -27,8 +27,8 @@ inline T Dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// A face's unit normal and 1 / |e1 x e2|, 0 where that is too small to divide by (the face then has
-// no direction).
+// A face's unit normal and 1 / |e1 x e2|, 0 if that is too small to divide by (the face then has no
+// direction).
 template <class T>
 struct FaceNormal {
   Vec3<T> unit = {0, 0, 0};
@@ -50,7 +50,7 @@ inline FaceNormal<T> NormalOf(std::span<const T> p, const Face& face) {
   return {{n[0] * inverse, n[1] * inverse, n[2] * inverse}, inverse};
 }
 
-// Of one mesh: p [V,3]; normals [F] are filled. The sum is taken in double.
+// One mesh: p [V,3]; fills normals [F]. Sums in double.
 template <class T>
 double SmoothnessForward(const Topology& topology, std::span<const Face> faces,
                          std::span<const T> p, std::vector<FaceNormal<T>>& normals) {

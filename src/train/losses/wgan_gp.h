@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equation 15 and its share of equation 17: the Wasserstein game with gradient penalty (Arjovsky et
+// Equation 15 and its part of equation 17: the Wasserstein game with gradient penalty (Arjovsky et
 // al. 2017, Gulrajani et al. 2017).
 //
 //   W    = E[D(I)] - E[D(I')]                       how far the critic D tells real from rendered
-//   L_gp = E[(|grad_x D(x)|_2 - 1)^2]               one norm for each sample
+//   L_gp = E[(|grad_x D(x)|_2 - 1)^2]               one norm per sample
 //   the critic minimises     -W + lambda_gp L_gp
 //   the generator minimises  -E[D(I')]              the part of W that depends on it
 //
 // Equation 17 as printed has the critic maximise W + lambda_gp L_gp, which would reward gradients
-// whose norm is far from 1; the penalty is subtracted here, as in the work that it cites. D of an
-// image is the mean of its map of scores.
+// whose norm is far from 1; here the penalty is subtracted, as in the work that it cites. D of an
+// image is the mean of its score map.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@
 
 namespace tilegrad::train {
 
-// Where x of the penalty lies.
+// Where the penalty's x lies.
 enum class PenaltyPlace {
   kRendered,     // at the rendered image I', as equation 15 is printed
   kInterpolates  // at t I + (1 - t) I', t uniform in [0, 1) for each sample (Gulrajani et al.)
@@ -38,14 +38,14 @@ struct CriticLoss {
   nn::Var total, wasserstein, penalty;
 };
 
-// What an update of the critic goes down on. real, fake: [n, ..] of one shape, numbers without a
-// graph: a critic's update moves nothing but the critic. The critic must have no batch norm: a
-// sample's score must depend on that sample alone. `rng` is drawn from for interpolates only.
+// The critic's objective, to minimise. real, fake: [n, ..] of one shape, detached: a critic's
+// update moves only the critic. The critic must have no batch norm: a sample's score must depend on
+// that sample alone. Draws from `rng` only for interpolates.
 CriticLoss WganCriticLoss(nn::Module& critic, const nn::Var& real, const nn::Var& fake,
                           const WganGpOptions& options, Rng& rng);
 
-// What an update of the generator goes down on, -E[D(fake)]: differentiable by what made `fake`,
-// through the renderer too.
+// The generator's objective, -E[D(fake)]: differentiable with respect to whatever made `fake`, also
+// through the renderer.
 nn::Var WganGeneratorLoss(nn::Module& critic, const nn::Var& fake);
 
 }  // namespace tilegrad::train

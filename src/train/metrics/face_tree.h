@@ -16,13 +16,13 @@ using Triangle = std::array<glm::dvec3, 3>;
 class FaceTree {
  public:
   struct Nearest {
-    std::int32_t face = -1;           // of equally near ones the first; -1 if there is no face
-    std::array<double, 3> weights{};  // of its corners in the nearest point; 0 where on an edge
+    std::int32_t face = -1;           // the first of ties; -1 if there is no face
+    std::array<double, 3> weights{};  // barycentric, of the nearest point; 0 where on an edge
     double squared = std::numeric_limits<double>::infinity();  // distance
   };
 
-  // Coordinates must be finite, and their differences' squares, too. Faces without area are edges
-  // or points.
+  // Coordinates and the squares of their differences must be finite. Faces without area count as
+  // edges or points.
   explicit FaceTree(std::span<const Triangle> faces);
 
   Nearest Find(const glm::dvec3& query) const;
@@ -42,22 +42,22 @@ class FaceTree {
   void Search(std::size_t at, const glm::dvec3& query, Nearest* best) const;
 
   std::vector<Triangle> faces_;
-  std::vector<std::size_t> order_;  // faces, as leaves have them
+  std::vector<std::size_t> order_;  // faces in the order of the leaves
   std::vector<Node> nodes_;
 };
 
-// The nearest of a set of points, by a k-d tree in place: the median of each range is its node,
-// what is left and right of it its subtrees (Bentley: Multidimensional binary search trees, 1975).
-// Split along the longest side.
+// The nearest of a set of points, by a k-d tree in place: the median of each range is its node, the
+// halves left and right of it are its subtrees (Bentley: Multidimensional binary search trees,
+// 1975). Split along the longest side.
 
 class NearestPoint {
  public:
   struct Found {
-    std::int32_t index = -1;  // of equally near ones the first; -1 if there is no point
+    std::int32_t index = -1;  // the first of ties; -1 if there is no point
     double squared = std::numeric_limits<double>::infinity();  // distance
   };
 
-  // Coordinates must be finite, and their differences' squares, too.
+  // Coordinates and the squares of their differences must be finite.
   explicit NearestPoint(std::span<const glm::dvec3> points);
   explicit NearestPoint(std::span<const glm::vec3> points);
 

@@ -24,21 +24,21 @@ namespace tilegrad::train {
 // [x][y][z] of 0 or 1. An error for an invalid mesh or one without extent.
 Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
 
-// The paper's rule (binvox -cb -dc -aw), on the same cube: a voxel is empty if a ray along an axis,
-// from outside, comes through it and one voxel further without meeting the surface. One voxel
-// before the surface stays solid where no other ray takes it, and a hollow that no ray along an
-// axis looks into is filled.
+// The paper's rule (binvox -cb -dc -aw), on the same cube: a voxel is empty if an axis-parallel ray
+// from outside passes through it and the next voxel without meeting the surface. So the voxel in
+// front of the surface stays solid unless another ray carves it, and hollows that no axis-parallel
+// ray enters are filled.
 Result<std::vector<std::uint8_t>> VoxelizeCarved(const Mesh& mesh, int resolution);
 
-// The rule of N3MR and SoftRas (their `voxelization`) for a mesh that they would evaluate: it is
-// not moved to fill the cube; [-half_extent, half_extent]^3 is scaled to resolution - 1 voxels in
-// its middle. The surface is the voxels of the vertices and, along each axis, the four around a
-// line through corners of voxels, at the height where it meets a face; solid is what cannot be
-// reached from outside. An error for an invalid mesh.
+// The rule of N3MR and SoftRas (their `voxelization`), which does not fit the mesh to the cube: it
+// scales [-half_extent, half_extent]^3 to resolution - 1 voxels in the cube's middle. Surface
+// voxels are those of the vertices and, along each axis, the four around a line through voxel
+// corners at the height where it meets a face; a voxel is solid if it cannot be reached from
+// outside. An error for an invalid mesh.
 Result<std::vector<std::uint8_t>> VoxelizeNmr(const Mesh& mesh, double half_extent, int resolution);
 
-// As Voxelize, of a surface that is known by points: so many that each of its voxels holds one. The
-// cube is [-half_extent, half_extent]^3; points beyond it are left out.
+// As Voxelize, for a surface given by points, dense enough that each of its voxels holds one. The
+// cube is [-half_extent, half_extent]^3; points outside are ignored.
 Result<std::vector<std::uint8_t>> VoxelizePoints(std::span<const glm::vec3> points,
                                                  double half_extent, int resolution);
 
@@ -47,12 +47,11 @@ double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b
 
 // The voxels that a surface passes through, [x][y][z] of 0 or 1. Corners are in voxels: voxel (i,
 // j, k) of [0, resolution)^3 is the cube from (i, j, k) to (i + 1, j + 1, k + 1); up to a
-// thousandth of one, as above. What lies outside is left out. An error for a resolution out of
-// range.
+// thousandth of one, as above. Ignores what lies outside. An error for a resolution out of range.
 Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surface, int resolution);
 
-// Points distributed by area: faces, with the weights of their corners (deterministic in `seed`).
-// An error if the areas' sum is not a positive number.
+// Points distributed by area, as faces with barycentric weights (deterministic in `seed`). An error
+// if the areas' sum is not a positive number.
 struct SurfaceSample {
   std::int32_t face;
   std::array<double, 3> weights;
@@ -75,27 +74,27 @@ struct SurfaceScore {
 SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<const glm::vec3> truth,
                              double threshold);
 
-// How crisp a picture is.
+// Sharpness of a picture.
 
-// Some planes of one picture: [channels][height][width], any range.
+// Planes of one picture: [channels][height][width], any range.
 struct PlanarPicture {
   std::span<const float> values;
   int channels = 0, height = 0, width = 0;
 };
 
 // High-pass energy: the mean over channels and counted pixels of (I - B I)^2, where B is the
-// binomial filter (1 2 1)^T (1 2 1) / 16. Counted is a pixel whose whole 3x3 window lies in the
-// picture and, where `covered` [height][width] is given, at pixels that are not 0 there: the crisp
-// outline of a blurred texture does not count. 0 of a constant picture and where no pixel counts;
-// m^2 of a chequerboard of +m and -m. Compare it with the truth's on the truth's pixels: below it,
-// a picture is blurred; above it, noisy. InvalidArgument: the sizes do not fit together, or a
-// number is not finite.
+// binomial filter (1 2 1)^T (1 2 1) / 16. A pixel counts if its whole 3x3 window lies in the
+// picture and, if `covered` [height][width] is given, is non-zero there: the sharp outline of a
+// blurred texture does not count. 0 for a constant picture and where no pixel counts; m^2 for a
+// chequerboard of +m and -m. Compare it with the truth's on the truth's pixels: a lower value means
+// blur, a higher one noise. InvalidArgument: inconsistent sizes, or a number that is not finite.
 Result<double> HighPassEnergy(const PlanarPicture& picture,
                               std::span<const std::uint8_t> covered = {});
 
 // PCK: the percentage of correct keypoints, as CMR counts it.
 
-// An error is right if it is below `threshold`, in parts of the longer side of the object's box.
+// A keypoint is correct if its error is below `threshold`, in units of the longer side of the
+// object's box.
 class KeypointScore {
  public:
   KeypointScore(std::size_t keypoints, double threshold)
@@ -105,8 +104,8 @@ class KeypointScore {
     ++seen_[keypoint];
     right_[keypoint] += error < threshold_ ? 1 : 0;
   }
-  // The share that is right of each keypoint, and the mean of those over the keypoints that were
-  // seen; nothing if none was.
+  // Mean over the keypoints seen of each one's share of correct predictions; nullopt if none was
+  // seen.
   std::optional<double> Mean() const {
     double sum = 0, count = 0;
     for (std::size_t k = 0; k < seen_.size(); ++k) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scores of sets of pictures by their features. Those by nearest neighbours are by brute force, on
-// all workers, with the same bits for any number of them.
+// Scores of sets of pictures by their features. Nearest neighbours are found by brute force on all
+// workers, with the same bits for any number of them.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@
 
 namespace tilegrad::train {
 
-// Pictures or shapes as points: what metrics of sets of them work on.
+// Pictures or shapes as points in feature space, the input of set metrics.
 
-// `rows` points of `width` coordinates, one after the other.
+// `rows` points of `width` coordinates, row-major.
 struct FeatureRows {
   std::vector<float> values;
   std::size_t width = 0;
@@ -28,7 +28,7 @@ struct FeatureRows {
 // InvalidArgument with `what` if there are fewer than `least` rows, values that fill no whole row,
 // or one that is not finite.
 Status CheckRows(const FeatureRows& rows, std::size_t least, const char* what);
-// The same of two sets, which must also agree in width.
+// The same for two sets, whose widths must agree.
 Status CheckPair(const FeatureRows& a, const FeatureRows& b, std::size_t least, const char* what);
 
 // `count` of the rows, or all if there are fewer, drawn without replacement by `seed`.
@@ -36,16 +36,16 @@ FeatureRows DrawRows(const FeatureRows& from, std::size_t count, std::uint64_t s
 // Rows [begin, end).
 FeatureRows SliceRows(const FeatureRows& from, std::size_t begin, std::size_t end);
 
-// Each column of `rows` minus its mean in `reference`, divided by its deviation there; a column
-// that is constant there is set to 0.
+// Each column of `rows` minus its mean in `reference`, divided by its standard deviation there;
+// columns that are constant there become 0.
 FeatureRows Standardised(const FeatureRows& rows, const FeatureRows& reference);
 
 // |a - b|^2 in double, in order.
 double SquaredDistance(std::span<const float> a, std::span<const float> b);
 
-// Whether what is generated looks like the truth (precision), and whether all of the truth is
-// generated (recall); in [0, 1]. Kynkaanniemi et al. 2019: a point counts as covered by a set if it
-// is no farther from some point of it than that point's k-th nearest neighbour in the set.
+// Whether generated points look like the truth (precision), and whether they cover all of it
+// (recall); in [0, 1]. Kynkaanniemi et al. 2019: a set covers a point that is no farther from some
+// point of the set than that point's k-th nearest neighbour in the set.
 struct Coverage {
   double precision = 0;  // share of generated points that the truth covers
   double recall = 0;     // share of true points that the generated set covers
@@ -56,15 +56,15 @@ Result<Coverage> PrecisionRecall(const FeatureRows& truth, const FeatureRows& ge
                                  const Workers& workers, int k = kNeighbours);
 
 struct Nearest {
-  std::size_t row = 0;  // the first of equals
+  std::size_t row = 0;  // the first of ties
   double distance = 0;  // Euclidean
 };
 // For each row of `from` the nearest of `to`. At least one row each.
 Result<std::vector<Nearest>> NearestRows(const FeatureRows& from, const FeatureRows& to,
                                          const Workers& workers);
 
-// Whether a generator repeats its training data: distances of samples to the nearest training
-// picture, beside those of true pictures that were not trained on.
+// Whether a generator memorises its training data: distances of samples to the nearest training
+// picture, compared with those of held-out pictures.
 struct Memorisation {
   std::vector<Nearest> samples, held_out;  // as NearestRows, to the training set
   double sample_median = 0, held_out_median = 0;
@@ -75,39 +75,40 @@ struct Memorisation {
 Result<Memorisation> MeasureMemorisation(const FeatureRows& samples, const FeatureRows& held_out,
                                          const FeatureRows& train, const Workers& workers);
 
-// Of a set of generated pictures against true ones, with what chance alone gives beside each: the
-// floor.
+// Scores of generated pictures against true ones, each with its floor: the score of other true
+// pictures.
 struct SetScore {
-  double frechet = 0;   // as they are
+  double frechet = 0;   // of the raw features
   double kernel = 0;    // standardised by the truth
   Coverage coverage{};  // standardised by the truth, k = kNeighbours
 };
 
-// All figures are of `n` rows on each side, as each of them depends on that number.
+// All scores use `n` rows on each side, because they depend on that number.
 struct SetScores {
   std::size_t n = 0;
   SetScore generated;  // n generated rows against n true ones
   SetScore floor;      // n other true rows against the same: what a perfect generator would get
 };
 
-// n is the smaller of the generated rows and half of the true ones; both sides are drawn by `seed`.
-// More than kNeighbours rows must remain. `truth` should be what the generator was not trained on.
+// n is the smaller of the generated rows and half of the true ones; `seed` draws both sides. n must
+// exceed kNeighbours. `truth` should be held out from the generator's training.
 Result<SetScores> ScoreSets(const FeatureRows& truth, const FeatureRows& generated,
                             std::uint64_t seed, const Workers& workers);
 
-// How far two sets of pictures are from each other as a whole: distances of distributions of their
-// features. Small sets are biased, so a figure means something beside one of equal size only: see
-// set_scores.h. With features of any network but Inception v3 this is not "FID".
+// Distances between the feature distributions of two sets of pictures. They are biased for small
+// sets, so compare only scores of equal set sizes (ScoreSets). With features of any network but
+// Inception v3 this is not "FID".
 
 // Frechet distance of the normal distributions of two sets (Dowson, Landau 1982; Heusel et al.
 // 2017): |m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2)), C the unbiased covariances. At least 2
-// rows each. Of f32 features as good as sqrt of their rounding: 1e-6 of the traces.
+// rows each. For f32 features it is accurate to 1e-6 of the traces, as sqrt amplifies their
+// rounding.
 Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b);
 
 // Kernel distance (Binkowski et al. 2018): the unbiased estimate of the squared maximum mean
 // discrepancy with k(x, y) = (x . y / width + 1)^3, which may fall below 0; at least 2 rows each.
-// Standardise the rows first (by the true set), or the widest columns decide alone. Same bits for
-// any worker count.
+// Standardise the rows first (by the true set), or the columns with the largest range dominate.
+// Same bits for any worker count.
 Result<double> KernelDistance(const FeatureRows& a, const FeatureRows& b, const Workers& workers);
 
 }  // namespace tilegrad::train

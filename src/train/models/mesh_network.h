@@ -19,12 +19,12 @@ struct NetworkConfig {
   std::int64_t hidden2 = 2048;
   SphereConfig sphere = {.radius = 0.175, .smoothing = 0, .symmetric = false};
   bool fc_norm = true;              // batch norm after hidden fully connected layers
-  double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
-                                    // prediction is nearly the template
-  double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
-                                    // fan-in, as convolutions
-  double color_bias = 0.0;          // what vertex colours start at
-  bool picture_colors = false;      // colours are read from the picture (nn/ops.h)
+  double output_deviation = 0.001;  // the decoders' initial last weights are N(0, this^2): the
+                                    // first prediction is nearly the template
+  double fc_deviation = 0.001;  // initial fully connected weights are N(0, this^2); 0: uniform by
+                                // fan-in, as for convolutions
+  double color_bias = 0.0;      // initial vertex colours
+  bool picture_colors = false;  // samples colours from the picture (nn/ops.h)
 };
 
 // At 64 x 64 with NetworkConfig's defaults.
@@ -32,13 +32,12 @@ inline constexpr std::int64_t kPaperParameters = 34'115'916;
 
 class MeshNetwork {
  public:
-  // `image_size` in pixels, a multiple of 8. The seed decides every weight.
+  // `image_size` in pixels, a multiple of 8. The seed determines every weight.
   MeshNetwork(nn::Context& context, const NetworkConfig& config, int image_size,
               std::uint64_t seed);
 
-  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Movement, colours, and positions
-  // whose bounding box is centred, with the largest half-extent
-  // SphereConfig::half_extent.
+  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black. Returns movement, colours, and
+  // positions with a centred bounding box of largest half-extent SphereConfig::half_extent.
   Prediction Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
@@ -49,7 +48,7 @@ class MeshNetwork {
 
   NetworkConfig config_;
   SphereModel sphere_;
-  // The three parts, shown to visitors as one module.
+  // The three parts as one module for visitors.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;
     nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return encoder.Forward(x, mode); }

@@ -35,7 +35,7 @@ KeypointPlace Middle(const std::vector<KeypointPlace>& points) {
   return sum;  // in the plane of symmetry
 }
 
-// Of logits [B, N]: for each row the place of its largest number in all rows of [B N, ..].
+// For each row of logits [B, N] the index of its largest number among the rows of [B N, ..].
 std::vector<std::int32_t> Likeliest(const nn::Tensor& logits) {
   const std::int64_t count = logits.shape()[1];
   std::vector<std::int32_t> out;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The network of section 5.4: a photograph in; a deformed mean shape that is learned with it, its
-// texture, keypoints and the camera out. As CMR's (Kanazawa et al., ECCV 2018) but for encoder and
-// decoder, which are a U-Net; the texture is a map (DIB-R's), or where in the photograph each texel
-// is to be found (CMR's flow).
+// The network of section 5.4: from a photograph it predicts the deformation of a learned mean
+// shape, the texture, keypoints and the camera. As CMR's (Kanazawa et al., ECCV 2018), but encoder
+// and decoder are a U-Net; the texture is a map (DIB-R's) or a flow that says where to sample each
+// texel in the photograph (CMR's).
 #pragma once
 
 #include <array>
@@ -23,36 +23,36 @@ struct PhotographNetworkConfig {
   std::int64_t levels = 4;         // halvings
   std::int64_t enlarge = 1;        // the texture is 2^this times as large as the picture
   bool skips = true;               // the U-Net's skip connections
-  std::int64_t latent = 200;       // all heads start from this code
+  std::int64_t latent = 200;       // width of the code that feeds all heads
   std::string texture = "direct";  // or "flow"
-  bool symmetric_texture = true;   // the map is its mirror image at x = 0
+  bool symmetric_texture = true;   // the map is symmetric at x = 0
   SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
-  double output_deviation = 1e-4;  // the head of movements starts as N(0, this^2)
+  double output_deviation = 1e-4;  // initial weights of the movement head are N(0, this^2)
   // Camera hypotheses per picture, initially spread evenly around the object, with a logit each.
   // One picture of a car often does not distinguish front from rear; a single camera then learns
   // the mean of both.
   std::int64_t azimuths = 1;
-  // Of the camera head: "quaternion", or "rows", the first two of the rotation's matrix.
+  // Output of the camera head: "quaternion", or "rows", the first two of the rotation matrix.
   std::string rotation = "quaternion";
 };
 
-// What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
-// which its vertices go from the middle; a sphere without any. It is smoothed as movements are.
-// `count` keypoints are learned, each from the vertices near to its place.
+// The initial mean shape: a sphere whose vertices are moved radially onto the convex hull of
+// `keypoints` (PhotographSet::mean_keypoints), if there are any; smoothed as movements are. The
+// network learns `count` keypoints, each initially from the vertices near its place.
 struct PhotographStart {
   std::vector<std::array<double, 3>> keypoints = {};
-  std::size_t count =
-      0;  // keypoints.size(), or, of a network that is to be loaded, as many as it has
+  std::size_t count = 0;  // keypoints.size(), or the number of a network to be loaded
 };
 
 class PhotographNetwork {
  public:
-  // `image_size`: pixels, a multiple of 2^levels. The seed decides every weight.
+  // `image_size`: pixels, a multiple of 2^levels. The seed determines every weight.
   PhotographNetwork(nn::Context& context, const PhotographNetworkConfig& config,
                     const PhotographStart& start, int image_size, std::uint64_t seed);
 
-  // pictures: [B, 3, size, size] in [0, 1]. Movement from the mean shape, symmetric, positions,
-  // textures, with "flow" that, keypoints if it has any, and cameras, whose world it is.
+  // pictures: [B, 3, size, size] in [0, 1]. Returns the symmetric movement from the mean shape,
+  // positions, textures, the flow (with "flow"), keypoints if it has any, and the cameras, in whose
+  // world the rest is.
   Prediction Forward(const nn::Var& pictures, nn::Mode mode);
   nn::Var MeanShape() const;        // [1, V, 3]
   nn::Var KeypointWeights() const;  // [K, V], rows sum to 1; invalid without keypoints
@@ -86,17 +86,17 @@ class PhotographNetwork {
   } all_;
 };
 
-// InvalidArgument names the key that is wrong, or does not go with pictures of that size.
+// InvalidArgument names a key that is invalid or does not fit pictures of that size.
 Status CheckNetwork(const PhotographNetworkConfig& config, int image_size);
 
-// What camera `k` of `count` starts as: upright, turned by k / count of a circle about y; (w, x, y,
-// z).
+// Initial rotation of camera `k` of `count`: upright, turned by k / count of a circle about y; (w,
+// x, y, z).
 std::array<double, 4> StartingRotation(int k, int count);
-// The one of them from which a camera is turned least.
+// The index of the initial rotation nearest to `quaternion`.
 int NearestStart(const std::array<double, 4>& quaternion, int count);
 
-// How far the convex hull of `points` reaches from `centre`, which is within it, in a direction of
-// length 1; 0 if the hull is flat there.
+// Distance from `centre`, which lies within the convex hull of `points`, to the hull in a unit
+// direction; 0 if the hull is flat there.
 double HullReach(const std::vector<std::array<double, 3>>& points,
                  const std::array<double, 3>& centre, const std::array<double, 3>& direction);
 

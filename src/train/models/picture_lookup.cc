@@ -42,7 +42,7 @@ struct View {
   }
 };
 
-// What a picture shows at (x, y), in [0, 1] from its upper left corner; nothing beyond its edges.
+// Samples a picture at (x, y), in [0, 1] from its upper left corner; nothing beyond its edges.
 template <class T>
 std::array<double, 4> SampleAt(const T* image, std::int64_t size, double x, double y) {
   std::array<double, 4> out = {};
@@ -315,7 +315,7 @@ void AddBilinear(glm::vec2 uv, std::int64_t side, nn::AxisTerms* terms) {
   }
 }
 
-// What N3MR mixes at barycentric weights w of a face: each axis of the cube at w of its corner.
+// N3MR's mixture at barycentric weights w of a face: each axis of the cube at w of its corner.
 void AddMixture(std::int64_t face, const std::array<float, 3>& w, nn::AxisTerms* terms) {
   for (std::int64_t t = 0; t < FaceCubes::kTexels; ++t) {
     double weight = 1;

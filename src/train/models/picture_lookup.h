@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the input picture shows of each texel of a predicted surface, if the picture's camera and
-// the shape are as predicted. Numbers without gradient: networks take them as input.
+// Samples the input picture at each texel of a predicted surface, through the predicted camera and
+// shape. Without gradient: the results are inputs of networks.
 #pragma once
 
 #include <array>
@@ -16,19 +16,19 @@
 
 namespace tilegrad::train {
 
-// A camera that looks about at the origin, as numbers that a network can learn: the first two rows
-// of its rotation; the principal point's shift from the middle; the size in the image of a unit
-// length at the origin; 1 / distance. The last four are shifted and scaled to be about 1 or less.
+// A camera that looks roughly at the origin, as outputs of a network: the first two rows of its
+// rotation; the principal point's shift from the middle; the image size of a unit length at the
+// origin; 1 / distance. The last four are shifted and scaled to be about 1 or less.
 inline constexpr std::int64_t kPoseNumbers = 10;
 using Pose = std::array<double, kPoseNumbers>;
 // `size`: pixels a side of the image.
 Pose PoseOf(const Camera& camera, int size);
-// The camera of predicted numbers; its rotation is orthonormal.
+// The camera of a predicted pose, with its rotation made orthonormal.
 Camera CameraOf(const Pose& pose, int size);
 
 class PictureLookup {
  public:
-  // Of maps [side][side] of the sphere, by longitude and latitude.
+  // For maps [side][side] of the sphere, by longitude and latitude.
   PictureLookup(const Mesh& sphere, int side);
 
   struct Job {
@@ -37,18 +37,18 @@ class PictureLookup {
     const nn::Tensor& pose;       // [M,10]: Pose, whose rows need not be orthonormal
     nn::Tensor light = {};        // [M,3] unit, in the axes of the camera; empty: none
   };
-  // For each texel, and then for its mirror image at x = 0: RGB (what is seen, divided by the
+  // For each texel, and then for its mirror image at x = 0: RGB (of the picture, divided by the
   // cover), the cover, n.v towards the camera (< 0: turned away), ln of 1 over the Lambert light
-  // there, at most ln 4. Hidden surfaces are not told from others.
+  // there, at most ln 4. Does not test for occlusion.
   static constexpr std::int64_t kChannels = 6;
-  // [M, 2 kChannels, side, side], or the first three of each alone: [M, 6, side, side].
+  // [M, 2 kChannels, side, side], or only the first three of each: [M, 6, side, side].
   nn::Tensor Look(nn::Context& context, const Job& job) const;
   nn::Tensor Colors(nn::Context& context, const Job& job) const;
 
-  // [M, kCues]: how brightness goes with the normals that the camera sees, from which a light's
-  // direction can be read. Their mean; the mean brightness; the covariance of both, by that mean;
-  // the share that is not black; the mean normal of what is not; last the unit direction d that
-  // fits the brightness of what is not black best as a multiple of n.d, as if all had one paint.
+  // [M, kCues]: how brightness varies with the normals that the camera sees, which indicates the
+  // light's direction. The mean normal; the mean brightness; their covariance, divided by that
+  // mean; the share that is not black, and its mean normal; last the unit direction d for which a
+  // multiple of n.d fits the brightness of what is not black best, as if all had one paint.
   static constexpr std::int64_t kCues = 14;
   nn::Tensor Cues(nn::Context& context, const Job& job) const;
 
@@ -64,12 +64,12 @@ class PictureLookup {
   std::vector<SurfacePoint> texels_;  // [side][side]
 };
 
-// What the networks of sections 5.2 to 5.4 have in common: a U-Net from a picture to a map of the
-// sphere, whose bottom goes through one code that other heads start from, too.
+// The common part of the networks of sections 5.2 to 5.4: a U-Net from a picture to a map of the
+// sphere, whose bottleneck passes through a code that also feeds the other heads.
 
 struct PictureCodeShape {
   std::int64_t image_size = 64;  // pixels a side, a multiple of 2^levels of the U-Net
-  std::int64_t latent = 384;     // numbers of the code
+  std::int64_t latent = 384;     // width of the code
   int layers = 1;                // fully connected, from the U-Net's bottom to the code
 };
 
@@ -96,11 +96,11 @@ class PictureCode : public nn::Module {
   nn::Shape bottom_;  // of the U-Net, for one picture
 };
 
-// Rows of v [B, n], each divided by sqrt(|v|^2 + 1e-8), so that a row of zeros stays one.
+// Rows of v [B, n], each divided by sqrt(|v|^2 + 1e-8), so that rows of zeros stay zero.
 nn::Var UnitRows(const nn::Var& v);
 
-// Maps of a sphere as N3MR's texture cubes of 2 x 2 x 2 texels a face, and back: one network for
-// both renderers.
+// Converts maps of a sphere to N3MR's texture cubes of 2 x 2 x 2 texels a face, and back, so that
+// one network serves both renderers.
 
 class FaceCubes {
  public:
@@ -110,7 +110,7 @@ class FaceCubes {
   // `sphere` with SphereUvs; maps are side x side.
   FaceCubes(nn::Context& context, const Mesh& sphere, int side);
 
-  // textures [B,side,side,3] -> [B,F,8,3]: as N3MR's loader, bilinear samples at barycentric
+  // textures [B,side,side,3] -> [B,F,8,3]: as in N3MR's loader, bilinear samples at barycentric
   // coordinates (i, j, k) / (i + j + k), and at the middle for (0, 0, 0).
   nn::Var Cubes(const nn::Var& textures) const;
   // [B,F,8,3] -> [B,side,side,3]: what N3MR would show at each texel's place.

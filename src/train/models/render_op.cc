@@ -35,7 +35,7 @@ std::array<nn::Var, kSlots> SlotsOf(const SceneVars& v) {
           v.sh,        v.cameras, v.uvs,      v.reflectance};
 }
 
-// What the renderer takes as records, not arrays, of one image; or the gradients of it.
+// The inputs of one image that the renderer takes as records, not arrays; or their gradients.
 template <class T>
 struct ImageRecords {
   TextureT<T> texture;
@@ -80,7 +80,7 @@ class BatchRender {
 
   Status Check() const;
   Status Forward();
-  // Of the slots that are there, in their order; empty for those that need none.
+  // For the slots present, in their order; empty for those that need none.
   Result<std::vector<nn::Tensor>> Gradients(nn::Context& context,
                                             std::span<const nn::Tensor> d_outputs);
   const ImagesT<T>& images() const { return frame_.images(); }
@@ -322,7 +322,7 @@ struct RivalBatch {
   std::vector<nn::Tensor> Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs);
 };
 
-// The numbers of the i-th tensor, if it is there.
+// The numbers of the i-th tensor, if present.
 template <class T>
 std::span<T> SpanOf(std::span<const nn::Tensor> tensors, std::size_t i) {
   if (i >= tensors.size() || tensors[i].empty()) return {};

@@ -12,9 +12,8 @@
 
 namespace tilegrad::train {
 
-// What the scenes of a batch are made of: B meshes of V vertices, each seen by `views` cameras, N =
-// B * views images. A Var that is left invalid is absent. Gradients are computed of those alone
-// that need one.
+// The scenes of a batch: B meshes of V vertices, each seen by `views` cameras, N = B * views
+// images. An invalid Var is absent. Computes only the gradients that are needed.
 struct SceneVars {
   nn::Var positions{};         // [B,V,3]
   nn::Var colors{};            // [B,V,3]
@@ -41,20 +40,20 @@ void ForEachCameraNumber(Camera&& camera, const Visit& visit) {
   visit(camera.cy);
 }
 
-// What is the same for all meshes, and no tensor.
+// The inputs other than tensors, the same for all meshes.
 struct RenderJob {
   std::span<const std::int32_t> faces{};  // [F,3]; must outlive the tape
   std::vector<Camera> cameras;            // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options{};
   bool alpha = true;
-  bool normals = false;  // draw them, too, into the renderer's frame (FrameOf)
+  bool normals = false;  // also draw normals, into the renderer's frame (FrameOf)
   // [F,3,2] of corners, with SceneVars::textures and without its uvs.
   std::span<const float> uvs{};
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
   ShadingModel shading{};
-  Surface surface{};  // of all faces; its texture is SceneVars::textures if they are there
+  Surface surface{};  // of all faces; its texture is SceneVars::textures, if given
 };
 
 struct RenderedImages {
@@ -62,9 +61,9 @@ struct RenderedImages {
   nn::Var alpha;   // [N, H, W]; invalid without RenderJob::alpha
 };
 
-// A renderer with its images, reused from step to step so that a steady state takes nothing large
-// from the heap. Holds the state of one rendering at a time: its way back is taken, or given up,
-// before the next RenderScenes.
+// A renderer with its images, reused from step to step so that a steady state allocates nothing
+// large. Holds the state of one rendering at a time: run or drop its backward pass before the next
+// RenderScenes.
 struct SceneRenderer {
   explicit SceneRenderer(const Workers& workers)
       : renderer(RendererOn(workers)), renderer64(RendererOn<double>(workers)) {}
@@ -85,7 +84,7 @@ RenderedImages RenderScenes(SceneRenderer& renderer, const SceneVars& scenes, Re
 // The rivals' renderers (src/rivals) as an operation on the tape: meshes in, images out, the rule's
 // own gradient back.
 
-// What is the same for all meshes of a batch.
+// The inputs that all meshes of a batch share.
 struct RivalJob {
   std::span<const std::int32_t> faces{};  // [F,3]; must outlive the tape
   std::vector<Camera>
@@ -106,7 +105,7 @@ struct RivalRenderer {
 RenderedImages RenderTextured(RivalRenderer& renderer, const nn::Var& positions,
                               const nn::Var& textures, RivalJob job);
 
-// positions, and colors of vertices: [B,V,3]. An invalid `colors` draws alpha alone: the images'
+// positions, and colors of vertices: [B,V,3]. An invalid `colors` draws only alpha: the images'
 // colors are then invalid, too. f64 draws SoftRas with the scalar reference (for proofs). Errors of
 // shapes and options reach the context's status.
 RenderedImages RenderRival(RivalRenderer& renderer, const nn::Var& positions, const nn::Var& colors,

@@ -21,8 +21,8 @@ Mesh SphereOf(const SphereConfig& config) {
   return Icosphere(static_cast<int>(config.level), static_cast<float>(radius));
 }
 
-// One round of diffusion over a mesh: each vertex goes halfway to the mean of its neighbours. Noise
-// from vertex to vertex dies out with the rounds, and what is smooth stays.
+// One round of diffusion over a mesh: each vertex goes halfway to the mean of its neighbours.
+// Vertex-to-vertex noise decays with the rounds; smooth offsets remain.
 nn::AxisMap DiffusionRound(const nn::Var& like, const Topology& topology, std::int64_t vertices) {
   return nn::MakeAxisMap(like, {vertices, vertices}, [&](std::int64_t v, nn::AxisTerms& terms) {
     const auto at = topology.offsets.begin() + v;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sphere that every prediction is a deformation of, and what a network's numbers do to it.
+// The sphere that every prediction deforms, and how a network's outputs deform it.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, of Camera
 struct SphereConfig {
   std::int64_t level = 3;      // subdivisions of the icosahedron: 3 gives 642 vertices
   double radius = 0.3;         // world units
-  std::int64_t smoothing = 4;  // rounds of diffusion over the sphere that offsets go through
-  bool symmetric = true;  // offsets are the mean of themselves and their mirror image at x = 0, so
-                          // every prediction is symmetric there
+  std::int64_t smoothing = 4;  // rounds of diffusion over the sphere that smooth offsets
+  bool symmetric = true;  // averages offsets with their mirror image at x = 0, so every prediction
+                          // is symmetric there
   bool n3mr_vertices = false;  // SphereVertices instead of offsets; radius is 1/4, and the two
                                // keys above do not apply
-  // Of normalised shapes, world units: that of the dataset's objects (CameraRule). No key: it comes
-  // with the data, and with a checkpoint.
+  // Half-extent of normalised shapes, world units: that of the dataset's objects (CameraRule). Not
+  // a key: the data or the checkpoint sets it.
   double half_extent = 0.45;
 };
 
@@ -42,17 +42,17 @@ class SphereModel {
   const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }  // [3 F], longitude, latitude
   std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
   std::int64_t vertices() const { return static_cast<std::int64_t>(mesh_.positions.size()); }
-  // That deform one sphere: three for each vertex and, in N3MR's form, three for all.
+  // The numbers that deform one sphere: three for each vertex and, with n3mr_vertices, three for
+  // all.
   std::int64_t numbers() const { return 3 * vertices() + (config_.n3mr_vertices ? 3 : 0); }
 
-  // raw [B, numbers()] -> offsets [B, V, 3] from the sphere; those of 0 are 0.
+  // raw [B, numbers()] -> offsets [B, V, 3] from the sphere; 0 for raw = 0.
   nn::Var Movement(const nn::Var& raw) const;
   nn::Var Positions() const;  // of the sphere, [V, 3]
   // Movement [B, V, 3] to positions, NormalizeMeshes to SphereConfig::half_extent.
   nn::Var Normalized(const nn::Var& movement) const;
 
-  // To draw deformed spheres, with textures if they have any: faces, uvs and how they wrap. Refers
-  // to the model.
+  // The job that draws deformed spheres, textured or not: faces, uvs and wrap. Refers to the model.
   RenderJob Job(const RenderOptions& options) const {
     return {.faces = faces(),
             .cameras = {},
@@ -80,8 +80,8 @@ class SphereModel {
 // mesh of [B, V, 3]. The gradient flows through the extremes. A mesh without extent stays finite.
 nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent);
 
-// Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
-// is at 1/2 - u (scene/shapes.h): column i has W/2 - 1 - i.
+// Averages the columns of a map of the sphere with their mirror image at x = 0, which is at 1/2 - u
+// (scene/shapes.h): column W/2 - 1 - i for column i.
 nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width);
 
 // Vertices as N3MR's training code parameterises them (and SoftRas's after it): each coordinate
@@ -95,9 +95,9 @@ nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width);
 // coordinate where s is 0 has u = 0 whatever its bias, without a gradient.
 nn::Var SphereVertices(const nn::Var& bias, const nn::Var& centroid, const nn::Tensor& sphere);
 
-// What networks say of pictures, and generators make of noise.
+// What networks predict from pictures, and generators from noise.
 
-// Of a batch of B. What a network does not say is an invalid Var. Light is in the axes of each
+// For a batch of B. What a network does not predict is an invalid Var. Light is in the axes of each
 // picture's camera.
 struct Prediction {
   nn::Var movement{};    // [B, V, 3] from what is deformed, before normalisation
@@ -110,15 +110,15 @@ struct Prediction {
   nn::Var sh{};          // [B, 9]; harmonics
   nn::Var pose{};        // [B, 10] Pose of the picture's camera (picture_lookup.h)
   nn::Var cameras{};     // [B, 7] (weak_cameras.h), quaternions unit
-  // Of a network that predicts N cameras per picture: all of them (`cameras` holds the likeliest),
+  // For a network that predicts N cameras per picture: all of them (`cameras` holds the likeliest),
   // and their logits.
   nn::Var camera_choices{};  // [B N, 7]
   nn::Var choice_logits{};   // [B, N]
   nn::Var keypoints{};       // [B, K, 3]
 };
 
-// Number i, a deformed `sphere`, with its texture, or else with colours brought into [0, 1] if it
-// has any. An error if it is not valid.
+// Item i as a deformed `sphere`, with its texture, if any, and its colours, if any, clamped to [0,
+// 1]. An error if it is not valid.
 Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std::size_t i);
 
 // [B][4][size][size] bytes as networks take them: [B, 4, size, size] in [0, 1].

@@ -177,7 +177,7 @@ Prediction TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
 
 namespace {
 
-// What the layers say of each texel, and what PictureLookup::Look does: channels [first, end).
+// Channels [first, end) of the layers' output for each texel, and of PictureLookup::Look.
 struct Channels {
   std::int64_t first, end;
 };
@@ -188,7 +188,7 @@ constexpr Channels kPaintShare{8, 9};  // with a palette; then a logit for each 
 constexpr Channels kUnlit{5, 6};       // of Look: ln of 1 / light
 constexpr Channels kMirrorUnlit{PictureLookup::kChannels + 5, PictureLookup::kChannels + 6};
 
-// Of what is above 1 this share is taken off; the rest leaves a gradient that leads back.
+// The share of any excess above 1 that is removed; the rest keeps a gradient back to 1.
 constexpr double kTooBright = 0.9;
 
 nn::Var Take(const nn::Var& maps, const Channels& channels) {
@@ -200,8 +200,8 @@ nn::Var WrapAround(const nn::Var& map) {
   return nn::Pad(nn::Pad(map, 3, 1, 1, nn::PadMode::kCircular), 2, 1, 1, nn::PadMode::kReplicate);
 }
 
-constexpr double kDarkChannel = 0.03;  // of a channel: no light reaches what is darker
-constexpr double kFewTexels = 1;       // of so many a guess weighs as much as what is seen
+constexpr double kDarkChannel = 0.03;  // of a channel; anything darker counts as unlit
+constexpr double kFewTexels = 1;       // so many seen texels weigh as much as the guess
 constexpr double kNoShare = 1e-3;
 
 // [M, 4, h, w]: colours of `seen` (PictureLookup::Look) without light, and how much to trust each:

@@ -111,7 +111,7 @@ class RowRotation {
   }
   const std::array<double, 4>& quaternion() const { return quaternion_; }
 
-  // What d_quaternion is by the six numbers. A turn by the small vector t in the camera's axes
+  // Pulls d_quaternion back to the six numbers. A turn by the small vector t in the camera's axes
   // moves the quaternion by (0, t) q / 2, and of the rows first . third by t[1], first . second by
   // -t[2], second . third by -t[0].
   template <class T>

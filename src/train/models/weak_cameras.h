@@ -13,13 +13,13 @@ namespace tilegrad::train {
 
 inline constexpr std::int64_t kWeakNumbers = 7;
 
-// points [B, K, 3], cameras [B, 7] -> [B, K, 2]: where they are seen. Gradients to both.
+// points [B, K, 3], cameras [B, 7] -> [B, K, 2]: their image positions. Gradients to both.
 nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras);
 
-// rows [B, 6] -> [B, 4]: unit quaternions, w >= 0, of the rotations whose first two rows are
-// nearest to such a row's by Gram and Schmidt. Every rotation has its numbers and neighbours of it
-// near ones, which four numbers do not give (Zhou et al., CVPR 2019, section 4.2). Rows of no
-// length or that are parallel have some rotation, and a gradient that is finite.
+// rows [B, 6] -> [B, 4]: unit quaternions, w >= 0, of the rotations whose first two rows
+// Gram-Schmidt makes from the six numbers. These represent rotations continuously, which four
+// numbers cannot (Zhou et al., CVPR 2019, section 4.2). Zero or parallel rows give some rotation
+// and a finite gradient.
 nn::Var QuaternionsOfRows(const nn::Var& rows);
 
 // cameras [B, 7] -> [B, 16], SceneVars::cameras of images of `size` pixels a side: pinholes at
@@ -30,14 +30,13 @@ nn::Var PinholeCameras(const nn::Var& cameras, int size);
 // bits still resolve depths of 1e-4.
 inline constexpr double kPinholeDistance = 1000;
 
-// The same of one camera, in pixels of such an image.
+// The same for one camera, in pixels of such an image.
 Camera PinholeIn(const WeakPerspective& camera, int size);
 
 // [B, 7] without gradient.
 nn::Tensor CameraRows(nn::Context& context, std::span<const WeakPerspective> cameras);
 
-// Light in the axes of cameras, as networks see it, turned to the world's, as the renderer takes
-// it.
+// Rotates light from camera axes, which networks use, to world axes, which the renderer uses.
 
 // [N,3] -> [N,3]: R^T d with the rotation R of each image's camera.
 nn::Var DirectionsToWorld(const nn::Var& directions, std::span<const Camera> cameras);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What pages are made of: their files, text that is safe to put into them, and plots as SVG.
+// The building blocks of pages: their files, safe text, and plots as SVG.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace tilegrad::train {
 
 struct LogPoint {
   double x, y;        // > 0
-  std::string title;  // shown by a browser where the mouse is
+  std::string title;  // the browser's tooltip
 };
 
 struct LogSeries {
@@ -34,11 +34,11 @@ struct LogPlot {
 // 720 x 440 pixels; axes end at powers of ten. Texts are escaped.
 std::string LogPlotSvg(const LogPlot& plot);
 
-// Pages: their files, and text that is safe to put into them.
+// The files of pages, and text that is safe to put into them.
 
 // Compiled in: report.html with {{placeholders}}, report.css, report.js.
 extern const std::string_view kReportHtml, kReportCss, kReportJs;
-// What all pages draw with, the live page, and that of a fit.
+// The script that all pages share, the live page, and the page of a fit.
 extern const std::string_view kPartsJs, kLiveHtml, kLiveJs, kFitHtml;
 
 // 3214902 as "3,214,902".
@@ -53,7 +53,7 @@ std::string ScriptJson(const nlohmann::ordered_json& json);
 // A PNG as data: address.
 Result<std::string> PngAddress(const ImageU8& image);
 
-// Puts values["x"] where `text` has {{x}}; values are not searched again. kInternal names a
+// Replaces {{x}} in `text` by values["x"]; does not search the values again. kInternal names a
 // placeholder without a value.
 Result<std::string> FillTemplate(std::string_view text,
                                  const std::map<std::string, std::string>& values);

@@ -28,7 +28,7 @@ constexpr int kRest = 20;  // times what writing took
 constexpr std::chrono::seconds kStale{10};
 constexpr std::size_t kMostMeshes = 60, kMostPictures = 300;
 
-// As FilesOfSteps; nothing where the folder cannot be read.
+// As FilesOfSteps; empty if the folder cannot be read.
 Files FilesIn(const Path& folder, std::string_view beginning, std::string_view ending) {
   auto files = FilesOfSteps(folder, beginning, ending);
   return files.ok() ? std::move(*files) : Files();
@@ -159,7 +159,7 @@ Files LivePage::Meshes(std::int64_t step) const {
   return files;
 }
 
-// Those that are new; scripts of others go.
+// Writes scripts of new meshes and removes those of others.
 Json LivePage::WriteMeshes(const Files& files) {
   Json out = Json::array();
   Files old = FilesIn(folder_, "mesh_", ".js");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The live page of a running, finished or interrupted run: RUN/live.html, opened from the disk.
 // Once a second it reloads the scripts in RUN/live, since a page from a disk may load scripts but
-// not fetch files. The scripts are made from the run's own files only, so a killed run shows the
+// not fetch files. The scripts are made only from the run's own files, so a killed run shows the
 // same.
 //
 // Pictures are samples/step_N.png or timelapse/N.png; meshes timelapse/N.glb and mesh.glb, or else
@@ -24,9 +24,9 @@ namespace tilegrad::train {
 
 struct LiveSource {
   Path run;                // folder of a run or a fit, possibly without a step
-  Path data = {};          // dataset of a run, for what it predicts; empty: no meshes
+  Path data = {};          // dataset of a run, for its predictions; empty: no meshes
   std::int64_t steps = 0;  // of the whole run; 0: those of config.toml, if present
-  TermLabels labels = {};  // of its log, where there is no run.json
+  TermLabels labels = {};  // of its log, if there is no run.json
 };
 
 class LivePage {
@@ -40,8 +40,8 @@ class LivePage {
   // Updates the data: at once at the start of a stage, else once a second, or up to every five
   // seconds if updating would take more than a twentieth of the time.
   void Tell(const Progress& progress);
-  // Writes the data for the last time, with how the work ended. Returns the first problem since
-  // Start.
+  // Writes the data for the last time, with the outcome of the work. Returns the first problem
+  // since Start.
   Status Finish(const Status& outcome);
 
   // Whether a process keeps the page of a running run up to date.
@@ -64,7 +64,7 @@ class LivePage {
   Path file_, folder_;
   std::string stage_;
   Clock::time_point next_;  // not before this
-  std::set<Path> broken_;   // what made no mesh
+  std::set<Path> broken_;   // files that gave no mesh
   Status problem_;
 };
 

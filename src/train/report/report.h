@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page about a run, and what its script draws: curves and meshes, as JSON (report.js reads it).
+// The report page of a run, and the JSON of curves and meshes that its script draws (report.js).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -16,38 +16,38 @@ namespace tilegrad::train {
 
 // {"low": [3], "high": [3], "positions", "colors", "faces": base64, "texture"}: positions as 16
 // bits an axis over the bounding box, colours as 8 bits a channel (white where the mesh has none),
-// indices of `index_bytes` bytes; all little-endian. `texture`, where all faces share one:
-// {"image": address, "wrap": [2], "low": [2], "high": [2], "uvs": base64}, 16 bits a coordinate of
-// a corner; else null. Null for a mesh without faces.
+// indices of `index_bytes` bytes; all little-endian. `texture`, if all faces share one: {"image":
+// address, "wrap": [2], "low": [2], "high": [2], "uvs": base64}, 16 bits a coordinate of a corner;
+// else null. Null for a mesh without faces.
 nlohmann::ordered_json MeshJson(const Mesh& mesh);
-// The same in the middle of a cube of side 0.9. An error for a mesh without extent.
+// The same, centred in a cube of side 0.9. An error for a mesh without extent.
 Result<nlohmann::ordered_json> CentredMeshJson(Mesh mesh);
 
 // At most `count` entries: means over equal stretches, at the step of each stretch's last entry.
 std::vector<LogEntry> Thin(const std::vector<LogEntry>& log, std::size_t count);
 
-// {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each value
-// of the log but the clock's.
+// {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each logged
+// value except the clock's.
 nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels);
 
 // The same, with {"camera": {...}, "generated", "models": [...]}.
 nlohmann::ordered_json PageData(const ReportFacts& facts);
 
-// One page about a run that needs nothing but itself: what was trained, how good it is, curves,
-// pictures, meshes to turn, configuration, credits. It loads nothing from anywhere.
+// A self-contained page about a run: what was trained, how good it is, curves, pictures, meshes to
+// turn, configuration, credits.
 
 struct ReportJob {
-  Path run;        // with at least one whole checkpoint
+  Path run;        // with at least one complete checkpoint
   Path data;       // dataset folder
   Path out;        // the page
   int models = 8;  // held-out models to show, >= 0
-  // The models that it shows in one PNG, where the task has one; empty: not written.
+  // A PNG of all shown models, if the task has one; empty: not written.
   Path sheet = {};
 };
 
 struct ReportSummary {
   std::size_t bytes = 0;              // of the page
-  int models = 0;                     // that it shows
+  int models = 0;                     // shown
   bool evaluated = false;             // the run has an eval.json
   std::string sheet_columns;          // of ReportJob::sheet, if it was written
   std::vector<std::string> warnings;  // newer checkpoints that could not be read

@@ -227,7 +227,7 @@ std::string CellsHtml(const Values& values) {
   return out;
 }
 
-// Whether there is an F-score beside the main measure.
+// Whether there is an F-score besides the main measure.
 bool HasFScores(const Evaluation& evaluation) {
   return !Classifies(evaluation) && !IsOfPhotographs(evaluation);
 }

@@ -19,16 +19,16 @@ struct RunFacts {
   Path folder;
   RunHeader header;
   TrainConfig config;
-  std::string config_text;  // config.toml as it is
+  std::string config_text;  // config.toml verbatim
   std::vector<LogEntry> log;
 };
 
 // The contents of a report, gathered from the run and its task.
 struct ReportFacts {
   RunFacts run;
-  std::string data;       // the dataset's folder, as it was given
+  std::string data;       // the dataset's folder, as given
   std::string predictor;  // Predictor::description
-  std::int64_t step = 0;  // of the network that is shown: its checkpoint's
+  std::int64_t step = 0;  // of the checkpoint shown
   std::optional<Evaluation> evaluation;
   Showcase showcase;
 };
@@ -36,8 +36,8 @@ struct ReportFacts {
 std::string SummaryHtml(const ReportFacts& facts);  // what was trained on what, and how good it is
 std::string ComparisonHtml(const ReportFacts& facts);      // the mean of each method as bars
 Result<std::string> ModelsHtml(const ReportFacts& facts);  // a row of pictures a model
-std::string ScoresHtml(const ReportFacts& facts);          // the table, or that there is none yet
-std::string CommandsHtml(const ReportFacts& facts);        // how to make all this again
+std::string ScoresHtml(const ReportFacts& facts);    // the table, or a note that there is none yet
+std::string CommandsHtml(const ReportFacts& facts);  // the commands that reproduce it
 std::string MachineHtml(const ReportFacts& facts);
 std::string CreditsHtml(const ReportFacts& facts);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Section 5.3: what sharpens textures beside equation 14. A critic that learns to distinguish
-// rendered from true pictures (equation 15), features of the critic, and features of a network
-// trained beforehand (equation 16).
+// Section 5.3: the losses that sharpen textures, added to equation 14: a critic that learns to
+// distinguish rendered from true pictures (equation 15), feature matching with the critic, and a
+// perceptual loss with a pretrained network (equation 16).
 #pragma once
 
 #include <memory>
@@ -19,10 +19,10 @@
 
 namespace tilegrad::train {
 
-// Weights of 0 leave a part out. Section 5.3 has 0.5, 1, 1, a penalty of 0.5 and a rate of 1e-5.
+// A weight of 0 disables its term. Section 5.3 uses 0.5, 1, 1, a penalty of 0.5 and a rate of 1e-5.
 struct AdversaryConfig {
   double weight = 0;                 // lambda_adv
-  double features = 0;               // of the critic's features
+  double features = 0;               // of feature matching with the critic
   double perceptual = 0;             // lambda_per
   std::string network = "classify";  // PerceptualSource
   std::string network_file = {};
@@ -30,7 +30,7 @@ struct AdversaryConfig {
   std::string place = "rendered";                           // PenaltyPlace
   double learning_rate = 1e-5, beta1 = 0.5, beta2 = 0.999;  // of the critic's Adam
   std::int64_t base = 32, halvings = 4;                     // CriticShape
-  std::int64_t updates = 1;                                 // of the critic, each step
+  std::int64_t updates = 1;                                 // of the critic per step
 
   bool HasCritic() const { return weight > 0 || features > 0; }
 };
@@ -39,17 +39,17 @@ ConfigFields FieldsOf(AdversaryConfig* config);
 
 class Adversary {
  public:
-  // Errors: a word that is not known, a perceptual network that cannot be read.
+  // Errors: an unknown word, an unreadable perceptual network.
   static Result<std::unique_ptr<Adversary>> Make(nn::Context& context,
                                                  const AdversaryConfig& config, std::uint64_t seed);
 
   struct Pictures {
     nn::Var rendered;      // [n, 3, size, size]
     nn::Tensor truth;      // likewise
-    Portion portion = {};  // of the batch that they are
+    Portion portion = {};  // of the batch
   };
-  // Adds those of the three terms that have a weight. Numbers of both pictures are kept for the
-  // critic's updates on this portion, which come after this one.
+  // Adds the terms with non-zero weight. Keeps both pictures, detached, for the critic's updates on
+  // this portion, which follow.
   void AddLosses(const Pictures& pictures, LossSum* sum);
 
   // Updates of the critic in each step; 0 without one.
@@ -60,16 +60,17 @@ class Adversary {
     Portion portion = {};
     nn::GradientListener* listener = nullptr;
   };
-  // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
+  // Gradients of WganCriticLoss on the pictures that AddLosses kept. The first update appends the
+  // critic's logged terms.
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at, StepValues* values);
   Status UpdateCritic(std::span<const nn::Gradient> gradients, nn::UpdateShare* share) {
     return critic_->Update(gradients, 0, share);
   }
 
-  // Of the data with that fingerprint and the perceptual network, if there is one.
+  // Combines the fingerprint `data` with that of the perceptual network, if there is one.
   Result<std::string> Fingerprint(const std::string& data) const;
 
-  // Of the critic: weights and moments, as "critic...".
+  // Weights and moments of the critic, named "critic...".
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
   nn::Critic* critic() { return critic_ ? &critic_->network() : nullptr; }

@@ -23,13 +23,13 @@ struct LossConfig : RegularizerWeights {
 };
 
 struct RenderConfig {
-  // "dibr", "softras" or "n3mr". The rivals draw alpha alone, and there is no colour loss, unless
-  // RivalConfig enables one; they ignore the next three numbers. Pictures and scores
-  // are always drawn by "dibr".
+  // "dibr", "softras" or "n3mr". The rivals draw only alpha, without a colour loss unless
+  // RivalConfig enables one, and ignore the next three numbers. Pictures and scores always use
+  // "dibr".
   std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
-  double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
-                                  // run: a wide band first
+  double sharpness_start = 7000;  // at step 0; changes geometrically to `sharpness` over the first
+                                  // half of the run: a wide band first
   double max_alpha_error = 1e-5;
 };
 
@@ -40,13 +40,13 @@ struct OptimizerConfig {
   std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
   double beta1 = 0.9;
   double beta2 = 0.999;
-  double weight_decay = 0;  // AdamW's; a task that has it has the key, too
-  double average = 0;  // decay of a moving average of the weights, which is what predicts; 0: none
+  double weight_decay = 0;  // AdamW's; a key only of tasks that use it
+  double average = 0;  // decay of the moving average of the weights, which then predicts; 0: none
 };
 
-// One after the other.
+// Concatenated.
 ConfigFields Joined(std::initializer_list<ConfigFields> parts);
-// What a task does not have of a table that it shares.
+// Drops the keys of a shared table that a task does not use.
 ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view> keys);
 
 ConfigFields FieldsOf(SphereConfig* config);  // of [network]; without n3mr_vertices
@@ -59,7 +59,7 @@ struct UNetKeys {
 };
 ConfigFields FieldsOf(const UNetKeys& keys);
 
-// The head of vertices starts as N(0, this^2).
+// Standard deviation of the vertex head's initial weights, N(0, value^2).
 ConfigField OutputDeviation(double* value);
 
 ConfigFields FieldsOf(LossConfig* config);
@@ -69,14 +69,14 @@ ConfigFields FieldsOf(OptimizerConfig* config);
 // The learning rate and 1/delta at a step of a run of `steps`.
 double LearningRateAt(const OptimizerConfig& config, std::int64_t steps, std::int64_t step);
 double SharpnessAt(const RenderConfig& config, std::int64_t steps, std::int64_t step);
-// Of square images with 1/delta = `sharpness`.
+// For square images with 1/delta = `sharpness`.
 RenderOptions OptionsOf(const RenderConfig& config, double sharpness, int size);
 
 // The terms of equation 14 that tasks share.
 
 // alpha and truth: [N, size, size].
 void AddIou(double weight, const nn::Var& alpha, const nn::Tensor& truth, LossSum* sum);
-// `loss`: of colours, however they are compared.
+// `loss`: any colour loss.
 void AddColor(double weight, const nn::Var& loss, LossSum* sum);
 
 }  // namespace tilegrad::train

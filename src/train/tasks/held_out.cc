@@ -223,7 +223,8 @@ namespace {
 
 constexpr int kCellSize = 192;  // pixels a side, or the largest multiple of a picture's below
 
-// Of the truth of the second view, in Example::pictures: truth and prediction of each view.
+// Index of the second view's truth in Example::pictures, which has truth and prediction of each
+// view.
 constexpr std::size_t kTurnedTruth = 2;
 
 Status AddRow(const Example& example, const UnlitPictures& request, const Workers& workers,

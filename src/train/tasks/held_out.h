@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tasks share that learn from a dataset's images and predict a mesh from one: evaluation and
-// examples on its held-out models.
+// Evaluation and examples on held-out models, shared by the tasks that learn from a dataset's
+// images and predict a mesh from one.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,7 @@ namespace tilegrad::train {
 
 inline constexpr int kShownViews = 3;
 
-// Fits in so many steps, on the workers, what a task predicts.
+// Makes a function that fits, in `steps` steps on the workers, what a task predicts.
 using MakeFitFunction = std::function<FitFunction(const DatasetInfo&, int steps, const Workers&)>;
 
 // Scores of eval/evaluate.h. Errors: as CheckHeldOut and Evaluate; images of another size.
@@ -44,9 +44,9 @@ std::vector<int> ShownViews(int views);
 // The examples of a report in one image.
 
 // Fills sheet and sheet_columns from examples that show, as ShowHeldOut makes them, ShownViews of
-// the dataset, each as truth and prediction. A row an example: what the network sees, its
+// the dataset, each as truth and prediction. One row per example: what the network sees, its
 // prediction from there, its prediction from the second view, and the truth from there. Predictions
-// are drawn in detail, the dataset's pictures pixel by pixel. Nothing without examples.
+// are drawn in detail, the dataset's pictures pixel by pixel. Does nothing without examples.
 Status AddSheet(int image_size, const Workers& workers, Showcase* showcase);
 
 }  // namespace tilegrad::train

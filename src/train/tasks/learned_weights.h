@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The weights of a network as training moves and keeps them: Adam under a schedule, and a moving
+// The weights of a network during training: Adam with a learning-rate schedule, and a moving
 // average that predicts.
 #pragma once
 
@@ -18,16 +18,16 @@ namespace tilegrad::train {
 
 class LearnedWeights {
  public:
-  // Of a run of `steps`. `network` outlives it.
+  // For a run of `steps` steps. `network` outlives it.
   LearnedWeights(nn::Context& context, nn::Module& network, const OptimizerConfig& config,
                  std::int64_t steps);
 
-  // Of `loss`, a LossSum's that `values` has. One that is not finite, or whose gradients are not,
-  // is an error with its terms.
+  // Gradients of `loss`, the LossSum recorded in `values`. A loss or gradient that is not finite is
+  // an error that lists the terms.
   Result<nn::StepVector<nn::Gradient>> Gradients(const nn::Var& loss,
                                                  nn::GradientListener* listener,
                                                  const StepValues& values);
-  // One step of Adam, and of the moving average if there is one. `share`: of Adam::Step.
+  // One step of Adam, and of the moving average if there is one. `share`: see Adam::Step.
   Status Update(std::span<const nn::Gradient> gradients, std::int64_t step,
                 nn::UpdateShare* share = nullptr);
 
@@ -46,15 +46,15 @@ class LearnedWeights {
   OptimizerConfig config_;
   std::int64_t steps_;
   nn::Adam adam_;
-  nn::MovingAverage average_;  // of no tensors without OptimizerConfig::average
+  nn::MovingAverage average_;  // empty without OptimizerConfig::average
 };
 
-// The weights that predict: the averages, where the run kept some.
+// Loads the weights that predict: the moving averages, where the run kept some.
 Status LoadPredictingWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state);
 
 // A critic with its optimiser: one side of the Wasserstein game (losses/wgan_gp.h).
 
-// A term of the log, as LossSum takes it; without a name nothing is noted.
+// A logged term, as LossSum takes it; without a name it is not logged.
 struct TermWords {
   const char *name = nullptr, *label = nullptr;
 };
@@ -72,8 +72,9 @@ class LearnedCritic {
     nn::CriticShape shape;
     WganGpOptions game;
     OptimizerConfig optimizer;
-    std::int64_t steps = 1;  // of the schedule of its rate
-    // Weights follow from the seed and the first number, interpolates from it and the second.
+    std::int64_t steps = 1;  // of the learning-rate schedule
+    // The seed with `weights` determines the initial weights, with `interpolates` the penalty's
+    // interpolates.
     std::uint64_t seed = 0, weights = 0, interpolates = 0;
   };
   LearnedCritic(nn::Context& context, const Job& job);
@@ -83,8 +84,8 @@ class LearnedCritic {
   struct Pair {
     nn::Tensor real, fake;
   };
-  // Of WganCriticLoss on batch `number`. A loss or gradient that is not finite is an error. What is
-  // watched is appended to `values`, if they are there.
+  // Gradients of WganCriticLoss on batch `number`. A loss or gradient that is not finite is an
+  // error. Appends the logged terms to `values`, unless null.
   Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, std::uint64_t number,
                                                  nn::GradientListener* listener,
                                                  StepValues* values);
@@ -94,7 +95,7 @@ class LearnedCritic {
     return weights_.Update(gradients, step, share);
   }
 
-  // Under the role's prefix; after so many updates.
+  // Under the role's prefix; `updates`: taken so far.
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t updates);
   nn::Critic& network() { return critic_; }
@@ -111,7 +112,7 @@ class LearnedCritic {
   LearnedWeights weights_;
 };
 
-// Tensors under prefix + name, and back: those that have the prefix, without it.
+// Adds the prefix to all names; and back: the tensors with the prefix, without it.
 std::vector<nn::NamedTensor> WithPrefix(const std::string& prefix,
                                         std::vector<nn::NamedTensor> tensors);
 std::vector<nn::NamedTensor> OfPrefix(const std::string& prefix,

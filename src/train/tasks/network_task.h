@@ -33,20 +33,21 @@ class NetworkTask : public Task {
 
  protected:
   virtual LearnedWeights& weights() = 0;
-  // Of a portion of a step's batch, on the tape, as a LossSum of `out` has it. Sets out->images.
+  // The loss of a portion of the step's batch, on the tape, summed by a LossSum of `out`. Sets
+  // out->images.
   virtual Result<nn::Var> Loss(const UpdateIndex& at, const Slots& slots, StepValues* out) = 0;
 
-  // What Start begins with: sets context_ and lesson_.batch.
+  // The first part of Start: sets context_ and lesson_.batch.
   Status BeginStart(const TaskStart& start, std::int64_t batch);
-  // `start.run`: a new run whose network starts as that of `run`, a folder or a checkpoint, with
-  // the weights that predict there and an optimiser that has taken no step.
+  // `start.run`: initialises a new run's network with the weights that predict of `run`, a folder
+  // or a checkpoint; the optimiser starts fresh.
   Status StartAs(const Path& run);
 
   nn::Context* context_ = nullptr;
-  std::unique_ptr<Adversary> adversary_;  // made when the task starts; or none
+  std::unique_ptr<Adversary> adversary_;  // made by Start; null: none
   struct Lesson {
     std::string source = {};                        // of the data
-    int objects = 0;                                // of an epoch
+    int objects = 0;                                // per epoch
     std::int64_t batch = 1;                         // objects a step
     double half_extent = CameraRule().half_extent;  // of the data's objects
   } lesson_;                                        // complete after Start

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pictures of a step are read, drawn and changed beside the step before (base/side_loop.h), so
-// that workers for whom its loops have no task are busy. What is in a batch follows from its place
-// in the run alone: who makes it, and when, changes no bit.
+// Prefetching: reads, renders and augments the pictures of a step during the step before
+// (base/side_loop.h), to keep workers busy for which that step's loops have no task. A batch
+// depends only on its place in the run: who makes it, and when, changes no bit.
 #pragma once
 
 #include <functional>
@@ -12,16 +12,16 @@
 
 namespace tilegrad::train {
 
-// A batch that is being made: its memory is there, each task fills a part.
+// A batch in preparation: its memory is allocated, and each task fills a part.
 template <class Batch>
 struct BatchWork {
   std::size_t tasks = 0;
   SideLoop::Task run;  // called by several threads, each with a lane of its own
-  // The batch, once all tasks are done, or why there is none. On the context's thread, once.
+  // Called once, after all tasks, on the context's thread: the batch, or the error.
   std::function<Result<Batch>()> finish;
 };
 
-// On all workers, now. Lanes are workers.
+// Does the work now, on all workers. Lanes are workers.
 template <class Batch>
 Result<Batch> MakeNow(const BatchWork<Batch>& work, const Workers& workers) {
   workers.For(work.tasks, work.run);
@@ -33,7 +33,8 @@ class NextBatch {
  public:
   explicit NextBatch(const Workers& workers) : loop_(workers) {}
 
-  // The batch of `at`, and that of at.next is begun. `make`: BatchIndex -> BatchWork<Batch>.
+  // Returns the batch of `at` and starts on that of at.next. `make`: BatchIndex ->
+  // BatchWork<Batch>.
   template <class Make>
   Result<Batch> Take(const UpdateIndex& at, const Make& make) {
     const BatchIndex now{at.step, at.portion};
@@ -45,7 +46,7 @@ class NextBatch {
     return batch;
   }
 
-  // Waits until what has begun is ready.
+  // Waits for the batch in preparation.
   void Settle() { loop_.Finish(); }
 
  private:
@@ -59,7 +60,7 @@ class NextBatch {
 
   BatchWork<Batch> work_;
   std::optional<BatchIndex> begun_;
-  SideLoop loop_;  // last: it ends before its work goes
+  SideLoop loop_;  // last: ends before its work is destroyed
 };
 
 }  // namespace tilegrad::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tasks there are, by the name that `task.kind` has in a configuration.
+// The known tasks, by their `task.kind` in configurations.
 #pragma once
 
 #include <memory>
@@ -13,10 +13,11 @@ inline constexpr const char* kDefaultTask = "single_image";  // of configuration
 
 using TaskFactory = std::unique_ptr<Task> (*)();
 
-// For additional tasks of a program, before any training; tilegrad's own are registered already.
+// Registers a task of an embedding program, before any training; tilegrad's own are registered
+// already.
 void RegisterTask(const std::string& kind, TaskFactory make);
 
-// With the defaults of its fields. InvalidArgument lists the kinds there are.
+// With the defaults of its fields. InvalidArgument lists the known kinds.
 Result<std::unique_ptr<Task>> MakeTask(const std::string& kind);
 
 // tilegrad's own, by their kinds. "single_image": section 5.1 of the paper, shape and vertex

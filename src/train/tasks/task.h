@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a task is to the rest of the program: its configuration, its steps, its state, its
-// predictions, its scores and what a report shows. Training, eval, predict and report know tasks
-// through this file only. How to add one: docs/adding.md.
+// The interface between a task and the rest of the program: its configuration, its steps, its
+// state, its predictions, its scores and what a report shows. Training, eval, predict and report
+// know tasks only through this file. How to add one: docs/adding.md.
 #pragma once
 
 #include <functional>
@@ -36,17 +36,17 @@ class GeneratorModel;
 class PhotographModel;
 class TexturedModel;
 
-// What a task starts training with.
+// The inputs of Task::Start.
 struct TaskStart {
   nn::Context& context;  // outlives the task
   Schedule schedule;
   Path data;  // dataset folder
   const ProgressSink& progress;
   const StopFlag& stop;
-  WarningSink warn = nullptr;  // of what is likely not what was meant
+  WarningSink warn = nullptr;  // for likely mistakes of the user
 };
 
-// What a portion of a step's batch is known by.
+// Identifies a portion of a step's batch.
 struct BatchIndex {
   std::int64_t step = 0;  // from 0
   Portion portion{};
@@ -61,38 +61,39 @@ struct UpdateIndex {
   Portion portion{};                         // of the batch
   nn::GradientListener* listener = nullptr;  // for nn::Gradients
   nn::UpdateShare* share = nullptr;          // for nn::Adam::Step
-  // The batch that this process computes with after this one, if the run has one more: it may be
-  // made meanwhile.
+  // The batch that this process uses after this one, if the run has one more: Backward may prefetch
+  // it.
   std::optional<BatchIndex> next = std::nullopt;
 };
 
-// A trained network as commands use it. Of most tasks it predicts: images in, meshes out.
+// A trained network as commands use it. For most tasks it predicts meshes from images.
 class Model {
  public:
   virtual ~Model() = default;
   std::int64_t parameters() const { return parameters_; }
   // The tensors that Task::LoadModel reads: all that a file of weights needs.
   const std::vector<nn::NamedTensor>& weights() const { return weights_; }
-  // What it predicts before it has learned anything, normalised as predictions are. Without
-  // vertices of a task that predicts no meshes.
+  // The mesh that predictions deform, normalised as they are; without vertices if the task predicts
+  // no meshes.
   const Mesh& template_mesh() const { return template_; }
   // images: [N][4][size][size] planar RGBA bytes, RGB over black, of the size it was trained on;
-  // N at most kImagesAtOnce. Appends N valid meshes. InvalidArgument of a task that predicts none.
+  // N at most kImagesAtOnce. Appends N valid meshes. InvalidArgument if the task predicts none.
   virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes);
-  // Itself, of the task that has such models; else null.
+  // This model as that of a particular task, or null.
   virtual ClassifierModel* classifier() { return nullptr; }
   virtual GeneratorModel* generator() { return nullptr; }
   virtual PhotographModel* photographs() { return nullptr; }
   virtual TexturedModel* textured() { return nullptr; }
-  // Why a prediction cannot be refined on its picture (fit/refine.h), if so.
+  // An error that says why, if predictions cannot be refined on their picture (fit/refine.h).
   virtual Status CheckRefinable() const { return {}; }
 
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
 
  protected:
-  // Loads, counts and notes the weights that predict. Errors say what does not fit in the state.
+  // Loads the weights that predict, and sets parameters_ and weights_. Errors say what in the state
+  // does not fit.
   Status LoadWeights(nn::Module& network, const std::vector<nn::NamedTensor>& state);
-  // Brought to the place and size of predictions, whose largest half-extent is that.
+  // Centres and scales it like predictions, to the largest half-extent `half_extent`.
   Status SetTemplate(const Mesh& start, double half_extent);
 
   std::int64_t parameters_ = 0;
@@ -100,8 +101,8 @@ class Model {
   Mesh template_;
 };
 
-// What is done to a prediction before it is scored, with the image that it was made from. Called
-// from several threads at once.
+// Changes a prediction before it is scored, given its input image. Called from several threads at
+// once.
 using PredictionChange =
     std::function<Result<Mesh>(const Mesh& prediction, std::span<const std::uint8_t> image)>;
 
@@ -112,11 +113,11 @@ struct TaskEvaluation {
   int views_per_model = 24;
   PredictionChange change{};  // none: predictions are scored as they are
   // Steps that fit a prediction to all views of each scored model, for an upper-bound row; 0: none.
-  // An error where a task has no such row.
+  // An error for tasks without such a row.
   int oracle_steps = 0;
   ProcessGroup* group =
-      nullptr;  // of ranks that score models together; only on rank 0 are scores whole
-  // By whose rule voxels of an IoU are made; none: that of the dataset's.
+      nullptr;  // the ranks that score models together; only rank 0 gets complete scores
+  // The voxelization rule of the IoU; none: that of the dataset's own voxels.
   std::optional<VoxelRule> voxels = std::nullopt;
 };
 
@@ -132,7 +133,7 @@ struct Example {
   std::string creator, license;        // empty where unknown
   Mesh prediction, truth;              // without faces: none
   std::vector<ShownPicture> pictures;  // the first is what the network sees
-  std::vector<Camera> cameras = {};    // of a dataset's views that `pictures` shows
+  std::vector<Camera> cameras = {};    // of the dataset's views in `pictures`
 };
 
 struct ShowcaseRequest {
@@ -150,48 +151,49 @@ struct Showcase {
   std::vector<std::string> credits;
   std::vector<Example> examples;
   bool generated = false;     // the examples are made from noise: none has an input or a truth
-  ImageU8 sheet;              // the examples in one picture, a row each; empty: there is none
+  ImageU8 sheet;              // all examples in one picture, a row each; empty: none
   std::string sheet_columns;  // what its columns are
-  double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the view on meshes; degrees
+  double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the viewer of meshes; degrees
 };
 
 class Task {
  public:
   virtual ~Task() = default;
 
-  // Its keys. They point into the task, which is made with their defaults.
+  // Its keys, which point into the task and have their defaults at first.
   virtual ConfigFields Fields() = 0;
-  // What scores a run of it, as words after "tilegrad" and before "--run".
+  // The command that scores its runs: the words between "tilegrad" and "--run".
   virtual const char* ScoreCommand() const { return "eval"; }
 
-  // ---- Training. Start comes first, once, when the fields have their values.
+  // ---- Training. Start is called first, once, after the fields are set.
 
-  // Opens the data and builds networks and optimisers; all that is random follows from the seed.
+  // Opens the data and builds networks and optimisers; the seed determines all randomness.
   virtual Status Start(const TaskStart& start) = 0;
-  // Side of its images in pixels; a run continues with the same.
+  // Side of its images in pixels; the same in a resumed run.
   virtual int image_size() const = 0;
-  // Of what it predicts, world units: that of the dataset's objects. After Start.
+  // Half-extent of its predictions, world units: that of the dataset's objects. After Start.
   virtual double half_extent() const { return CameraRule().half_extent; }
   virtual RunHeader Header() = 0;  // without name, dataset folder and machine
-  // What it learns from, train/data/fingerprint.h: ranks compare them. After Start.
+  // Fingerprint of its training data (train/data/fingerprint.h), which ranks compare. After Start.
   virtual Result<std::string> Fingerprint(const Path& data, const Workers& workers) const;
-  // Files of its own in the run's folder; an error if a run cannot continue with the present files.
+  // Writes its own files to the run folder; an error if a run cannot be resumed with the files
+  // there.
   virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
 
   virtual int Updates(std::int64_t /*step*/) const { return 1; }
-  // The gradients of what an update moves, of the mean loss over `at.portion` of the batch. Sets
-  // values->loss and images, and appends terms. A loss or gradient that is not finite is an error.
-  // Changes nothing that a later step would notice, but Statistics(). What an update leaves for the
-  // next one of its step, it leaves for the same portion.
+  // The gradients, for the parameters of this update, of the mean loss over `at.portion` of the
+  // batch. Sets values->loss and images, and appends terms. A loss or gradient that is not finite
+  // is an error. Changes no state that later steps see, except Statistics(). Whatever an update
+  // keeps for the step's next one, it keeps per portion.
   virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
                                                         StepValues* values) = 0;
-  // Returns when nothing that Backward has begun for UpdateIndex::next is under way.
+  // Waits for whatever Backward has started for UpdateIndex::next.
   virtual void Settle() {}
-  // The tensors that Backward changes: nn::Buffers of its networks. Each portion starts with what
-  // the step started with, and the step ends with the mean of what they end with. The default is an
-  // error: a task has to say that it knows of portions.
+  // The tensors that Backward changes: nn::Buffers of its networks. Each portion starts from their
+  // values at the start of the step, and the step ends with the mean over portions. The default is
+  // an error: a task must declare that it supports portions.
   virtual Result<std::vector<nn::NamedTensor>> Statistics();
-  // Steps along `gradients`, of which the caller may have made means over portions.
+  // Takes an optimiser step along `gradients`, which the caller may have averaged over portions.
   virtual Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) = 0;
 
   // Everything that later steps depend on, under unique names: weights, statistics, moments of each
@@ -199,11 +201,10 @@ class Task {
   virtual std::vector<nn::NamedTensor> State() = 0;
   virtual Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) = 0;
 
-  // What the networks do after `steps` steps, in one picture; an empty one if there is nothing to
-  // show.
+  // One picture of what the networks do after `steps` steps; empty if there is nothing to show.
   virtual Result<ImageU8> SamplePicture(std::int64_t steps) = 0;
 
-  // ---- Afterwards. Start was not called; the fields have their values.
+  // ---- After training. Start was not called; the fields are set.
 
   virtual Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
                                                    const Checkpoint& checkpoint) = 0;

@@ -23,8 +23,8 @@ _UNBATCHED = ("faces",)  # the same for all meshes of a batch
 
 class SurfaceMesh:
     """A triangle mesh, or B of them with the same faces. Members may be set, also to None; one that
-    is not set is computed where that is possible, and None elsewhere. Computed ones are computed
-    anew each time, so that they follow what they come from.
+    is not set is computed if possible, else None. Computed ones are recomputed at each access, so
+    that they follow their sources.
 
     vertices [V,3]; faces [F,3] int64; normals [N,3] with face_normals_idx [F,3]; uvs [T,2] with
     face_uvs_idx [F,3]; vertex_normals [V,3]; vertex_colors, vertex_features [V,C]; face_colors,

@@ -112,7 +112,7 @@ class Builder {
     ProcessGroup* const group = options_.group;
     TILEGRAD_TRY(group ? MakeTogether(*group) : Prepare());
     if (group && !group->leads()) return std::move(summary_);
-    // What other ranks made is there as if an earlier run had made it.
+    // Models of other ranks count like those of an earlier build.
     TILEGRAD_TRY(MakeShare({0, 1}));
     return Finish();
   }
@@ -189,7 +189,7 @@ class Builder {
     if (stamp.status().code() == StatusCode::kIo) Fail(stamp.status());
   }
 
-  // What is refused for one model may be refused for all, and is no fault of the model's.
+  // A refused resource may be refused for all models, and is no fault of this one.
   void Fail(const Status& status) {
     const std::lock_guard lock(mutex_);
     if (failure_.ok()) failure_ = status;
@@ -197,7 +197,7 @@ class Builder {
   }
 
   Status MakeMissing(const Share& share) {
-    // The list stands for a complete set, which this no longer is.
+    // The list marks a complete set, which this no longer is.
     std::error_code error;
     std::filesystem::remove(ModelsPath(folder_), error);
     std::vector<LitRenderer> renderers(static_cast<std::size_t>(workers_.count()));
@@ -282,7 +282,7 @@ class Builder {
     return model;
   }
 
-  // What the source fixes stands; the rest is ours.
+  // Keeps what the source fixes; the rest is ours.
   void Split() {
     SplitModels(info_.classes, options_.split, &summary_.models);
     for (std::size_t i = 0; i < usable_.size(); ++i) {

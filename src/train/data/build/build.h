@@ -28,14 +28,13 @@ struct BuildOptions {
   int limit = 0;      // at most that many in all; 0: all
   UpAxis up = UpAxis::kY;                 // of the source's meshes
   std::vector<std::string> classes = {};  // only these; empty: all
-  bool anew = false;                      // a dataset that is there goes first
+  bool anew = false;                      // removes an existing dataset first
   bool allow_broken = false;  // any share of a published set may be unusable (broken_members.h)
-  // Ranks that make the dataset together, in one folder that all of them see; null: this process
-  // alone.
+  // The ranks that build the dataset together, in a folder that all see; null: this process alone.
   ProcessGroup* group = nullptr;
 };
 
-// What was left out of a model that is used all the same.
+// A warning about a model that is used all the same.
 struct ModelWarning {
   std::string file, text;
 };
@@ -45,27 +44,27 @@ struct BuildSummary {
   DatasetInfo info;
   std::vector<RejectedModel> rejected;
   BrokenMembers broken;                // the same, counted by reason
-  std::vector<ModelWarning> warnings;  // of models that this run read; kept ones are not read again
+  std::vector<ModelWarning> warnings;  // of models that this build read, not of kept ones
   std::vector<IgnoredFile> ignored;    // by the source
-  int reused = 0;                      // model files that an earlier run had finished
+  int reused = 0;                      // model files kept from an earlier build
   std::uint64_t bytes = 0;             // of the dataset's files
 };
 
-// Fills `folder` (dataset.h says with what). Model files that are there, readable and of the same
-// recipe are kept, so an interrupted run goes on where it stopped and gives the same bytes as one
-// that was not interrupted; so does any number of workers and ranks. Models that fail are listed in
-// rejected.jsonl and left out. `stop` ends the run between models with kCancelled. Errors: a folder
-// that holds a dataset of another recipe, options out of range, no usable model, too many broken
-// ones of a published set, a full disk. With a group every rank calls it and rank 0 gets the
-// summary, but for warnings of models that others read.
+// Writes the files of dataset.h to `folder`. Keeps readable model files of the same recipe, so that
+// an interrupted build resumes where it stopped and gives the same bytes as an uninterrupted one,
+// with any number of workers and ranks. Lists models that fail in rejected.jsonl and omits them.
+// `stop` ends it between models with kCancelled. Errors: a folder that holds a dataset of another
+// recipe, options out of range, no usable model, too many broken ones of a published set, a full
+// disk. With a group every rank calls it and rank 0 gets the summary, without warnings of models
+// that others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers,
                                   const ProgressSink& progress, const StopFlag& stop);
 
-// Which models of a source a dataset gets.
+// Chooses the models of a source for a dataset.
 
-// Entries by classes, per_class, liveries and limit; ascending. The first by hash, so that a part
-// of a set is as varied as the whole: first of shapes, then of the models of each.
+// Selects entries by classes, per_class, liveries and limit; ascending. Takes the first by a hash,
+// first of shapes, then of the models of each, so that a part of a set is as varied as the whole.
 std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
                                        const BuildOptions& options);
 

@@ -7,7 +7,7 @@ namespace tilegrad::train {
 
 inline constexpr float kGlassAlpha = 0.2f;  // materials with less are glass
 
-// Removes faces of glass, unless nothing would be left: what is behind it is what people see.
+// Removes faces of glass, because people see what is behind them, unless nothing would be left.
 // Everything else counts as opaque.
 void RemoveGlass(Mesh* mesh);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From one loaded model to the data that a dataset keeps of it.
+// Makes the data that a dataset keeps of one loaded model.
 #pragma once
 
 #include <string>
@@ -15,9 +15,8 @@ struct MadeModel {
   ModelStamp stamp;
 };
 
-// Prepared, rendered,
-// voxelised, sampled (seeded by class and id) and reduced for reports. A pure function of the
-// model, the entry and `info`.
+// Prepares, renders, voxelises, samples (seeded by class and id) and, for reports, simplifies a
+// model. A pure function of the model, the entry and `info`.
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
                             LitRenderer& renderer);
 

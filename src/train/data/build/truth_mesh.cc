@@ -66,7 +66,7 @@ Mesh JoinCorners(const Mesh& mesh, const ColorList& colors, KeyOf key_of) {
   return out;
 }
 
-// What vertex v has, as what vertex to[v] has, of `kept`; negative: left out.
+// Moves the value of vertex v to vertex to[v] of `kept`; negative: dropped.
 template <class T>
 void Renumber(const std::vector<std::int32_t>& to, std::int32_t kept, std::vector<T>* values) {
   if (values->empty()) return;
@@ -77,7 +77,7 @@ void Renumber(const std::vector<std::int32_t>& to, std::int32_t kept, std::vecto
   *values = std::move(out);
 }
 
-// Vertices that no face uses any more go.
+// Drops vertices that no face uses any more.
 void DropUnused(Mesh* mesh) {
   std::vector<std::int32_t> to(mesh->positions.size(), -1);
   std::int32_t kept = 0;
@@ -133,7 +133,7 @@ void JoinVertices(const Bounds& bounds, int cells, Mesh* mesh) {
   }
 }
 
-// Those that have no area or double another; false if no others are there.
+// Drops faces that have no area or duplicate another; false if no others are left.
 bool DropSpentFaces(Mesh* mesh) {
   std::set<Face> seen;
   std::vector<char> keep;

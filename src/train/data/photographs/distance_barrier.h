@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far pixels are from a mask, as CMR's texture flow is kept on the object by it
-// (compute_dt_barrier of its code).
+// Distances of pixels from a mask, which keep CMR's texture flow on the object (compute_dt_barrier
+// of its code).
 #pragma once
 
 #include <span>
@@ -13,8 +13,8 @@ namespace tilegrad::train {
 // Huttenlocher, "Distance transforms of sampled functions", 2012.
 std::vector<double> SquaredDistances(std::span<const float> mask, int size, bool inside);
 
-// 1 / (1 + exp(-50 d)), d: the distance to the object less the distance to what is not, in parts of
-// the side. About 0 inside, 1/2 at the edge and 1 outside. Into out [size][size].
+// 1 / (1 + exp(-50 d)), d: the distance to the object minus the distance to the background,
+// relative to the side. About 0 inside, 1/2 at the edge and 1 outside. Into out [size][size].
 void DistanceBarrier(std::span<const float> mask, int size, std::span<float> out);
 
 }  // namespace tilegrad::train

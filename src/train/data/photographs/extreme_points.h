@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keypoints of rendered models, which nobody has annotated: the vertices that reach farthest in
-// fixed directions, in coordinates that the half extents of the bounding box are the units of.
+// Keypoints of rendered models, which have no annotations: the vertices that reach farthest in
+// fixed directions, in coordinates scaled by the half extents of the bounding box.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct ExtremePoint {
 extern const std::array<ExtremePoint, 12> kExtremePoints;
 std::vector<int> ExtremeMirror();  // keypoint i is the mirror image of keypoint [i]
 
-// Of a mesh with vertices: the mean of the vertices that reach farthest, within a hundredth.
+// For a mesh with vertices: the mean of the vertices that reach farthest, within a hundredth.
 std::vector<glm::vec3> FindExtremePoints(const Mesh& mesh);
 
 }  // namespace tilegrad::train

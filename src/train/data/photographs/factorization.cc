@@ -115,7 +115,7 @@ void Align(const KeypointViews& job, RigidMotion* rigid) {
   rigid->shape = std::move(shape);
 }
 
-// Keypoints about their mean in parts of the view's extent, so that all views count the same.
+// Keypoints about their mean in units of the view's extent, so that all views have equal weight.
 struct Normalization {
   double x = 0, y = 0, extent = 1;
 };
@@ -219,7 +219,7 @@ using points3::Cross, points3::Dot, points3::Point, points3::Unit, points3::oper
 using Views = KeypointRows;
 
 constexpr int kAffineRounds = 60, kRigidRounds = 40;
-constexpr double kRidge = 1e-3;  // of motions, in parts of a view's weight
+constexpr double kRidge = 1e-3;  // of motions, relative to a view's weight
 
 // Two rows of a 3 x 3 map, and a shift.
 struct Motion {
@@ -238,7 +238,7 @@ struct Affine {
   double squares = 0;
 };
 
-// Of one view: [S 1] -> x and y by least squares.
+// Fits one view: [S 1] -> x and y by least squares.
 Motion FitMotion(const std::vector<Point>& shape, const std::vector<Keypoint>& view) {
   NormalEquations coordinates[2] = {NormalEquations(4), NormalEquations(4)};
   double weight = 0;
@@ -259,7 +259,7 @@ Motion FitMotion(const std::vector<Point>& shape, const std::vector<Keypoint>& v
   return out;
 }
 
-// Of one keypoint, over all views that see it. Stays where none does.
+// Fits one keypoint over all views that see it; it stays if none does.
 void FitPoint(const std::vector<Motion>& motions, const Views& views, std::size_t k, Point* point) {
   NormalEquations equations(3);
   for (std::size_t i = 0; i < 3; ++i) equations.Diagonal(i) = 1e-9;

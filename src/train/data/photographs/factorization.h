@@ -19,37 +19,37 @@ namespace tilegrad::train {
 struct KeypointViews {
   std::vector<std::vector<Keypoint>> views;  // at least four visible in each
   std::vector<int> mirror;                   // PhotographSet::mirror
-  // Pairs of keypoints (from, to), each the mean direction of an axis: to the object's left (+x),
-  // up (+y) and to its front (+z). The first is needed; of the others one is, or there is a choice
-  // of ours.
+  // Pairs of keypoints (from, to), whose mean direction is an axis: to the object's left (+x), up
+  // (+y) and to its front (+z). `left` is required; without both others, the longest extent across
+  // x is taken as the front.
   std::vector<std::pair<int, int>> left, up, front;
 };
 
 struct Structure {
   std::vector<std::array<double, 3>> shape;  // symmetric at x = 0, largest distance 2
   std::vector<WeakPerspective> cameras;      // of the views, in their pixels
-  double error = 0;  // root mean square over visible keypoints, in parts of a view's extent
+  double error = 0;  // root mean square over visible keypoints, in units of a view's extent
 };
 
-// Whether an object is seen from in front or its depth is turned around cannot be told from places
-// under orthography: visible keypoints are taken to be nearer than hidden ones. InvalidArgument
-// where there are too few views or keypoints.
+// Orthographic positions cannot distinguish a shape from its reflection in depth: without all three
+// axes, visible keypoints are taken to be nearer than hidden ones. InvalidArgument where there are
+// too few views or keypoints.
 Result<Structure> FactorizeKeypoints(const KeypointViews& job);
 
-// Where cameras are known: the points that they see at the keypoints, by least squares over all
-// views; the origin for a keypoint that none sees.
+// Triangulates the keypoints from known cameras, by least squares over all views; the origin for a
+// keypoint that none sees.
 std::vector<std::array<double, 3>> LocateKeypoints(const std::vector<std::vector<Keypoint>>& views,
                                                    const std::vector<WeakPerspective>& cameras);
 
-// The camera that sees `shape` at the visible keypoints best (least squares, Levenberg and
-// Marquardt), from `start`.
+// The camera that projects `shape` best onto the visible keypoints (least squares,
+// Levenberg-Marquardt), from `start`.
 WeakPerspective FitWeakCamera(const std::vector<std::array<double, 3>>& shape,
                               const std::vector<Keypoint>& keypoints, WeakPerspective start);
 // Root mean square of the distances in pixels.
 double WeakCameraError(const std::vector<std::array<double, 3>>& shape,
                        const std::vector<Keypoint>& keypoints, const WeakPerspective& camera);
 
-// The alternation behind factorization.h, before shapes are turned to an object's axes.
+// The alternation behind FactorizeKeypoints, before shapes are rotated to an object's axes.
 
 using KeypointRows = std::vector<std::vector<Keypoint>>;  // [view][keypoint]
 
@@ -59,13 +59,13 @@ struct RigidMotion {
   double squares = 0;  // of the residuals
 };
 
-// Rows of three numbers and a shift for each view, and points, in turn by least squares from a
-// random start; then the map after which rows are orthogonal and as long as each other; then
-// cameras and points in turn. Views are to be of about unit extent.
+// Alternates least squares for each view's rows and shift and for the points, from a random start;
+// then finds the map that makes each view's rows orthogonal and of equal length; then alternates
+// cameras and points. Views should have about unit extent.
 RigidMotion FindRigidMotion(const KeypointRows& views, std::uint64_t seed);
 
-// Of one keypoint, where cameras are known: by least squares over the views that see it; the origin
-// if none does.
+// Triangulates one keypoint from known cameras, by least squares over the views that see it; the
+// origin if none does.
 std::array<double, 3> LocateKeypoint(const KeypointRows& views,
                                      const std::vector<WeakPerspective>& cameras, std::size_t k);
 

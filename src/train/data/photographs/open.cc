@@ -9,7 +9,8 @@
 namespace tilegrad::train {
 namespace {
 
-// What no annotation means: a crop of it would take hours, or a loss would not be finite.
+// Limits beyond which an annotation is an error: a crop would take hours, or a loss would not be
+// finite.
 constexpr double kFarthestPlace = 1 << 20;                    // pixels
 constexpr double kSmallestScale = 1e-6, kLargestScale = 1e6;  // pixels for a unit of the world
 

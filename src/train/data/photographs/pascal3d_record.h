@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a file of PASCAL3D+'s own annotations says: Annotations/<class>_<imagenet|pascal>/*.mat,
-// release 1.1 (Y. Xiang, R. Mottaghi, S. Savarese, "Beyond PASCAL", WACV 2014).
+// A file of PASCAL3D+'s own annotations: Annotations/<class>_<imagenet|pascal>/*.mat, release 1.1
+// (Y. Xiang, R. Mottaghi, S. Savarese, "Beyond PASCAL", WACV 2014).
 #pragma once
 
 #include <map>
@@ -16,8 +16,8 @@ namespace tilegrad::train {
 // In degrees; pixels count from (1, 1). The world is that of the set's CAD models: z up, front
 // towards -y; from azimuth 0 it is seen from the front.
 struct Pascal3dViewpoint {
-  double azimuth = 0, elevation = 0, theta = 0, distance = 0;  // theta: of the image
-  double focal = 1, viewport = 3000;                           // focal length in pixels: product
+  double azimuth = 0, elevation = 0, theta = 0, distance = 0;  // theta: in the image plane
+  double focal = 1, viewport = 3000;  // focal length in pixels: their product
   double px = 0, py = 0;
 };
 
@@ -25,9 +25,9 @@ struct Pascal3dObject {
   int number = 0;                           // place among the record's objects, from 1
   int cad = 0;                              // the CAD model that is most like it, from 1; 0: none
   bool whole = true;                        // neither truncated, occluded nor difficult
-  PhotoBox box;                             // as photographs.h counts
+  PhotoBox box;                             // in the coordinates of photographs.h
   std::map<std::string, Keypoint> anchors;  // likewise
-  Pascal3dViewpoint viewpoint;              // distance 0: there is only a coarse one
+  Pascal3dViewpoint viewpoint;              // distance 0: only a coarse one
 };
 
 struct Pascal3dRecord {

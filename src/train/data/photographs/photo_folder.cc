@@ -89,7 +89,7 @@ class FolderReader {
  private:
   bool Has(const char* name) const { return PathExists(folder_ / name); }
 
-  // As `tilegrad views` and NeRF's datasets have them, which say what is held out.
+  // The files of `tilegrad views` and NeRF's datasets, which say what is held out.
   Result<std::vector<io::CameraView>> ReadSplitCameras() {
     TILEGRAD_ASSIGN(std::vector<io::CameraView> all, io::LoadCameras(folder_ / kTrain, {}));
     if (!Has(kTest)) return all;

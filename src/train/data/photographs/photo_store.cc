@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kCropStream = 0x63726f70;
 
-// Around the unmoved window there is room for this much jitter, in parts of its side.
+// Around the unmoved window there is room for this much jitter, relative to its side.
 constexpr double kMargin = CropRule::kMostJitter;
 
 // Area averaging: samples so dense that each pixel of the photograph is met.
@@ -135,7 +135,7 @@ Status PhotoStore::LoadOne(std::size_t i, const StopFlag& stop) {
   return {};
 }
 
-// Bilinear within what is stored; its edge goes on beyond it.
+// Bilinear within the stored crop, whose edge is extended beyond it.
 void PhotoStore::Resample(int i, const PhotoWindow& window, bool mirrored, std::span<float> rgb,
                           std::span<float> mask) const {
   const PhotoWindow& whole = windows_[static_cast<std::size_t>(i)];

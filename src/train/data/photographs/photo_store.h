@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs as a network sees them: square crops around the object, of one size, mirrored or not,
-// with keypoints and cameras that go with the crop. As CMR's loader cuts them, without
-// its rounding of boxes to whole pixels.
+// with keypoints and cameras transformed accordingly. As in CMR's loader, but boxes are not rounded
+// to whole pixels.
 #pragma once
 
 #include <span>
@@ -16,7 +16,7 @@
 namespace tilegrad::train {
 
 struct CropRule {
-  double padding = 0.05;  // of the box on each side, in parts of its width and height
+  double padding = 0.05;  // of the box on each side, relative to its width and height
   double jitter = 0.05;   // of each edge in training, the same way; at most kMostJitter
   static constexpr double kMostJitter = 0.1;
 };
@@ -26,20 +26,20 @@ struct PhotoWindow {
   double left = 0, top = 0, side = 1;
 };
 
-// The box, padded, its edges moved by up to `jitter` if there is an rng, made a square about its
-// middle by its longer side.
+// The padded box, with edges moved by up to `jitter` if there is an rng, enlarged to a square about
+// its middle.
 PhotoWindow WindowOf(const PhotoBox& box, const CropRule& rule, Rng* rng);
 
-// What belongs to a crop beside its pixels. Coordinates are [-1, 1] across it, x right, y down.
+// The annotations of a crop. Coordinates are [-1, 1] across it, x right, y down.
 struct CroppedPhoto {
   std::vector<Keypoint> keypoints;
   WeakPerspective camera;  // the identity where the photograph has none
-  // A length in [-1, 1] units times this is in parts of the longer side of the box, before padding.
+  // Converts a length in [-1, 1] units to units of the box's longer side, before padding.
   double to_box = 0.5;
 };
 
-// What is done to a photograph: `position` decides jitter and mirroring; without one it is cut
-// without either.
+// The augmentation of a photograph: `position` determines jitter and mirroring; neither unless
+// `random`.
 struct CropDraw {
   std::uint64_t seed = 0, position = 0;
   bool random = false;

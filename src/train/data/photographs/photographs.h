@@ -7,7 +7,7 @@
 //               pictures in images/ or CUB_200_2011/images/
 //   PASCAL3D+   as CMR's code lays it out: data/<class>_kps.mat, data/<class>_{train,val}.mat and
 //               sfm/<class>_{train,val}.mat, in the folder, p3d/ or cachedir/p3d/; pictures in
-//               Images/ or PASCAL3D+_release1.1/Images/. Its val is what we test on. Of rendered
+//               Images/ or PASCAL3D+_release1.1/Images/. Its val is our test split. For rendered
 //               objects (rendered_set.h) sfm_anno also has `points`, 3 x K: Photograph::points
 //   a folder    of pictures with alpha, or with masks/<name>.png; cameras of COLMAP,
 //               transforms.json, or transforms_train.json and transforms_test.json, which say what
@@ -32,7 +32,7 @@ namespace tilegrad::train {
 
 struct Keypoint {
   double x = 0, y = 0;
-  bool visible = false;  // x and y mean nothing where it is not
+  bool visible = false;  // x and y are meaningless where it is not
 };
 
 struct PhotoBox {
@@ -59,8 +59,8 @@ struct Photograph {
   PhotoMask mask;                   // empty: the picture's alpha
   std::vector<Keypoint> keypoints;  // as many as the set has names
   std::optional<WeakPerspective> camera;
-  // Where its keypoints truly are in the world of the cameras. Empty: nobody knows, as of all that
-  // was taken of real objects.
+  // True positions of its keypoints in the world of the cameras. Empty: unknown, as for all
+  // photographs of real objects.
   std::vector<std::array<double, 3>> points = {};
 };
 
@@ -70,7 +70,7 @@ struct PhotographSet {
   Path folder;
   std::vector<std::string> keypoint_names;
   std::vector<int> mirror;  // the mirror image of keypoint i is keypoint mirror[i]
-  // Their mean places in the world of the cameras, which is symmetric at x = 0; largest distance
+  // Their mean positions in the world of the cameras, which is symmetric at x = 0; largest distance
   // about 2. Empty: there are no keypoints.
   std::vector<std::array<double, 3>> mean_keypoints;
   std::vector<Photograph> photographs;
@@ -78,16 +78,16 @@ struct PhotographSet {
   std::vector<int> Select(Split split) const;
 };
 
-// By what is there. Errors name file and place, or the photograph: of boxes, keypoints and cameras,
-// too, that are far from any picture. At least one photograph of Split::kTrain; cameras,
-// where a folder has keypoints but none, are found by factorisation (factorization.h).
+// Detects the form. Errors name file and place, or the photograph, also of boxes, keypoints and
+// cameras that are far from any picture. At least one photograph is of Split::kTrain; if a folder
+// has keypoints but no cameras, factorisation finds them (factorization.h).
 Result<PhotographSet> OpenPhotographs(const Path& folder);
 
 // Errors: boxes, keypoints and cameras that are far from any picture.
 Status CheckPhotograph(const Photograph& photo);
 
-// The forms alone; nothing if the folder is not of that form. With `broken`, photographs whose
-// annotation makes no sense go there instead of ending it.
+// A single form; nullopt if the folder is not of that form. With `broken`, photographs with invalid
+// annotations go there instead of being an error.
 Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder,
                                                    BrokenMembers* broken = nullptr);
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder);

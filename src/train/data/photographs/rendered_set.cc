@@ -205,7 +205,7 @@ Similarity WorldOfCameras(const PhotographSet& set) {
   return FitSimilarity(mean, set.mean_keypoints);
 }
 
-// Of the test part alone: nothing else knows the models.
+// For the test part only: nothing else uses the true models.
 void TellTruth(PhotographSet* set) {
   const Similarity to_cameras = WorldOfCameras(*set);
   for (Photograph& photo : set->photographs) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Photographs that anyone can make: models in front of real backgrounds, one view of each object,
-// annotated as badly as real ones are, in the layout of PASCAL3D+ (photographs.h). Nothing knows
-// the models afterwards but the annotations of the test part, which are exact: also its cameras,
-// each that which sees its object's true keypoints best, in the world of the training part's.
+// Synthetic photographs that anyone can make: models in front of real backgrounds, one view of each
+// object, annotated as noisily as real ones, in the layout of PASCAL3D+ (photographs.h). Only the
+// annotations of the test part come from the true models and are exact, also its cameras: each is
+// the one that projects its object's true keypoints best, in the world of the training part's.
 #pragma once
 
 #include "base/parallel.h"
@@ -21,10 +21,10 @@ struct RenderedSetJob {
   std::uint64_t seed = 1;
 };
 
-// What is done to the training part's annotations.
+// The noise of the training part's annotations.
 struct AnnotationNoise {
   double mask = 2.0;       // pixels by which a mask's outline wanders, one standard deviation
-  double keypoint = 0.02;  // standard deviation of each coordinate, in parts of the box
+  double keypoint = 0.02;  // standard deviation of each coordinate, relative to the box
   double hidden = 0.1;     // share of visible keypoints that are not annotated
 };
 
@@ -36,8 +36,8 @@ struct AnnotationNoise {
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const ProgressSink& progress, const StopFlag& stop);
 
-// The mask with its outline moved in and out by smooth noise of `deviation` pixels, and by as much
-// all along it. Never empty.
+// The mask with its outline moved in and out by smooth noise of `deviation` pixels, plus a constant
+// shift of half that deviation. Never empty.
 PhotoMask DisturbedMask(const PhotoMask& mask, double deviation, Rng& rng);
 
 }  // namespace tilegrad::train

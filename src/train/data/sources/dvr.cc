@@ -82,7 +82,7 @@ Status ReadDvrPoints(const Path& file, ModelData* truth) {
   for (std::size_t i = 0; i < numbers.size(); i += 3)
     all.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
   TILEGRAD_ASSIGN(truth->occupancy, VoxelizePoints(all, kDvrHalfExtent, kOccupancyResolution));
-  // Each is drawn anew, so any of them are as good as the first.
+  // Each is an independent draw, so any of them are as good as the first.
   const auto scale = static_cast<float>(CameraRule{}.half_extent / kDvrHalfExtent);
   const std::size_t count = std::min<std::size_t>(all.size(), kTruthPoints);
   for (std::size_t i = 0; i < count; ++i)

@@ -42,7 +42,7 @@ bool BelongsToModels(const Path& file) {
   return file.filename().string().starts_with('.') || endings.count(ending) > 0;
 }
 
-// Models of a folder CLASS/MODEL, and what was passed over.
+// Models of a folder CLASS/MODEL, and what was skipped.
 class FolderList {
  public:
   Status Read(const Path& folder) {

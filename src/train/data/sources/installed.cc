@@ -28,7 +28,7 @@ std::vector<std::string> NamesIn(const std::string& name) {
   }
 }
 
-// Wrong names are said before any package that is missing.
+// Reports wrong names before missing packages.
 Result<std::vector<const InstalledSource*>> SourcesNamed(const std::string& name) {
   std::vector<const InstalledSource*> sources;
   for (const std::string& one : NamesIn(name)) {

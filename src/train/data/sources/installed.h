@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sources that are installed packages, by the names that datasets note.
+// Sources that are installed packages, by the names that datasets record.
 #pragma once
 
 #include <memory>

@@ -16,7 +16,7 @@ using io::NpyArray;
 using io::NpzArrays;
 using ArrayShape = std::vector<std::size_t>;
 
-constexpr std::size_t kAny = static_cast<std::size_t>(-1);  // in a wanted shape: whatever is there
+constexpr std::size_t kAny = static_cast<std::size_t>(-1);  // in an expected shape: any length
 
 template <class Vector>
 NpyArray VectorsToNpy(const std::vector<Vector>& values) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where models come from: a list made at once, and each model loaded when its turn comes.
+// Sources of models: the list is made at once, each model is loaded on demand.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ struct SourceEntry {
   std::string shape = {};
 };
 
-// A file or folder that a source passed over, and why: it may have been meant.
+// A file or folder that a source skipped, and why: it may have been intended.
 struct IgnoredFile {
   std::string file, reason;
 };
@@ -36,7 +36,7 @@ struct SourceModel {
   // A mesh still to be normalised and rendered (y up, front towards +z), or finished data where the
   // source holds images instead.
   std::variant<Mesh, ModelData> data;
-  std::vector<std::string> warnings = {};  // of reading it: a texture is missing, ...
+  std::vector<std::string> warnings = {};  // of its reader: a texture is missing, ...
 };
 
 class ModelSource {
@@ -45,16 +45,16 @@ class ModelSource {
   virtual std::string name() const = 0;                         // DatasetInfo::source
   virtual std::vector<std::string> credits() const = 0;         // DatasetInfo::credits
   virtual const std::vector<SourceEntry>& entries() const = 0;  // sorted by class, then id
-  // Thread-safe. Entries are asked for in ascending order, give or take the number of workers.
+  // Thread-safe. Called in ascending order, give or take the number of workers.
   virtual Result<SourceModel> Load(std::size_t entry) const = 0;
   // The camera and sizes that the source dictates, where it holds images.
   virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
   virtual std::vector<IgnoredFile> ignored() const { return {}; }
-  // Whether it is a set that others know too, of whose models hardly any may be unusable.
+  // Whether it is a published set, of which hardly any model may be unusable.
   virtual bool published() const { return false; }
   virtual std::string input() const { return {}; }  // DatasetInfo::input
-  // Another where the same entries give other models, as after a change of a list that says how
-  // they are read; 0 where nothing does.
+  // Changes whenever the same entries give other models, as after a change to a list that says how
+  // to read them; 0 if that cannot happen.
   virtual std::uint64_t version() const { return 0; }
 };
 
@@ -62,13 +62,13 @@ class ModelSource {
 std::unique_ptr<ModelSource> ProceduralSource(int per_class, std::uint64_t seed);
 
 // The eleven classes of data/sweethome3d_classes.tsv from the libraries LIBRARY.sh3f in `folder`.
-// Errors: no library there (says which package holds them), or one cannot be opened.
+// Errors: no library there (names the package), or one cannot be opened.
 inline constexpr const char* kSweetHome3dFolder = "/usr/share/sweethome3d/furniture";
 Result<std::unique_ptr<ModelSource>> SweetHome3dSource(const Path& folder);
 
 // Models of Debian's packages of games, by lists in data/, all below `games`. Each set of textures
-// (a livery, a skin) is an entry, and those of one model have its shape. Errors: a package is not
-// there (says which), or its archive cannot be opened.
+// (a livery, a skin) is an entry, and those of one model have its shape. Errors: a package is
+// missing (named), or its archive cannot be opened.
 inline constexpr const char* kGamesFolder = "/usr/share/games";
 Result<std::unique_ptr<ModelSource>> PlanesSource(const Path& games);  // flightgear-data-ai
 Result<std::unique_ptr<ModelSource>> ShipsSource(const Path& games);   // flightgear-data-models
@@ -79,17 +79,16 @@ Result<std::unique_ptr<ModelSource>> CarsSource(const Path& games);
 std::unique_ptr<ModelSource> CombineSources(std::string name,
                                             std::vector<std::unique_ptr<ModelSource>> sources);
 
-// folder/<class>/<file>, every file whose ending io::LoadMesh knows. Other files, images and what
-// belongs to a model left out, are `ignored`, as are models that lie in no class's folder or in a
-// folder within one.
+// folder/<class>/<file>, every file whose ending io::LoadMesh knows. Other files, except images and
+// parts of a model, are `ignored`, as are models outside a class's folder or in a subfolder of one.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
-// ShapeNetCore, version 1 or 2 (shapenet.cc), of the paper's 13 synsets; other folders are not
-// looked at. A model without a file, a texture or a material library is an entry that cannot be
-// loaded. With a list (split_list.h) only the models that it lists are used.
+// ShapeNetCore, version 1 or 2 (shapenet.cc), of the paper's 13 synsets; skips other folders. A
+// model that lacks a file, a texture or a material library is an entry that fails to load. With a
+// list (split_list.h) it uses only the listed models.
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const SplitList& list);
 
-// Published renders of ShapeNet models; each file says what lies where: 3D-R2N2's (choy.cc), N3MR's
+// Published renders of ShapeNet models; each file describes the layout: 3D-R2N2's (choy.cc), N3MR's
 // as kept for DVR (dvr.cc, which has lists of its own) and the paper's (dibr.cc). Without a list
 // 3D-R2N2's rule divides its set: the first 80 % of each class train, the others test.
 Result<std::unique_ptr<ModelSource>> ChoySource(const Path& folder, const SplitList& list,
@@ -109,7 +108,7 @@ CameraRule NmrCameras();
 // "airplane" for "02691156" and so on for the 13 synsets; other names stay as they are.
 std::string SynsetName(const std::string& synset);
 
-// What is in a folder, sorted; an error that names it.
+// The contents of a folder, sorted; errors name it.
 Result<std::vector<Path>> ListFolder(const Path& folder);
 
 // Turns any text into a file name: letters, digits, '.', '-' and '_' stay, the rest becomes '_'.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models of Debian packages by lists of ours, data/planes.tsv and its siblings: `class`, `shape`
+// Models of Debian packages, by our lists data/planes.tsv and its siblings: `class`, `shape`
 // (unique id), `name`, `package`, `licence`, `model` (file in the package), `front` and `up` (file
 // axes that become +z and +y), `with` and `without` (other files of the model, objects that are no
-// part of it, separated by '|'), `textures` (package_textures.h), `wheels`. Left out are things
-// that are no vehicles, copies, and broken models.
+// part of it, separated by '|'), `textures` (package_textures.h), `wheels`. The lists omit
+// non-vehicles, copies, and broken models.
 #pragma once
 
 #include <string>

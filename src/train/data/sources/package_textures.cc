@@ -32,7 +32,7 @@ class WithTextures : public io::FileSource {
   const std::string& folder_;
 };
 
-// What the file says of its materials does not count any more, nor what was wrong with them.
+// Replaces the file's materials, and drops warnings about them.
 Status Paint(const io::FileSource& files, const std::string& image, io::LoadedMesh* loaded) {
   TILEGRAD_ASSIGN(const Bytes bytes, files.Read(image));
   TILEGRAD_ASSIGN(ImageU8 pixels, io::DecodeImage(bytes, files.Describe(image)));
@@ -47,7 +47,7 @@ Status Paint(const io::FileSource& files, const std::string& image, io::LoadedMe
   return {};
 }
 
-// Folders of the archive that match the parts of a pattern, with what its stars stand for.
+// Folders of the archive that match the parts of a pattern, named by what its stars match.
 void Match(const Path& archive, const Path& at, std::span<const Path> parts,
            const std::string& name, std::vector<TextureSet>* out) {
   if (parts.empty()) return;

@@ -13,16 +13,16 @@ namespace tilegrad::train {
 
 struct TextureSet {
   std::string name;    // empty: the model's own
-  std::string folder;  // its images stand in for those of the same name; empty: none do
-  std::string image;   // stands in for every image of the model; empty: none does
+  std::string folder;  // its images replace those of the same name; empty: none
+  std::string image;   // replaces every image of the model; empty: none
 };
 
-// What a list's column `textures` says, parts separated by '|', all relative to `archive`:
+// Parses a list's column `textures`: parts separated by '|', all relative to `archive`:
 //   nothing or "."   the model's own
 //   "a/b.png"        those in the folder a
-//   "a/*/b.png"      a set for each folder below a that holds b.png; named by what '*' stands for
+//   "a/*/b.png"      a set for each folder below a that holds b.png; named by what '*' matches
 //   "=a/b.png"       this image
-// Sorted as written; a pattern's sets by name. A pattern that finds nothing gives none.
+// Sorted as written; a pattern's sets by name. A pattern without a match gives none.
 std::vector<TextureSet> FindTextureSets(std::string_view column, const Path& archive);
 
 // Loads a mesh with one of its sets of textures.

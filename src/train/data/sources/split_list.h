@@ -14,7 +14,7 @@
 
 namespace tilegrad::train {
 
-// What a list says of a model. Without a split the set's own rule holds.
+// A list's entry for a model. Without a split the set's own rule applies.
 struct Listing {
   bool used = false;
   std::optional<Split> split;
@@ -36,13 +36,13 @@ class SplitList {
   static Result<SplitList> Read(const std::vector<Path>& files);
 
   bool empty() const { return models_.empty() && classes_.empty(); }
-  // Everything is used if it is empty.
+  // An empty list uses every model.
   Listing Of(const std::string& synset, const std::string& model) const;
   // How many models it lists, each once.
   std::size_t size() const { return models_.size(); }
 
  private:
-  // A model is anywhere if its synset is empty.
+  // An empty synset matches any.
   using Key = std::pair<std::string, std::string>;
   friend class SplitListReader;
   void Add(const Key& key, Split split);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists of models are lines of columns, and columns may be lists again.
+// Lists of models are lines of columns, and columns may be lists themselves.
 #pragma once
 
 #include <string_view>

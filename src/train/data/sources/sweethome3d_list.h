@@ -5,7 +5,7 @@
 
 namespace tilegrad::train {
 
-// The text of data/sweethome3d_classes.tsv (docs/datasets.md says its columns).
+// The text of data/sweethome3d_classes.tsv (columns: docs/datasets.md).
 std::string_view SweetHome3dList();
 
 }  // namespace tilegrad::train

@@ -12,8 +12,8 @@ struct ClassifyConfig {
   OptimizerConfig optimizer = {
       .learning_rate = 2e-3, .final_factor = 0.01, .warmup = 20, .weight_decay = 1e-2};
   std::int64_t batch = 64;
-  double mirrored = 0.5;   // share of the pictures that are shown mirrored
-  std::int64_t shift = 4;  // pixels that a picture is moved by at most, each way, black beyond it
+  double mirrored = 0.5;   // share of pictures mirrored
+  std::int64_t shift = 4;  // most pixels of a random shift, each way; black fills in
   Schedule schedule;       // of the run; no keys of the task
 };
 

@@ -302,7 +302,7 @@ struct Placement {
   bool mirrored;
   Shift shift;
 
-  // The byte that comes to (x, y) of channel c, or 0 from beyond the picture.
+  // The byte shifted to (x, y) of channel c, or 0 from beyond the picture.
   std::uint8_t At(std::span<const std::uint8_t> image, int c, int y, int x) const {
     const int row = y - shift.y, moved = x - shift.x;
     if (row < 0 || row >= size || moved < 0 || moved >= size) return 0;

@@ -13,9 +13,9 @@
 
 namespace tilegrad::train {
 
-// What checkpoints keep beside the weights: the classes, by number.
+// The class names by index, kept in checkpoints beside the weights.
 nn::NamedTensor ClassNames(nn::Context& context, const std::vector<std::string>& classes);
-// An error if there are none, or fewer than two.
+// An error if they are missing or fewer than two.
 Result<std::vector<std::string>> ReadClassNames(const std::vector<nn::NamedTensor>& state);
 
 class ClassifierModel : public Model {
@@ -27,7 +27,7 @@ class ClassifierModel : public Model {
   ClassifierModel* classifier() override { return this; }
   ClassifierNetwork& network() { return network_; }
   const std::vector<std::string>& classes() const { return classes_; }
-  // The most likely class of each picture; of equals the first. images: [n][4][size][size] planar
+  // The most likely class of each picture; the first of ties. images: [n][4][size][size] planar
   // RGBA bytes, RGB over black, n at most kImagesAtOnce.
   Result<std::vector<int>> Classify(std::span<const std::uint8_t> images);
 
@@ -40,19 +40,19 @@ class ClassifierModel : public Model {
   ClassifierNetwork network_;
 };
 
-// Of each row of scores [n, classes].
+// Argmax of each row of scores [n, classes]; the first of ties.
 std::vector<int> MostLikely(const nn::Tensor& scores);
 
-// A classifier on models that it never saw: scores, and pictures of a report.
+// Scores and report pictures of a classifier on held-out models.
 
-// Accuracy of classes, beside always naming the most frequent class and naming that of the nearest
+// Accuracy, with two baselines: always the most frequent class, and the class of the nearest
 // training picture. Errors: as CheckHeldOut; images of another size or other classes than it was
-// trained on; an empty split; meshes that are to be changed, of which there are none.
+// trained on; an empty split; a job with a change, since there are no meshes.
 Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
                                       const Workers& workers, const ProgressSink& progress,
                                       const StopFlag& stop);
 
-// Showcase of the test split: three views of each model and what the network calls them.
+// Showcase of the test split: three views of each model and their predicted classes.
 Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
                                 const ProgressSink& progress, const StopFlag& stop);
 
@@ -67,18 +67,18 @@ Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<in
                                     const Workers& workers, const ProgressSink& progress,
                                     const StopFlag& stop);
 
-// Pixels that each picture of a batch is moved by to the right and down; black comes in.
+// Augmentation by translation, in pixels to the right and down; black fills in.
 struct Shift {
   int x = 0, y = 0;
 };
-// At most `most` each way, a pure function of seed and position.
+// At most `most` pixels each way; a pure function of seed and position.
 Shift RandomShift(std::uint64_t seed, std::uint64_t position, int most);
 
 struct LabelledBatch {
   nn::Tensor images;  // [n, 3, size, size], RGB over black in [0, 1]
   nn::Tensor labels;  // [n] of kI32
 };
-// The first view of each sample; one shift for each, or none for all. `data` outlives the work.
+// The first view of each sample; one shift for each, or none at all. `data` outlives the work.
 BatchWork<LabelledBatch> LabelledWork(nn::Context& context, const LabelledImages& data,
                                       std::vector<Sample> batch, std::vector<Shift> shifts);
 // The same, on all workers.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The networks that a perceptual loss can look through, by name and file.
+// The networks of perceptual losses, by name and file.
 #pragma once
 
 #include "base/file.h"
@@ -9,19 +9,19 @@
 namespace tilegrad::train {
 
 struct PerceptualSource {
-  // "classify": a run folder, or one checkpoint, of task.kind = "classify". "vgg16": a safetensors
-  // file of the user's with torchvision's names (nn::Vgg16).
+  // "classify": a run folder, or one checkpoint, of task.kind = "classify". "vgg16": the user's
+  // safetensors file with torchvision's tensor names (nn::Vgg16).
   std::string kind = "classify";
   Path file;
-  // Of "classify": the levels before this one are left out, as far as one remains. At the full and
-  // half size of the picture the network compares little more than pixels: docs/gan.md.
+  // For "classify": skips the levels before this one, but always keeps one. At the full and half
+  // size of the picture, features compare little more than pixels: docs/gan.md.
   int first_level = 2;
 };
 
-// Its features in the context's dtype; its weights stay as they are. Errors name the file and what
-// is wrong with it.
+// Its features in the context's dtype, with frozen weights. Errors name the file and what is wrong
+// with it.
 Result<FeatureFunction> LoadPerceptualNetwork(nn::Context& context, const PerceptualSource& source);
-// The file that its weights are in.
+// The file with its weights.
 Result<Path> PerceptualWeights(nn::Context& context, const PerceptualSource& source);
 
 }  // namespace tilegrad::train

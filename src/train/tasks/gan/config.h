@@ -11,13 +11,13 @@
 
 namespace tilegrad::train {
 
-// Of each critic; section 5.5 names the loss (WGAN-GP) only.
+// For each critic; section 5.5 specifies only the loss (WGAN-GP).
 struct GanCriticConfig {
   std::int64_t base = 24, halvings = 4;  // nn::CriticShape
   std::int64_t updates = 1;              // in each step
   double penalty = 10;                   // lambda_gp, at interpolates
   double learning_rate = 1e-3;
-  double texture_weight = 0.25;  // of D_t beside D_I; 0: no D_t
+  double texture_weight = 0.25;  // of D_t relative to D_I; 0: no D_t
 };
 
 struct GanTextureSource {
@@ -28,19 +28,19 @@ struct GanTextureSource {
 struct GanConfig {
   GeneratorConfig network;
   GanCriticConfig critic;
-  LossConfig loss;                  // of it the regularisers; the paper's section 5.5 has none
-  std::int64_t shape_steps = 3500;  // of the run; then shapes are frozen, and textures learn
+  LossConfig loss;                  // only its regularisers; the paper's section 5.5 has none
+  std::int64_t shape_steps = 3500;  // of the run; then shapes are frozen and textures trained
   std::string start;                // a run, or checkpoint, whose shapes this one starts with
   GanTextureSource textures;
-  RenderConfig render;  // of it `sharpness` and `max_alpha_error`
+  RenderConfig render;  // only `sharpness` and `max_alpha_error`
   OptimizerConfig optimizer;
   std::int64_t views = 4;  // kMostViews at most
   std::int64_t batch = 16;
   std::int64_t score_every = 250, score_count = 128;
-  TexturedStreamConfig stream;  // of it what is not a camera's
+  TexturedStreamConfig stream;  // without its camera keys
   Schedule schedule;            // of the run; no keys of the task
 
-  // Of the schedules of a stage: that of shapes, or that of textures.
+  // Steps of the schedules of the shape stage or the texture stage.
   std::int64_t StageSteps(bool shapes) const {
     return std::max<std::int64_t>(1, shapes ? shape_steps : schedule.steps - shape_steps);
   }

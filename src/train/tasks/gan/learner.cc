@@ -85,7 +85,7 @@ int GanLearner::Updates(std::int64_t step) {
          static_cast<int>(config_.critic.updates) * static_cast<int>(Critics(StageOf(step)).size());
 }
 
-// Of what is drawn: each round of the critics sees other objects. The first sees the generator's.
+// The number of a draw: each round of the critics sees other objects, the first the generator's.
 std::uint64_t GanLearner::NumberOf(const UpdateIndex& at, int round) const {
   const std::int64_t batch = at.step * config_.critic.updates + round;
   return static_cast<std::uint64_t>(batch * at.portion.count + at.portion.index);
@@ -258,7 +258,7 @@ Status GanLearner::StartAs(const std::vector<nn::NamedTensor>& state) {
   return {};
 }
 
-// What a checkpoint has of a GanLearner.
+// The checkpointed state of a GanLearner.
 
 namespace {
 

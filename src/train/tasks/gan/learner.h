@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The game of section 5.5, update by update: a step is one of the generator and then some of each
-// critic of its stage. Also keeps the generator that scored best.
+// GAN training of section 5.5: a step is one update of the generator and then some of each critic
+// of its stage. Also keeps the generator that scored best.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ class GanLearner {
     const CameraRule& camera;
     const WarningSink& warn;
   };
-  // What it learns from; outlives the learner. `bank` is none where no textures are learned.
+  // What it learns from; outlives the learner. `bank` is null if no textures are trained.
   struct Sources {
     RealPictures* pictures;
     const TextureBank* bank;
@@ -37,18 +37,18 @@ class GanLearner {
   }
   int Updates(std::int64_t step);
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out);
-  // The last update of a step also scores, keeps what is best, and freezes shapes where their stage
-  // ends.
+  // The last update of a step also scores, keeps the best, and freezes the shapes at the end of
+  // their stage.
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients);
 
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
-  // What Backward changes beside its gradients.
+  // What Backward changes besides its gradients.
   std::vector<nn::NamedTensor> Statistics();
-  // With the shapes that a run kept.
+  // Starts with the best shapes that another run kept.
   Status StartAs(const std::vector<nn::NamedTensor>& state);
 
-  // With the moving average of the weights.
+  // The generator with the moving averages of its weights.
   Result<ShapeTextureGenerator*> Shown(std::int64_t steps);
   std::int64_t parameters();
   GanStep& step() { return step_; }
@@ -81,12 +81,12 @@ class GanLearner {
   LearnedCritic silhouettes_, pictures_;
   std::optional<LearnedCritic> maps_;
   std::optional<GanWatch> watch_;
-  // Of the last update of the generator, or of this round of the critics, by portion.
+  // From the last update of the generator or from this round of the critics, by portion.
   struct Seen {
     nn::Tensor cover, colors, maps;
   };
   std::vector<Seen> real_, fake_;
-  // Best distance of each stage; distance, and spread of shapes and colours, when last looked at.
+  // Best distance of each stage; distance, and spread of shapes and colours, when last scored.
   enum { kBestShape, kBestTexture, kDistance, kShapes, kColors, kScores };
   nn::Tensor scores_;
 };

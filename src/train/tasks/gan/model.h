@@ -15,8 +15,8 @@
 
 namespace tilegrad::train {
 
-// Meshes of codes [n, noise], by the weights that `generator` has. Without `textured`, of shapes
-// alone, they are grey. Normals are smooth.
+// Meshes of codes [n, noise] with the present weights of `generator`; grey unless `textured`.
+// Normals are smooth.
 Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGenerator& generator,
                                          const nn::Tensor& codes, bool textured);
 
@@ -27,11 +27,11 @@ class GeneratorModel : public Model {
 
   GeneratorModel* generator() override { return this; }
 
-  // Numbers of a code.
+  // Dimension of a code.
   std::int64_t noise() const { return config_.network.noise; }
-  // Whether textures have learned: in the first stage only shapes do.
+  // Whether textures are trained: the first stage trains only shapes.
   bool has_textures() const { return textured_; }
-  // Code `index` of those that `seed` stands for: standard normal, the same on every machine.
+  // Code `index` of the sequence of `seed`: standard normal, the same on every machine.
   std::vector<float> Code(std::uint64_t seed, std::uint64_t index) const;
   // codes: [n][noise()].
   Result<std::vector<Mesh>> Generate(std::span<const float> codes);
@@ -48,17 +48,17 @@ class GeneratorModel : public Model {
   ShapeTextureGenerator generator_;
 };
 
-// From one code to another along the great circle, as both lie far out on a sphere: `share` in
+// Spherical interpolation from one code to another, since both lie near a large sphere; `share` in
 // [0, 1].
 std::vector<float> BetweenCodes(std::span<const float> from, std::span<const float> to,
                                 double share);
 
-// What checkpoints keep of the generator that scored best, "best.shape..." and "best.texture...".
+// The generator that scored best, as checkpoints keep it: "best.shape..." and "best.texture...".
 std::vector<nn::NamedTensor> KeptState(ShapeTextureGenerator& generator);
 Status LoadKept(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
 Status LoadKeptShape(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
 
-// Pictures of generated objects for people: under the light of datasets.
+// Pictures of generated objects for people, under the light of datasets.
 
 struct SheetLook {
   int size = 128;      // pixels a side of each picture
@@ -66,7 +66,7 @@ struct SheetLook {
   bool behind = true;  // also from behind: two pictures to an object
 };
 
-// From in front and above, turned by `azimuth` degrees more.
+// From the front and above, turned by another `azimuth` degrees.
 Camera SheetCamera(int size, double azimuth);
 // A picture for each mesh.
 Result<std::vector<ImageU8>> DrawObjects(std::span<const Mesh> meshes, const Camera& camera,

@@ -16,7 +16,7 @@
 namespace tilegrad::train {
 namespace {
 
-// Width and height in pixels of what is covered by half and more.
+// Width and height, in pixels, of the bounding box of pixels that are at least half covered.
 template <class T>
 std::array<double, 2> BoxOf(std::span<const T> plane, std::size_t side) {
   std::size_t left = side, right = 0, top = side, bottom = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What critics see of true objects: pictures from a few views that never change, without light. So
-// whatever is generated has to stand as the training objects do. A pure function of (seed, place in
-// the run).
+// The critics' real pictures: unlit training objects in a few fixed views, so that generated
+// objects must have the pose of training objects. A pure function of (seed, place in the run).
 #pragma once
 
 #include <array>
@@ -31,8 +30,8 @@ struct ObjectViews {
   nn::Tensor cover;   // [B, V, size, size]: the covered share
 };
 
-// Half axes of an ellipsoid about as large as these objects, x y z: of the boxes of their
-// silhouettes from the front, the side and above, as if each lay at the origin.
+// Half axes (x, y, z) of an ellipsoid about as large as these objects, from the bounding boxes of
+// their silhouettes in the front and side views, as if each object were at the origin.
 std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& rule);
 
 class RealPictures {
@@ -48,16 +47,16 @@ class RealPictures {
 
   struct Batch {
     std::uint64_t number = 0;
-    int count = 0;  // objects, each drawn anew
+    int count = 0;  // objects, each a new draw
   };
   Result<ObjectViews> Draw(const Batch& batch);
-  // As NextBatch has it. `batch_of`: BatchIndex -> Batch.
+  // As NextBatch::Take. `batch_of`: BatchIndex -> Batch.
   template <class BatchOf>
   Result<ObjectViews> Take(const UpdateIndex& at, const BatchOf& batch_of) {
     return next_.Take(at, [&](const BatchIndex& of) { return Work(batch_of(of)); });
   }
   void Settle() { next_.Settle(); }
-  // Of processor time, since the last call.
+  // Processor time since the last call.
   double TakeSeconds() { return seconds_.exchange(0); }
   Result<ImageU8> Sheet(int objects, int views) { return stream_.Sheet(objects, views); }
 
@@ -72,17 +71,17 @@ class RealPictures {
   BatchOrder order_;
   std::vector<TexturedView> views_;
   std::atomic<double> seconds_ = 0;
-  NextBatch<ObjectViews> next_;  // last: it ends before what it uses goes
+  NextBatch<ObjectViews> next_;  // last: ends before what it uses is destroyed
 };
 
-// What the critic of texture maps takes for true: the textures that the network of sections 5.2 and
-// 5.3 extracts from pictures of the training objects. There are no others that fit on a sphere.
+// Real data of the texture-map critic: the textures that the network of sections 5.2 and 5.3
+// extracts from pictures of the training objects. No others have the sphere's layout.
 
 class TextureBank {
  public:
   struct Job {
     Path run;          // of the network
-    int count = 2000;  // pictures, each of an object drawn anew
+    int count = 2000;  // pictures, each of a new draw of an object
     std::uint64_t seed = 0;
     TexturedStreamConfig stream;  // of objects; cameras and lights are those of the run
     GeneratorConfig maps;
@@ -91,14 +90,13 @@ class TextureBank {
     const Dataset& dataset;
     const MeshCache& meshes;  // of training
   };
-  // Errors name the run: it is not there, is of another task, or has images or textures of another
-  // size.
+  // Errors name the run: it is missing, of another task, or has images or textures of another size.
   static Result<TextureBank> Extract(const Job& job, const Data& data, const Workers& workers,
                                      const ProgressSink& progress, const StopFlag& stop);
 
-  // Maps of `count`, drawn by `number`: [count, 3, texture_size, map_width] in [0, 1].
+  // `count` maps, chosen by `number`: [count, 3, texture_size, map_width] in [0, 1].
   nn::Tensor Draw(nn::Context& context, std::uint64_t number, int count) const;
-  // Of the textures, and of a fingerprint that they belong to.
+  // Combines the fingerprint `with` with that of the textures.
   std::string Fingerprint(const std::string& with) const;
   std::vector<float> Mean() const;  // [3, texture_size, map_width]
   std::size_t size() const { return bytes_.size() / map_bytes_; }

@@ -64,7 +64,7 @@ class Scorer {
     return pictures.Draw({kFarNumber, 2 * job_.count});
   }
 
-  // With `mean`, the mean map on every shape: what shapes alone are worth.
+  // With `mean`, the mean map on every shape: the score of the shapes alone.
   Result<ObjectViews> Generated(bool mean) {
     ObjectViews out;
     for (std::int64_t at = 0; at < job_.count; at += kAtOnce) {

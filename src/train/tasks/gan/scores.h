@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a generator makes against true objects, as sets: how far, how varied, and whether it copies.
-// All true objects are drawn with the run's augmentation, as what it learned from was.
+// Compares sets of generated and true objects: their distance, diversity and memorisation. All true
+// objects are drawn with the run's augmentation, as its training data was.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -19,15 +19,15 @@ namespace tilegrad::train {
 struct GanScoreJob {
   Path run, data;
   int count = 256;         // objects of each set
-  std::uint64_t seed = 0;  // of the codes
+  std::uint64_t seed = 0;  // of the latent codes
   Path judge;              // a run of task.kind = "classify"; empty: cells of the pictures
 };
 
-// One set beside true objects of one split.
+// One set compared with true objects of one split.
 struct GanScoreRow {
   std::string method;  // "generator", "mean texture", ..., last "true objects": the floor
   SetScore pictures, shapes;
-  Spread spread;  // shares of the truth's
+  Spread spread;  // as shares of the truth's
 };
 
 struct GanScores {
@@ -35,27 +35,27 @@ struct GanScores {
   std::string judge;                           // in words
   Spread truth;                                // of training objects
   std::vector<GanScoreRow> trained, held_out;  // against training shapes, and test shapes
-  Memorisation memorisation;  // of pictures: samples and held-out objects, to training objects
+  Memorisation memorisation;  // by pictures: samples and held-out objects, to training objects
   // Rows: a sample, then the nearest training object; columns: three of the critic's views.
   ImageU8 nearest;
 };
 
-// Errors: as CheckHeldOut; a judge that cannot be read; too few objects.
+// Errors: as CheckHeldOut; an unreadable judge; too few objects.
 Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
                                  const ProgressSink& progress, const StopFlag& stop);
 std::string FormatScores(const GanScores& scores);  // Markdown tables
 nlohmann::ordered_json ScoresJson(const GanScores& scores);
 
-// What sets of generated and true objects are compared by.
+// The features by which sets of generated and true objects are compared.
 
-// Which columns differ within the truth. The others are cells at the edge of what any object
-// covers: standardised, they would decide alone.
+// 1 for columns that vary within the truth. The others are cells at the edge of what any object
+// covers: standardised, they would dominate all distances.
 std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth);
-// 0 in all others.
+// Sets all other columns to 0.
 FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns);
 
-// Features of pictures: the cells of each view, or what the levels of a classifier say on average
-// of the pixels of all views.
+// Features of pictures: the cells of each view, or the levels of a classifier, averaged over the
+// pixels of all views.
 class Judge {
  public:
   // `run`: of task.kind = "classify"; empty: cells.

@@ -90,7 +90,7 @@ void GanStep::AddShapeLosses(const ShapeTextureGenerator& generator, const Predi
 
 namespace {
 
-// By GanCritic: of weights and interpolates.
+// By GanCritic: random streams of weights and interpolates.
 constexpr std::uint64_t kGanCriticStreams[] = {0x637368, 0x637063, 0x637478};
 constexpr CriticRole kGanRoles[] = {
     {.prefix = "critic_shape.",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the generator of section 5.5 goes down on: noise -> shape and texture -> pictures of
-// each object -> critics. First shapes learn, through silhouettes; then they are frozen, and
-// textures learn.
+// The forward pass of the generator of section 5.5: noise -> shape and texture -> pictures of each
+// object -> critics. First the shapes are trained, through silhouettes; then they are frozen, and
+// the textures are trained.
 #pragma once
 
 #include <memory>
@@ -15,19 +15,19 @@
 
 namespace tilegrad::train {
 
-// Of silhouettes in all views, of their colours (D_I), of texture maps (D_t).
+// Critics of silhouettes in all views, of colours in all views (D_I), of texture maps (D_t).
 enum class GanCritic { kSilhouettes, kPictures, kTextures };
 
 LearnedCritic::Job JobOf(const GanConfig& config, GanCritic critic);
 
 enum class GanStage { kShape, kTexture };
 
-// Of a batch of B objects, what critics look at.
+// What critics see of a batch of B objects in V views.
 struct GeneratedObjects {
   Prediction shapes;
-  nn::Var maps;    // of the second stage
-  nn::Var cover;   // [B, V, size, size]; of the first stage
-  nn::Var colors;  // [B, 3 V, size, size], RGB over black; of the second one
+  nn::Var maps;    // texture stage only
+  nn::Var cover;   // [B, V, size, size]; shape stage only
+  nn::Var colors;  // [B, 3 V, size, size], RGB over black; texture stage only
 };
 
 class GanStep {
@@ -35,13 +35,13 @@ class GanStep {
   // Cameras are PrimaryCameras of `rule`, whose images are square.
   GanStep(nn::Context& context, const GanConfig& config, const CameraRule& rule);
 
-  // Standard normal [count, noise], by the seed, the stream and the number.
+  // Standard normal [count, noise], a function of the seed, the stream and the number.
   nn::Tensor Noise(std::uint64_t stream, std::uint64_t number, std::int64_t count) const;
-  // On the tape; one at a time, as images are of one renderer. Gradients reach what the stage
-  // trains.
+  // On the tape; one call at a time, because the images belong to one renderer. Gradients reach
+  // what the stage trains.
   GeneratedObjects Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise, GanStage stage,
                         nn::Mode mode);
-  // Both stages' pictures as numbers, in the weights' evaluation.
+  // Cover and colours without gradient, in eval mode.
   enum class Texture { kOwn, kMean };
   ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                    Texture texture = Texture::kOwn);
@@ -58,7 +58,7 @@ class GanStep {
   nn::Context& context_;
   GanConfig config_;
   int size_;
-  std::vector<Camera> cameras_;  // of `samples` pixels a side of each
+  std::vector<Camera> cameras_;  // supersampled: `samples` pixels a side of each pixel
   SceneRenderer renderer_;
 };
 

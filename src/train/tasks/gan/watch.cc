@@ -39,7 +39,7 @@ struct SheetCell {
   double deviation() const { return std::sqrt(std::max(0.0, squares / count - mean() * mean())); }
 };
 
-// Of each object the means of its cells, and then their deviations.
+// For each object the means of its cells, then their deviations.
 FeatureRows CellsOf(const nn::Tensor& planes, std::int64_t cells_a_side, bool deviations) {
   const nn::Shape& shape = planes.shape();
   const std::int64_t side = std::min(cells_a_side, shape[3]);
@@ -75,7 +75,7 @@ double SoftIou(std::span<const float> a, std::span<const float> b) {
   return either > 0 ? both / either : 1;
 }
 
-// Of each object over the pixels that it covers, all views together.
+// The mean colour of each object over the pixels that it covers in all views.
 std::vector<std::array<double, 3>> MeanColors(std::span<const float> colors,
                                               std::span<const float> cover, std::size_t objects,
                                               std::size_t views) {

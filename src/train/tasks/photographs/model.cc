@@ -164,7 +164,7 @@ std::string TextOf(const PhotographSet& set) {
   return text;
 }
 
-// Of a picture [4][size][size] and the object in a photograph, both over black.
+// Compares a picture [4][size][size] and the object in a photograph, both over black.
 struct ImageScore {
   double color = 0, iou_loss = 0;
   ImageScore(std::span<const float> drawn, std::span<const float> colors,
@@ -274,7 +274,7 @@ class PhotographJudge {
     return Compare(batch, i, {photo, batch.cameras[i]}, &tallies_[kOurs]);
   }
 
-  // What the annotated camera leaves to gain.
+  // The ceiling: true keypoints through the annotated camera.
   void ScoreTruth(const Photograph& photo, const PhotographBatch& batch, std::size_t i) {
     if (photo.points.empty()) return;
     Score score;

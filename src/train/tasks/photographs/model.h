@@ -8,21 +8,20 @@
 
 namespace tilegrad::train {
 
-// What one photograph gives, in the world of the cameras.
+// The prediction from one photograph, in the cameras' world coordinates.
 struct PredictedPhotograph {
   Mesh mesh;               // with its texture
   WeakPerspective camera;  // of the crop, in [-1, 1]
   std::vector<std::array<double, 3>> keypoints;
 };
 
-// Of a network with the weights of now. pictures: [B, 3, size, size] in [0, 1].
+// With the network's present weights. pictures: [B, 3, size, size] in [0, 1].
 Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context,
                                                             PhotographNetwork& network,
                                                             const nn::Tensor& pictures);
 
-// Predict takes cut-outs: RGBA over black, framed anyhow, which are cropped as training crops
-// photographs. Its meshes are brought to the truth's place and size: centred, largest half-extent
-// 0.45.
+// Predict takes cut-outs, RGBA over black in any framing, and crops them as training crops
+// photographs. It moves and scales its meshes like the truth: centred, largest half-extent 0.45.
 class PhotographModel : public Model {
  public:
   PhotographModel(nn::Context& context, const PhotographsConfig& config,
@@ -48,17 +47,16 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
 
 // Table 3 of the paper.
 
-// On the photographs of job.split, uncut by chance. Rows: "mean shape" (with the predicted
-// texture), "predicted camera", "tilegrad" through the cameras of the annotations, which is the
-// table's. Of each: texture L1, mean |difference| over all pixels of the crop and the channels
-// between the prediction and the photograph's object, both over black; 2D IoU loss, 1 - IoU of
-// their covers; PCK at 0.1 (metrics/metrics.h), where there are keypoints. Errors: a set
-// without cameras, one whose photographs were trained on, a job with a change or an oracle.
+// On the photographs of job.split, without random crops. Rows: "mean shape" (with the predicted
+// texture), "predicted camera", "tilegrad" through the annotated cameras, which is the table's. Of
+// each: texture L1, mean |difference| over all pixels of the crop and the channels between the
+// prediction and the photograph's object, both over black; 2D IoU loss, 1 - IoU of their covers;
+// PCK at 0.1 (metrics/metrics.h), where there are keypoints. Errors: a set without cameras, one
+// whose photographs were trained on, a job with a change or an oracle.
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
                                        const ProgressSink& progress, const StopFlag& stop);
 
-// Which photographs a run was trained on, in its folder: written by a new run, compared by a
-// resumed one.
+// Records in the run folder which photographs a new run is trained on; a resumed run compares them.
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new);
 // InvalidArgument if some of that split were trained on.
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split);
@@ -66,7 +64,7 @@ Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split 
 // At most `count` of that split, spread over it.
 std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int count);
 
-// Predictions of photographs in pictures: for scores and for people.
+// Renders predictions from photographs, for scores and for people.
 
 class PhotographPictures {
  public:

@@ -18,14 +18,14 @@
 
 namespace tilegrad::train {
 
-// What a step sees.
+// The data of a step.
 
 // B photographs of S pixels a side with K keypoints.
 struct PhotographBatch {
   nn::Tensor input;                      // [B, 3, S, S], what the network sees
   nn::Tensor colors;                     // [B, 3, S, S], of the object over black
   nn::Tensor mask;                       // [B, S, S]
-  nn::Tensor barrier;                    // [B, 1, S, S] DistanceBarrier; of a flow
+  nn::Tensor barrier;                    // [B, 1, S, S] DistanceBarrier; only with a flow
   nn::Tensor keypoints;                  // [B, K, 2], 0 where not visible; none without keypoints
   nn::Tensor visible;                    // [B, K, 1] 1 or 0
   std::vector<WeakPerspective> cameras;  // [B]
@@ -34,11 +34,11 @@ struct PhotographBatch {
 };
 
 struct PhotographPlaces {
-  std::vector<int> photographs;  // of the store
-  std::int64_t first = 0;        // place in the run of the first of them
+  std::vector<int> photographs;  // indices into the store
+  std::int64_t first = 0;        // place in the run of the first one
 };
-// A random crop of each of `photographs`, which follows from their places in the run: `first`,
-// first + 1, ..; or with `first` < 0 the crop as it is. `config` and `store` outlive the work.
+// A random crop of each of `photographs`, determined by their places in the run: `first`, first +
+// 1, ..; or with `first` < 0 the crop without jitter. `config` and `store` outlive the work.
 BatchWork<PhotographBatch> PhotographWork(nn::Context& context, const PhotographsConfig& config,
                                           const PhotoStore& store, PhotographPlaces places);
 // The same, on all workers.
@@ -53,7 +53,7 @@ class PhotographStep {
 
   // On the tape; `values` gets the sum and its terms.
   nn::Var Loss(const PhotographBatch& batch, std::int64_t step, StepValues* values);
-  // Its terms join Loss; without one there are none. `adversary` outlives the steps.
+  // Loss adds its terms; null: none. `adversary` outlives the steps.
   void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
 
   PhotographNetwork& network() { return network_; }
@@ -74,7 +74,7 @@ class PhotographStep {
   PhotographsConfig config_;
   PhotographNetwork network_;
   LearnedWeights weights_;
-  std::vector<WeighedEdge> edges_;  // of the mean shape as it starts
+  std::vector<WeighedEdge> edges_;  // of the initial mean shape
   SceneRenderer renderer_, color_renderer_;
   Adversary* adversary_ = nullptr;
 };

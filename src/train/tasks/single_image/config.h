@@ -14,15 +14,15 @@
 
 namespace tilegrad::train {
 
-// Whose renderer trains: ours, or one of those that section 5.1 compares with. Network, data, steps
-// and the other losses stay the same, which is Table 1 of the paper.
+// The renderer that trains: ours, or one that section 5.1 compares with. Network, data, steps and
+// the other losses stay the same, as in Table 1 of the paper.
 
 struct RivalConfig {
-  // SoftRas's own training, but for its near plane of 1: its cameras are 2.7 away from objects, so
-  // nothing is nearer, and a face that is has no gradient.
+  // SoftRas's own training settings except its near plane of 1: its cameras are 2.7 away from
+  // objects, so nothing is nearer, and a nearer face would get no gradient.
   rivals::SoftRasOptions softras = {.near_plane = 0.1};
   std::string softras_distance = "euclidean", softras_alpha = "product";
-  double softras_late_sigma = 1;  // share of sigma after 60 % of the run
+  double softras_late_sigma = 1;  // factor on sigma after 60 % of the run
   bool softras_color = false;     // colours of vertices, mixed by softras_colors
   rivals::SoftRasColors softras_colors = {};
   rivals::N3mrOptions n3mr = {};
@@ -32,10 +32,10 @@ struct RivalConfig {
 
 ConfigFields FieldsOf(RivalConfig* config);
 
-// What `rule` draws with; nothing for "dibr". Errors: a word that is none of those known.
+// The options of the rival `rule`; nullopt for "dibr". Errors: an unknown word.
 Result<std::optional<rivals::Options>> RivalOptions(const std::string& rule,
                                                     const RivalConfig& config);
-// Of a step, `share` of the run.
+// At `share` of the run, in [0, 1].
 double SoftRasSigmaAt(const RivalConfig& config, double share);
 
 struct SingleImageConfig {
@@ -47,12 +47,12 @@ struct SingleImageConfig {
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
-  double mirrored = 0;      // share of the samples that are shown mirrored at x = 0, light included
+  double mirrored = 0;      // share of samples mirrored at x = 0, light included
   Schedule schedule;        // of the run; no keys of the task
 };
 
 ConfigFields FieldsOf(SingleImageConfig* config);
-// InvalidArgument names keys that do not go together, and words that are not known.
+// InvalidArgument names conflicting keys and unknown words.
 Status CheckConfig(const SingleImageConfig& config);
 
 }  // namespace tilegrad::train

@@ -22,9 +22,8 @@ Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,
 // Pictures of what a network does now: rows of input | prediction | truth ... for a few objects.
 
 // One row an object: input view, its prediction, then each other view as prediction and truth; RGB
-// composited over light grey, `zoom` screen pixels a pixel. Uses the statistics of training (eval
-// mode) and no gradient; the weights are those of the last
-// step, also where a moving average of them predicts.
+// composited over light grey, `zoom` screen pixels a pixel. Runs in eval mode, without gradient,
+// with the weights of the last step even where their moving average predicts.
 Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageStore& store,
                             std::span<const Sample> samples, std::int64_t at_step);
 

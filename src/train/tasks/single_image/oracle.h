@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the template can do at best: fitted to all views of one object, with the renderer and the
-// losses of training, instead of predicted from one of them.
+// An upper bound for what the template can represent: fits it to all views of an object, with the
+// renderer and losses of training, instead of predicting it from one view.
 #pragma once
 
 #include "train/eval/evaluate.h"
@@ -8,10 +8,10 @@
 
 namespace tilegrad::train {
 
-// `steps` of Adam for each object, each over eight of its views, all in turn. The losses, their
-// weights, the template and the soft band are the configuration's, the renderer is always ours. The
-// mesh is as a prediction, with colours in [0, 1]; same bits for any number of workers. An error if
-// a loss is not finite.
+// `steps` steps of Adam for each object, each over eight of its views, cycling through all. Losses,
+// weights, template and soft band are the configuration's; the renderer is always ours. Returns
+// meshes like predictions, with colours in [0, 1]; the same bits for any number of workers. An
+// error if a loss is not finite.
 FitFunction FitTemplates(const SingleImageConfig& config, const DatasetInfo& info, int steps,
                          const Workers& workers);
 

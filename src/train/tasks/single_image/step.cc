@@ -93,7 +93,7 @@ struct BatchReader {
         to[row + x] = static_cast<T>(*(last - x)) * static_cast<T>(scale);
     }
   }
-  // What image n of a batch is held to.
+  // The target of image n of a batch.
   template <class T>
   void ReadTruth(std::span<const From> image, std::size_t n, BatchTensors& out) const {
     const std::size_t plane = size * size;

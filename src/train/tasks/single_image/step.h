@@ -24,19 +24,19 @@ namespace tilegrad::train {
 
 // The pictures of one step as tensors, from the dataset or rendered for it.
 
-// The tensors of one batch: what the network sees, and what the renders are held to.
+// The tensors of one batch: the network's input and the renders' targets.
 struct BatchTensors {
   nn::Tensor input;             // [B, 4, size, size]
   nn::Tensor truth_colors;      // [B * views, 3, size, size]
   nn::Tensor truth_alpha;       // [B * views, size, size]
   std::vector<Camera> cameras;  // [B * views]
-  double stream_seconds = 0;    // of processor time, for pictures that were rendered for it
+  double stream_seconds = 0;    // of processor time, to render its pictures
 };
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch);
-// Of a batch the first objects, which are rendered for it.
+// The first objects of a batch, which are rendered for it.
 struct StreamedObjects {
-  TexturedStream* from = nullptr;  // null: all are of the store
+  TexturedStream* from = nullptr;  // null: all come from the store
   std::int64_t first = 0;          // position in the run of the batch's first object
 };
 // `store` and the stream outlive the work, whose lanes are the stream's.
@@ -45,8 +45,8 @@ BatchWork<BatchTensors> GatherWork(nn::Context& context, const ImageStore& store
 
 class ImageLosses {
  public:
-  // Of deformed copies of `sphere`, which outlives it. The words of config.render and config.rivals
-  // are known (RivalOptions).
+  // Losses of deformed copies of `sphere`, which outlives this. The words of config.render and
+  // config.rivals must be valid (RivalOptions).
   ImageLosses(nn::Context& context, const SingleImageConfig& config, const SphereModel& sphere,
               int image_size);
 
@@ -55,13 +55,13 @@ class ImageLosses {
                 StepValues* values);
 
   SceneRenderer& renderer() { return renderer_; }
-  // By our renderer, whichever renderer trains.
+  // Uses our renderer, whichever one trains.
   RenderedImages DrawOurs(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
  private:
   // Whether the rule draws colours, which the colour loss needs.
   bool HasColor() const;
-  // The images that losses look at.
+  // The images that the losses compare.
   RenderedImages Draw(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
   SingleImageConfig config_;
@@ -75,7 +75,7 @@ class ImageLosses {
 // Network, optimiser and renderer of a run.
 class TrainStep {
  public:
-  // The words of config.render and config.rivals are known (RivalOptions).
+  // The words of config.render and config.rivals must be valid (RivalOptions).
   TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size);
 
   // Equation 14 of a batch, on the tape; `values` gets the sum and its terms.

@@ -10,17 +10,17 @@
 
 namespace tilegrad::train {
 
-// How colours are compared, beside LossConfig::color.
+// How colours are compared, in addition to LossConfig::color.
 struct ColorRule {
   bool masked = false;    // only where the truth's object is, by its cover of a pixel
   double from = 0;        // share of the run after which colours count: shapes first
   double soft = 0;        // ColorHuberLoss, up to `soft_until`; 0: L1
   double soft_until = 1;  // share of the run
-  // Of the view that a texture was predicted from, beside the other one. There a texture that has
-  // the picture's shading in it is no worse than one without.
+  // Weight of the view that a texture was predicted from, relative to the other one. In that view a
+  // texture with baked-in shading is no worse than one without.
   double own = 1;
-  double light = 0;  // of the mean square distance to the light that LightSearch finds
-  double pose = 1;   // of the mean square error of Pose, which is learned from the known cameras
+  double light = 0;  // weight of the mean squared distance to the light that LightSearch finds
+  double pose = 1;   // weight of the mean squared error of Pose, learned from the known cameras
 };
 
 struct TexturedImageConfig {
@@ -39,7 +39,7 @@ struct TexturedImageConfig {
 
 ConfigFields FieldsOf(TexturedImageConfig* config);
 Status CheckConfig(const TexturedImageConfig& config);
-// Whether N3MR's renderer trains, with texture cubes of which the network's maps are samples.
+// Whether N3MR's renderer trains, with texture cubes sampled from the network's maps.
 bool IsN3mr(const TexturedImageConfig& config);
 TextureNetworkConfig NetworkOf(const TexturedImageConfig& config);  // as the rule requires
 LightHeadShape LightHeadOf(const LightConfig& config);

@@ -73,7 +73,7 @@ class LightSearch::Attempts {
       best_ = light;
     }
   }
-  // Those around the best one.
+  // The directions around the best one.
   void TryRing(double radius) {
     const Direction center = best_.direction;
     const Direction a = UnitOf(std::abs(center[2]) < 0.9 ? Direction{center[1], -center[0], 0}

@@ -2,9 +2,9 @@
 // The best-fitting light of a picture, given an estimate of the object: a search over many
 // directions. The colour error of a light that is far from the right one has little gradient
 // (unlit surfaces stay black when it moves a little), so a network that follows the gradient
-// learns lights slowly; the direction found here is a target for it. Light from a direction is
-// compared by Lambert's law (highlights of Phong surfaces are left over), light of a sky and a
-// direction as SkyAndLight has it.
+// learns lights slowly; the direction found here is a target for it. Directional light is compared
+// by Lambert's law (Phong highlights remain as error), light of a sky and a direction by
+// SkyAndLight.
 #pragma once
 
 #include <array>
@@ -28,11 +28,11 @@ struct LightEvidence {
 
 struct FoundLight {
   std::array<double, 3> direction = {};  // unit, in the camera's axes; 0: the picture shows nothing
-  double sky = 0;                        // share of the light that comes from everywhere; harmonics
+  double sky = 0;                        // share of uniform light from all around; harmonics only
 };
 
-// Directions spread evenly over a spherical cap, finer around the best one, and of harmonics
-// the best sky for each; compared by L1.
+// Tries directions spread evenly over a spherical cap, then finer around the best one, for
+// harmonics each with its best sky; compares by L1.
 class LightSearch {
  public:
   explicit LightSearch(const LightConfig& config);

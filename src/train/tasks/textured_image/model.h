@@ -7,15 +7,15 @@
 
 namespace tilegrad::train {
 
-// What one image gives.
+// The prediction from one image.
 struct PredictedObject {
-  Mesh mesh;         // with its texture, unlit colours; smooth normals are the renderer's
-  DrawnLight light;  // in the axes of the image's camera
-  std::optional<Camera> camera;  // of the image, in its pixels; of a network with `lookup`
+  Mesh mesh;                     // with its texture, unlit; the renderer makes smooth normals
+  DrawnLight light;              // in the axes of the image's camera
+  std::optional<Camera> camera;  // of the image, in its pixels; only with `lookup`
 };
 
-// Of a network with the weights of now; batch statistics are those of training. images:
-// [N][4][size] [size] planar RGBA bytes, RGB over black.
+// With the network's present weights, in eval mode. images: [N][4][size][size] planar RGBA bytes,
+// RGB over black.
 Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,
                                                     std::span<const std::uint8_t> images,
                                                     int image_size);
@@ -30,7 +30,7 @@ class TexturedModel : public Model {
   Result<std::vector<PredictedObject>> PredictObjects(std::span<const std::uint8_t> images);
   TexturedModel* textured() override { return this; }
   const TexturedImageConfig& config() const { return config_; }
-  // Refined colours would be those of the picture, its light included.
+  // An error: refinement would bake the picture's light into the colours.
   Status CheckRefinable() const override;
 
  private:
@@ -41,7 +41,7 @@ class TexturedModel : public Model {
 };
 
 // Meshes have the template's faces, positions of CheckpointInfo::half_extent, centred, and one
-// texture. Batch statistics are those of training. Errors say what does not fit in the checkpoint.
+// texture. Runs in eval mode. Errors say what does not fit in the checkpoint.
 Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
                                                  const TexturedImageConfig& config,
                                                  const Checkpoint& checkpoint);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of predicted objects as TexturedStream has them of true ones.
+// Pictures of predicted objects, as TexturedStream draws true ones.
 #pragma once
 
 #include <memory>
@@ -33,12 +33,12 @@ class ObjectPictures {
   Frame frame_;
 };
 
-// Such a picture for people: over grey paper.
+// Such a picture for people, over grey.
 ImageU8 OnPaper(std::span<const float> rgba, int size);
-// For the network: bytes.
+// As bytes for the network.
 std::vector<std::uint8_t> ToBytes(std::span<const float> rgba);
 
-// Rows of pictures as the paper's figures 5 and 6.
+// Rows of pictures as in the paper's figures 5 and 6.
 
 struct ShownObject {
   std::string name;
@@ -50,7 +50,7 @@ struct ShownObject {
 // texture and true texture | map.
 Result<std::vector<ShownPicture>> PicturesOf(const ShownObject& shown, ObjectPictures& pictures,
                                              int size);
-// Such rows below each other, all cells of one size.
+// Stacks such rows, all cells of one size.
 ImageU8 SheetOf(const std::vector<std::vector<ShownPicture>>& rows, int size);
 
 }  // namespace tilegrad::train

@@ -137,8 +137,8 @@ nn::Var TexturedStep::Covered(const nn::Var& colors, const TexturedBatch& batch)
          nn::Reshape(nn::Constant(context_, batch.truth_alpha), {shape[0], 1, shape[1], shape[2]});
 }
 
-// Of the views that textures were not predicted from: there they are most in need of it, and half
-// as many pictures cost half as much.
+// Uses the views that textures were not predicted from: these need it most, and half as many
+// pictures cost half as much.
 void TexturedStep::AddAdversary(const RenderedImages& images, const TexturedBatch& batch,
                                 LossSum* sum) const {
   std::vector<std::int32_t> others;
@@ -292,7 +292,7 @@ Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, 
 
 namespace {
 
-// The image that shows input m as the object's other input has it: see TexturedBatch.
+// The image of input m's view with the prediction from the object's other input: see TexturedBatch.
 constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
 static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
 

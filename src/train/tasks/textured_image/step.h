@@ -23,12 +23,12 @@
 
 namespace tilegrad::train {
 
-// What a step sees: objects in two views, each under a light of its own.
+// The data of a step: objects in two views, each under its own light.
 
 inline constexpr int kViewsOfObject = 2;
 
-// M = 2 B inputs: 2 b and 2 b + 1 are the views of object b. The mesh that is predicted from input
-// m is seen in N = 2 M images: 2 m in its own view, 2 m + 1 in the other one of its object.
+// M = 2 B inputs: 2 b and 2 b + 1 are the views of object b. The mesh predicted from input m is
+// rendered in two of N = 2 M images: 2 m in its own view, 2 m + 1 in the object's other view.
 struct TexturedBatch {
   nn::Tensor input;                 // [M, 4, size, size]
   nn::Tensor truth_colors;          // [N, 3, size, size]
@@ -64,9 +64,9 @@ class LightTargets {
  public:
   LightTargets(nn::Context& context, const LightConfig& config);
 
-  // In the axes of the inputs' cameras, without gradient: [M, 3] unit directions, of harmonics
-  // [M, 9]; the prediction itself for inputs that show too little. `job` draws the batch; its
-  // shading is replaced. An empty tensor if drawing failed: the context's status has the error.
+  // In the axes of the inputs' cameras, without gradient: [M, 3] unit directions, for harmonics [M,
+  // 9]; the prediction itself for inputs that show too little. `job` draws the batch; its shading
+  // is replaced. An empty tensor if drawing failed: the context's status has the error.
   nn::Tensor Find(const Prediction& objects, const TexturedBatch& batch, RenderJob job);
 
  private:
@@ -75,7 +75,7 @@ class LightTargets {
   SceneRenderer renderer_;
 };
 
-// What losses, and critics of the images, look at.
+// The inputs of the losses and of image critics.
 struct TexturedRenders {
   Prediction objects;     // of the inputs
   RenderedImages images;  // of TexturedBatch::cameras
@@ -85,12 +85,12 @@ class TexturedStep {
  public:
   TexturedStep(nn::Context& context, const TexturedImageConfig& config, int image_size);
 
-  // Network and renderer, on the tape. One at a time: images are of one renderer.
+  // Network and renderer, on the tape. One call at a time: the images belong to one renderer.
   TexturedRenders Draw(const TexturedBatch& batch, std::int64_t step);
   // Equation 14 with textures and light; `values` gets the sum and its terms.
   nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch, std::int64_t step,
                StepValues* values);
-  // Its terms join Loss; without one there are none. `adversary` outlives the steps.
+  // Loss adds its terms; null: none. `adversary` outlives the steps.
   void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
 
   TextureNetwork& network() { return network_; }
@@ -124,7 +124,7 @@ class TexturedStep {
 double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b);
 // Row `row` of the lights of a batch of predictions.
 DrawnLight LightOf(const Prediction& objects, std::size_t row);
-// Of harmonics that of their linear part, else the light's own.
+// For harmonics that of their linear part, else the light's own.
 std::array<float, 3> DirectionOf(const DrawnLight& light, Lighting lighting);
 
 }  // namespace tilegrad::train

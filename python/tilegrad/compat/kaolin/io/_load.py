@@ -16,7 +16,7 @@ Path = Union[str, "os.PathLike[str]"]
 
 
 def load_surface(path: Path, with_materials: bool = True, with_normals: bool = True) -> SurfaceMesh:
-    """All that the file has. OSError, ValueError: as of tilegrad.meshes.load_mesh."""
+    """All that the file has. OSError, ValueError: as tilegrad.meshes.load_mesh."""
     mesh = load_mesh(path)
     loaded = SurfaceMesh(torch.from_numpy(mesh.positions), torch.from_numpy(mesh.faces).long())
     loaded.uvs, loaded.face_uvs_idx = _table(mesh, "uvs", mesh.corner_uvs)
@@ -70,7 +70,7 @@ def _materials(mesh: Mesh, order: list[int]) -> list[dict[str, Any]]:
 
 
 def _assignments(mesh: Mesh, order: list[int]) -> torch.Tensor:
-    """[F] int16, as Kaolin has it: -1 for faces without a material."""
+    """[F] int16, as in Kaolin: -1 for faces without a material."""
     places = np.full(len(mesh.materials) + 1, -1, np.int16)  # the last one: of a mesh without any
     places[order] = np.arange(len(order))
     faces = mesh.face_materials

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edges of faces, and Loop's subdivision, as kaolin.ops.mesh.subdivide_trianglemesh has it."""
+"""Edges of faces, and Loop's subdivision, as in kaolin.ops.mesh.subdivide_trianglemesh."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def pointclouds_to_voxelgrids(pointclouds: torch.Tensor, resolution: int,
                               origin: Optional[torch.Tensor] = None,
                               scale: Optional[torch.Tensor] = None,
                               return_sparse: bool = False) -> torch.Tensor:
-    """The voxels with points. pointclouds: [B,P,3]; the rest as of trianglemeshes_to_voxelgrids."""
+    """The voxels with points. pointclouds: [B,P,3]; the rest as in trianglemeshes_to_voxelgrids."""
     name = "pointclouds_to_voxelgrids"
     check_floats(name, "pointclouds", pointclouds, ("B", "P", 3))
     points = _in_grid(name, pointclouds.detach(), resolution, origin, scale).round()

@@ -74,7 +74,7 @@ def average_face_vertex_features(faces: torch.Tensor, face_features: torch.Tenso
 def compute_vertex_normals(faces: torch.Tensor, face_normals: torch.Tensor,
                            num_vertices: Optional[int] = None) -> torch.Tensor:
     """The mean, not of length 1, of the normals that faces have at each vertex. face_normals:
-    [B,F,3,3]. The rest as of average_face_vertex_features. Returns [B,V,3]."""
+    [B,F,3,3]. The rest as in average_face_vertex_features. Returns [B,V,3]."""
     return average_face_vertex_features(faces, face_normals, num_vertices)
 
 

@@ -261,7 +261,7 @@ class PinholeIntrinsics:
     @classmethod
     def from_fov(cls, width: int, height: int, fov: _Amount,
                  fov_direction: CameraFOV = CameraFOV.VERTICAL, **others: Any) -> PinholeIntrinsics:
-        """fov: radians, the whole angle of fov_direction. others: as of from_focal, from x0 on."""
+        """fov: radians, the full angle of fov_direction. others: as in from_focal, from x0 on."""
         side = width if fov_direction == CameraFOV.HORIZONTAL else height
         tangent = torch.tan(fov / 2) if isinstance(fov, torch.Tensor) else math.tan(fov / 2)
         return cls.from_focal(width, height, side / 2 / tangent, **others)
@@ -416,7 +416,7 @@ class Camera:
                    PinholeIntrinsics(lens.width, lens.height, params, lens.near, lens.far))
 
     def to(self, *args: Any, **kwargs: Any) -> Camera:
-        """A camera of another dtype or device, as torch.Tensor.to has it."""
+        """A camera of another dtype or device, as by torch.Tensor.to."""
         lens = self.intrinsics
         return Camera(CameraExtrinsics(self.view_matrix().to(*args, **kwargs)),
                       PinholeIntrinsics(lens.width, lens.height,

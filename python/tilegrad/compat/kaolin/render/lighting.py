@@ -67,7 +67,8 @@ _Values = Union[float, Sequence[float], torch.Tensor]
 
 
 class SgLightingParameters:
-    """Lights: amplitude [N,3], direction [N,3] made unit, sharpness [N]; one stands for all."""
+    """Lights: amplitude [N,3], direction [N,3] made unit, sharpness [N]; a single one applies to
+    all."""
 
     __slots__ = ("amplitude", "direction", "sharpness")
 
@@ -85,7 +86,7 @@ class SgLightingParameters:
     @staticmethod
     def from_sun(direction: torch.Tensor, strength: _Values = 3., angle: _Values = math.pi / 4,
                  color: Optional[_Values] = None) -> SgLightingParameters:
-        """As sg_from_sun; a number, and no colour, which is white, stand for all of direction [N,3]
+        """As sg_from_sun; a number, and no colour, which is white, apply to all of direction [N,3]
         (or [3])."""
         direction = direction.reshape(-1, 3)
         strength, angle, color = (
@@ -236,7 +237,7 @@ def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 
 def _checked(name: str, amplitude: torch.Tensor, direction: torch.Tensor, sharpness: torch.Tensor,
              **of_points: torch.Tensor) -> _Gaussians:
-    """The lights; errors as of check_floats."""
+    """The lights; errors as check_floats."""
     sizes: dict = {}
     check_floats(name, "amplitude", amplitude, ("N", 3), sizes)
     check_floats(name, "direction", direction, ("N", 3), sizes, amplitude)

@@ -63,14 +63,14 @@ def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.T
     """The soft silhouette: 1 where there is a face, 1 - prod(1 - exp(-sigmainv d^2)) elsewhere, d
     the distance to each face in NDC.
 
-    face_vertices_image: [B,F,3,2] NDC. All faces take part.
+    face_vertices_image: [B,F,3,2] NDC. All faces count.
     selected_face_idx: [B,H,W] integers, as `rasterize` returns them; -1 is background.
     sigmainv: > 0; larger is sharper.
     boxlen, knum: ignored, with one warning, unless exact_kaolin is True: then Kaolin's
         truncation is reproduced, with multiplier in its eps. None: as use_exact_kaolin says.
     max_alpha_error: how far the mask may be from the formula over all faces, in [0, 1]; None is
         1e-6 for float32 (plus rounding) and 1e-12 for float64. 0 leaves nothing out.
-    Returns [B,H,W]. TypeError, ValueError: as of `rasterize`.
+    Returns [B,H,W]. TypeError, ValueError: as `rasterize`.
     """
     paper = _kaolins_numbers(boxlen, knum, exact_kaolin)
     return _soft_mask(face_vertices_image, selected_face_idx, sigmainv, multiplier, paper,
@@ -89,7 +89,7 @@ def dibr_rasterization(height: int, width: int, face_vertices_z: torch.Tensor,
     """`rasterize`, for faces with face_normals_z [B,F] (or [B,F,1]) >= 0, and `dibr_soft_mask`,
     over all faces.
 
-    Arguments as of those two. Returns features [B,H,W,C] (a tuple if face_features is a list),
+    Arguments as in those two. Returns features [B,H,W,C] (a tuple if face_features is a list),
     soft_mask [B,H,W], face_idx [B,H,W] int64.
     """
     check_floats("dibr_rasterization", "face_vertices_image", face_vertices_image,
