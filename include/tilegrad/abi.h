@@ -4,4 +4,4 @@
 // another version fails to link instead of misbehaving.
 #pragma once
 
-#define TILEGRAD_API [[gnu::visibility("default")]]  // what the shared library exports
+#define TILEGRAD_API [[gnu::visibility("default")]]  // exported by the shared library

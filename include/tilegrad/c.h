@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The C interface of tilegrad, in float; for C99 or later, and for whatever calls C: Rust, Julia,
- * ctypes. Meanings, shapes and conventions are those of renderer.h and scene.h; a pointer with its
- * count stands for a span, and NULL, with a count of 0, for an empty one.
+/* The C interface of tilegrad, in float; for C99 or later and all languages that call C: Rust,
+ * Julia, ctypes. Meanings, shapes and conventions are those of renderer.h and scene.h; a pointer
+ * and a count replace a span, NULL and 0 an empty one.
  *
- * Large structs begin with their size, which tells the library what the caller was compiled with:
- * members are only ever added at the end, and those that a caller does not know have their
- * defaults. Fill a struct by its tilegrad_..._init first. All structs of an array have one size.
+ * Large structs begin with their size, which tells the library which version the caller was
+ * compiled with: new members come only at the end, and those that a caller does not know have their
+ * defaults. Call a struct's tilegrad_..._init first. All structs of an array have the same size.
  * Structs without a size never change.
  *
- * Nothing here prints, aborts or throws. One call at a time for each renderer.
+ * Nothing here prints, aborts or throws. One call at a time per renderer.
  */
 #ifndef TILEGRAD_C_H_
 #define TILEGRAD_C_H_
@@ -26,21 +26,21 @@ typedef enum tilegrad_status {
   TILEGRAD_OK = 0,
   TILEGRAD_INVALID_ARGUMENT = 1,   /* the caller's value is wrong */
   TILEGRAD_RESOURCE_EXHAUSTED = 2, /* larger than the memory or the limit allows */
-  TILEGRAD_INTERNAL = 3            /* a bug of the library */
+  TILEGRAD_INTERNAL = 3            /* a bug in the library */
 } tilegrad_status;
 
 typedef struct tilegrad_renderer tilegrad_renderer; /* threads and scratch memory */
-typedef struct tilegrad_frame tilegrad_frame;       /* images, and what the way back needs */
+typedef struct tilegrad_frame tilegrad_frame;       /* images, and what backward needs */
 
 TILEGRAD_C_API const char* tilegrad_version(void); /* "0.2.0" */
 
-/* threads: 0: one for each core; 1: only the caller's. NULL if there is no memory. */
+/* threads: 0: one per core; 1: only the caller's. Returns NULL if out of memory. */
 TILEGRAD_C_API tilegrad_renderer* tilegrad_renderer_create(int32_t threads);
 TILEGRAD_C_API void tilegrad_renderer_destroy(tilegrad_renderer* renderer);
 TILEGRAD_C_API tilegrad_frame* tilegrad_frame_create(void);
 TILEGRAD_C_API void tilegrad_frame_destroy(tilegrad_frame* frame);
 
-/* What was wrong with the last call, "" if nothing; until the next call with this renderer. */
+/* The error of the last call, "" if none; valid until the next call with this renderer. */
 TILEGRAD_C_API const char* tilegrad_last_error(const tilegrad_renderer* renderer);
 
 typedef struct tilegrad_camera {
@@ -58,7 +58,7 @@ typedef struct tilegrad_stream {
 typedef struct tilegrad_texture {
   const float* texels; /* [height,width,3], row 0 on top */
   int32_t width, height;
-  int32_t wrap;   /* 0 repeat, 1 clamp, 2 mirror; one way along u, another along v: 3 repeat clamp,
+  int32_t wrap;   /* 0 repeat, 1 clamp, 2 mirror; different modes along u, v: 3 repeat clamp,
                      4 clamp mirror, 5 mirror repeat, 6 repeat mirror, 7 clamp repeat,
                      8 mirror clamp */
   int32_t filter; /* 0 nearest, 1 bilinear, 2 trilinear */
@@ -100,18 +100,19 @@ typedef struct tilegrad_scene {
 typedef struct tilegrad_options {
   size_t struct_size;
   int32_t width, height;  /* pixels */
-  double delta;           /* NDC squared: how soft silhouettes are */
+  double delta;           /* NDC squared: softness of silhouettes */
   double max_alpha_error; /* absolute, [0, 1] */
   int32_t interpolation;  /* 0 perspective, 1 screen-linear */
   int32_t culling;        /* 0 none, 1 back faces */
-  int32_t alpha_rule;     /* 0 all faces, 1 as the paper's implementations */
+  int32_t alpha_rule;     /* 0 all faces, 1 as in the paper's implementations */
   double paper_box;
   int32_t paper_faces;
-  /* Which images are wanted: 0 or 1. */
+  /* Which images to compute: 0 or 1. */
   int32_t color, alpha, attributes, depth, normals, uv, barycentrics;
 } tilegrad_options;
 
-/* Views of a frame, until the next render into it; NULL: not wanted. N images, row 0 on top. */
+/* Views of a frame, valid until the next render into it; NULL: not requested. N images, row 0 on
+ * top. */
 typedef struct tilegrad_images {
   size_t struct_size;
   int32_t count, height, width, channels;
@@ -132,19 +133,19 @@ typedef struct tilegrad_frame_gradients {
   const float *color, *alpha, *attributes, *depth, *normals, *uv;
 } tilegrad_frame_gradients;
 
-/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. To ask for what the scene
- * does not have is an error. */
+/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. Requesting a gradient of what
+ * the scene does not have is an error. */
 typedef struct tilegrad_scene_gradients {
   size_t struct_size;
   float* positions;
   tilegrad_camera* camera;
   float *colors, *uvs, *normals, *attributes, *light_directions, *sh;
-  float* const* textures;     /* [texture_count]; NULL entries are not wanted */
+  float* const* textures;     /* [texture_count]; NULL entries are not computed */
   tilegrad_surface* surfaces; /* [surface_count], [1] if the scene has none */
   tilegrad_light* lights;     /* [light_count] */
 } tilegrad_scene_gradients;
 
-/* Defaults, and the size: tilegrad_scene_init(&scene). */
+/* Set defaults and struct_size: tilegrad_scene_init(&scene). */
 #define tilegrad_scene_init(scene) tilegrad_scene_init_sized((scene), sizeof(tilegrad_scene))
 #define tilegrad_options_init(options) \
   tilegrad_options_init_sized((options), sizeof(tilegrad_options))
@@ -159,7 +160,7 @@ TILEGRAD_C_API void tilegrad_images_init_sized(tilegrad_images* images, size_t s
 TILEGRAD_C_API void tilegrad_frame_gradients_init_sized(tilegrad_frame_gradients* d, size_t size);
 TILEGRAD_C_API void tilegrad_scene_gradients_init_sized(tilegrad_scene_gradients* d, size_t size);
 
-/* Images of `count` scenes. Their arrays stay alive and unchanged until the last backward. */
+/* Renders `count` scenes. Their arrays must stay alive and unchanged until the last backward. */
 TILEGRAD_C_API tilegrad_status tilegrad_render(tilegrad_renderer* renderer,
                                                const tilegrad_scene* scenes, size_t count,
                                                const tilegrad_options* options,
@@ -169,8 +170,7 @@ TILEGRAD_C_API tilegrad_status tilegrad_render(tilegrad_renderer* renderer,
 TILEGRAD_C_API tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame,
                                                      tilegrad_images* images);
 
-/* `count` gradients, one for each scene of the frame. add: 0 overwrites what the arrays hold, 1
- * adds to it. */
+/* `count` gradients, one per scene of the frame. add: 0 overwrites the arrays, 1 adds to them. */
 TILEGRAD_C_API tilegrad_status tilegrad_backward(tilegrad_renderer* renderer,
                                                  const tilegrad_frame* frame,
                                                  const tilegrad_frame_gradients* d_frame,

@@ -18,44 +18,44 @@ namespace tilegrad::inline v0 {
 // Axes as OpenGL: x right, y up, looking along -z; depth = -p_cam.z. Pixel (column j, row i) has
 // its centre at (j + 0.5, i + 0.5); row 0 is the top.
 //
-// Render checks the numbers, but not that `rotation` is one: any 3 x 3 matrix is applied as it
-// stands. A mirror (determinant -1, or one negative focal length) shows the mirror image, and turns
-// front faces to back faces; with scale or shear the eye of specular light is at -rotation^T *
-// translation all the same, which is then not where p_cam is 0.
+// Render checks that the numbers are finite and in range, but not that `rotation` is a rotation: it
+// applies any 3 x 3 matrix unchanged. A reflection (determinant -1, or one negative focal length)
+// renders the mirror image and swaps front and back faces; with scale or shear, specular light
+// still takes -rotation^T * translation as the eye, which is then not the point with p_cam = 0.
 template <class T>
 struct CameraT {
   T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
   T translation[3] = {0, 0, 0};                 // world units
   T fx = 64, fy = 64;                           // focal lengths, pixels; not 0, < 0 mirrors
   T cx = 32, cy = 32;                           // principal point, pixels
-  T near_plane = T(1e-2);                       // > 0, world units; nearer geometry is cut away
+  T near_plane = T(1e-2);                       // > 0, world units; nearer geometry is clipped
 };
 using Camera = CameraT<float>;
 
-// The principal point is the middle of the image, pixels are square.
+// The principal point is the centre of the image; pixels are square.
 struct Lens {
-  // Degrees, the whole vertical field of view, (0, 180). Blender's default (f = 35/16 of half the
-  // image's height), with which the paper's images were rendered.
+  // Degrees, the full vertical field of view, (0, 180). The default is Blender's (f = 35/16 of half
+  // the image's height), with which the paper's images were rendered.
   double fov_y = 49.13434207744484;
   int width = 64, height = 64;  // pixels
 };
 
-// A camera at distance * (cos el cos az, sin el, cos el sin az) that looks at the origin, y up.
+// A camera at distance * (cos el cos az, sin el, cos el sin az) looking at the origin, y up.
 struct Orbit {
   double azimuth = 0, elevation = 0;  // degrees
   double distance = 1;                // world units, > 0
 };
 
-// Of functions below T is float or double; inside, both are computed in double.
+// In the functions below T is float or double; both compute in double.
 
 // MakeCamera<double>(lens, orbit) is for SceneT<double>. Errors: a number that is not finite or out
-// of its range.
+// of range.
 template <class T = float>
 TILEGRAD_API Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit);
 
-// Six numbers of rotation, the first two rows of a matrix before they are made orthonormal
-// (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019), and
-// the rest of a camera: free parameters for an optimiser.
+// A camera as free parameters for an optimiser. The rotation is six numbers, the first two rows of
+// a matrix before orthonormalisation (Y. Zhou et al.: On the continuity of rotation representations
+// in neural networks, 2019).
 template <class T>
 struct CameraParametersT {
   T rotation[6] = {1, 0, 0, 0, 1, 0};
@@ -67,13 +67,13 @@ using CameraParameters = CameraParametersT<float>;
 template <class T = float>
 TILEGRAD_API CameraParametersT<T> ParametersOf(const CameraT<T>& camera);
 
-// Errors: a number that is not finite; rows so short (1e-6 of a unit) or so nearly parallel (1e-6
-// rad) that they give no rotation; a focal length or near plane that is not positive.
+// Errors: a number that is not finite; rows too short (1e-6 of a unit) or too nearly parallel (1e-6
+// rad) to give a rotation; a focal length or near plane that is not positive.
 template <class T = float>
 TILEGRAD_API Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
                                                      std::type_identity_t<T> near_plane = T(1e-2));
 
-// dL/d(parameters) from dL/d(camera). `parameters` as CameraFromParameters accepts them.
+// dL/d(parameters) from dL/d(camera). Accepts the same `parameters` as CameraFromParameters.
 template <class T = float>
 TILEGRAD_API CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
                                            const std::type_identity_t<CameraT<T>>& d_camera);

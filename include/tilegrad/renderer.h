@@ -5,10 +5,10 @@
 //   tilegrad::Renderer renderer;
 //   tilegrad::Frame frame;
 //   Status status = renderer.Render({&scene, 1}, {.width = 256, .height = 256}, {}, &frame);
-//   frame.images().color, frame.images().alpha                       // views, of the frame
+//   frame.images().color, frame.images().alpha                       // views into the frame
 //   status = renderer.Backward(frame, {.alpha = d_alpha}, {&d_scene, 1});
 //
-// Nothing here prints, aborts or throws: every error, running out of memory included, is a Status.
+// Nothing here prints, aborts or throws: every error, including out of memory, is a Status.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace tilegrad::inline v0 {
 
-// The images of N scenes: planar, row 0 on top. Empty where not wanted.
+// The images of N scenes: planar, row 0 on top. Images that were not requested are empty.
 template <class T>
 struct ImagesT {
   int count = 0, height = 0, width = 0;
@@ -32,14 +32,14 @@ struct ImagesT {
   std::span<const T> alpha;                // [N,H,W]; 1 where there is a face
   std::span<const T> attributes;           // [N,C,H,W]; 0 at background pixels
   std::span<const T> depth;                // [N,H,W] world units; +infinity at background pixels
-  std::span<const T> normals;              // [N,3,H,W] that shading uses: unit, world
+  std::span<const T> normals;              // [N,3,H,W] used for shading: unit, world
   std::span<const T> uv;                   // [N,2,H,W]
   std::span<const T> barycentrics;         // [N,2,H,W] weights of corners 1 and 2 of the face
-  double alpha_error_bound = 0;  // no alpha is farther than this from equation 6; infinite with
+  double alpha_error_bound = 0;  // no alpha differs from equation 6 by more; infinite with
                                  // AlphaRule::kPaper
 };
 
-// dL/d(image), in the shapes of ImagesT; an empty span is zero. NaN and infinity are errors.
+// dL/d(image), in the shapes of ImagesT; an empty span means zero. NaN and infinity are errors.
 template <class T>
 struct FrameGradientsT {
   std::span<const T> color{}, alpha{}, attributes{}, normals{}, uv{};
@@ -48,10 +48,10 @@ struct FrameGradientsT {
 
 template <class T>
 class TILEGRAD_API RendererT;
-struct RendererAccess;  // of the library itself
+struct RendererAccess;  // internal
 
-// The result of a Render: its images, the views of its scenes, and what Backward needs. The next
-// Render into it reuses its memory: rendering the same sizes again allocates nothing.
+// The result of Render: images, the views of the scenes, and what Backward needs. The next Render
+// into it reuses its memory: rendering the same sizes again allocates nothing.
 template <class T>
 class TILEGRAD_API FrameT {
  public:
@@ -60,8 +60,8 @@ class TILEGRAD_API FrameT {
   FrameT(FrameT&&) noexcept;
   FrameT& operator=(FrameT&&) noexcept;
 
-  // Views of this frame, until the next Render into it or its end. Empty before the first, and
-  // after one that failed.
+  // Views into this frame, valid until the next Render into it or its destruction. Empty before the
+  // first Render and after a failed one.
   const ImagesT<T>& images() const { return images_; }
 
  private:
@@ -73,24 +73,24 @@ class TILEGRAD_API FrameT {
 };
 
 struct RendererOptions {
-  // 1..1024; 0: one for each core that the process may use; 1: only the caller's. Where the system
-  // refuses some, fewer work.
+  // 1..1024; 0: one per core available to the process; 1: only the caller's thread. Uses fewer
+  // where the system refuses to create more.
   int threads = 0;
 };
 
 enum class GradientMode {
   kOverwrite,
-  kAdd,  // to what the arrays hold; after an error they are as before
+  kAdd,  // adds to what the arrays hold; leaves them unchanged on an error
 };
 
-// Owns threads, which start with the first call, and scratch memory, which is reused: rendering
+// Owns threads, which start with the first call, and scratch memory, which it reuses: rendering
 // the same sizes again allocates nothing. There is no global state: renderers are independent.
-// One call at a time for each renderer. The same input gives the same bits for any number of
-// threads.
+// Not thread-safe: one call at a time per renderer. The same input gives the same bits for any
+// number of threads.
 //
-// T = float is the engine. T = double is its scalar reference, for checks of gradients: every
-// face for every pixel, alpha of all faces whatever max_alpha_error allows, memory allocated by
-// every call; numbers must be in float's range.
+// T = float is the engine. T = double is its scalar reference, for gradient checks: it tests every
+// face at every pixel, takes alpha over all faces whatever max_alpha_error allows, and allocates
+// memory in every call; numbers must be in float's range.
 template <class T>
 class TILEGRAD_API RendererT {
  public:
@@ -99,17 +99,17 @@ class TILEGRAD_API RendererT {
   RendererT(RendererT&&) noexcept;
   RendererT& operator=(RendererT&&) noexcept;
 
-  // Images of a batch of scenes, each with its own mesh and camera, all of one size (images of
-  // several sizes are several calls). Errors: an array of the wrong size (names scene, array,
-  // expected and got), an index out of range, a number that is not finite (names scene, array,
-  // index), options out of range, scenes of different parts, no memory.
+  // Renders a batch of scenes, each with its own mesh and camera, all at one size (call once per
+  // size). Errors: an array of the wrong size (names scene, array, expected and actual size), an
+  // index out of range, a number that is not finite (names scene, array, index), options out of
+  // range, scenes with different parts, out of memory.
   Status Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
                 const Outputs& outputs, FrameT<T>* frame);
 
-  // The gradients of sum(d_frame * images) with respect to the scenes of `frame`, whose arrays
-  // are as they were in Render. `d_scenes`: one for each scene. Any renderer may do it. Errors:
-  // those of Render, a gradient of the wrong size, a gradient of alpha where alpha was not
-  // rendered, a gradient that overflows.
+  // The gradients of sum(d_frame * images) with respect to the scenes of `frame`, whose arrays must
+  // be unchanged since Render. `d_scenes`: one per scene. Any renderer will do, not only the one
+  // that rendered. Errors: those of Render, a gradient of the wrong size, a gradient of alpha when
+  // alpha was not rendered, a gradient that overflows.
   Status Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
                   std::span<const SceneGradientsT<T>> d_scenes,
                   GradientMode mode = GradientMode::kOverwrite);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is rendered: views over arrays of the caller, who keeps them alive and unchanged until the
-// last Backward of the frame. Whatever is left empty is absent: a scene with nothing but positions
-// and faces has a silhouette, one with `colors` is shaded by them, one with `textures` and `uvs` is
-// textured, and both are multiplied where both are there.
+// The scene: views of the caller's arrays, which must stay alive and unchanged until the last
+// Backward of the frame. Empty arrays are absent: positions and faces alone give a silhouette,
+// `colors` give vertex colours, `textures` with `uvs` give texture; with both, they are multiplied.
 //
 // Shapes: V vertices, F faces, C channels; row-major, the last axis is contiguous.
 #pragma once
@@ -18,7 +17,7 @@ namespace tilegrad::inline v0 {
 
 enum class Rate { kVertex, kCorner };
 
-// Values that are interpolated over faces.
+// Values interpolated over faces.
 template <class T>
 struct StreamT {
   std::span<const T> values{};  // [V,C]; [F,3,C] with Rate::kCorner: seams without extra vertices
@@ -29,7 +28,7 @@ enum class Wrap {
   kRepeat,  // the texture tiles the plane
   kClamp,   // outside [0, 1] the border texels are repeated
   kMirror,  // tiles of the texture and its mirror image alternate
-  // One way along u, another along v.
+  // Different modes along u and v.
   kRepeatClamp,
   kClampMirror,
   kMirrorRepeat,
@@ -40,7 +39,7 @@ enum class Wrap {
 enum class Filter {
   kNearest,    // no gradient to uvs
   kBilinear,   // between the four nearest texels
-  kTrilinear,  // and between two levels of a pyramid, by the size of a pixel on the texture
+  kTrilinear,  // and between two mip levels, chosen by the pixel's footprint
 };
 
 // [height,width,3], row 0 on top; (u, v) = (0, 0) is the lower left corner. Sides 1..16384.
@@ -54,22 +53,22 @@ struct TextureT {
 
 enum class Lighting {
   kNone,                // light is 1
-  kLambert,             // `lights` or `light_directions`
-  kPhong,               // the same, and the eye
+  kLambert,             // uses `lights` or `light_directions`
+  kPhong,               // the same, with a highlight towards the eye
   kSphericalHarmonics,  // `sh`: degree 2, nine coefficients
 };
 enum class Normals {
-  kSmooth,  // of vertices, from positions, weighted by the areas of faces
-  kFlat,    // of faces, from positions
-  kGiven,   // `normals`, of any length
+  kSmooth,  // per vertex, from positions, weighted by face area
+  kFlat,    // per face, from positions
+  kGiven,   // the scene's `normals`, of any length
 };
 
 // The same for all scenes of a batch.
 struct ShadingModel {
   Lighting lighting = Lighting::kNone;
   Normals normals = Normals::kSmooth;
-  bool two_sided = false;  // normals of faces that are seen from behind are turned
-  bool clamp = false;      // colours to [0, 1]; what is beyond has no gradient
+  bool two_sided = false;  // flips normals of faces seen from behind
+  bool clamp = false;      // colours to [0, 1]; clamped values have no gradient
   bool operator==(const ShadingModel&) const = default;
 };
 
@@ -79,7 +78,7 @@ template <class T>
 struct SurfaceT {
   std::array<T, 3> base_color = {T(1), T(1), T(1)};
   int texture = -1;  // index into `textures`, -1: none
-  // Of Lambert and Phong light; spherical harmonics have no use for them.
+  // For Lambert and Phong lighting; spherical harmonics ignore them.
   std::array<T, 3> ambient = {T(0), T(0), T(0)};
   std::array<T, 3> diffuse = {T(1), T(1), T(1)};
   std::array<T, 3> specular = {T(0.4), T(0.4), T(0.4)};  // Phong
@@ -92,7 +91,7 @@ struct LightT {
   T intensity = T(1);
 };
 
-// All scenes of a batch have the same parts (what is empty in one is empty in all), rates and
+// All scenes of a batch have the same parts (an array empty in one is empty in all), rates and
 // model.
 template <class T>
 struct SceneT {
@@ -121,16 +120,16 @@ using Surface = SurfaceT<float>;
 using Light = LightT<float>;
 using Scene = SceneT<float>;
 
-// dL/d(scene). An empty span (or null) is not computed and costs nothing. Scenes of a batch may
-// be given the same array, of many views of one mesh, say: it gets their sum, in the order of
-// scenes. Arrays that overlap in part, or are of two kinds or sizes, are an error.
+// dL/d(scene). Empty spans and null pointers are not computed and cost nothing. Scenes of a batch
+// may share an array, as for many views of one mesh: it receives their sum, added in scene order.
+// Arrays that overlap partly, or differ in kind or size, are an error.
 template <class T>
 struct SceneGradientsT {
   std::span<T> positions{};      // shapes as in the scene
-  CameraT<T>* camera = nullptr;  // entry by entry, as if all were free; near_plane gets 0
+  CameraT<T>* camera = nullptr;  // per entry, as if all entries were free; near_plane gets 0
   std::span<T> colors{}, uvs{}, normals{};
-  std::span<const std::span<T>> textures{};  // one for each texture; an empty one is not wanted
-  std::span<SurfaceT<T>> surfaces{};         // [1] if the scene has none; `texture` is not touched
+  std::span<const std::span<T>> textures{};  // one per texture; empty ones are not computed
+  std::span<SurfaceT<T>> surfaces{};         // [1] if the scene has none; `texture` is not written
   std::span<LightT<T>> lights{};
   std::span<T> light_directions{}, sh{}, attributes{};
 };

@@ -32,8 +32,7 @@ class [[nodiscard]] Status {
   StatusCode code() const { return code_; }
   const std::string& message() const { return message_; }
 
-  // "reading chair.obj: line 3: ..." : the place where it happened, put before the message. OK
-  // stays OK.
+  // Prefixes the place of the error: "reading chair.obj: line 3: ...". OK stays OK.
   Status Within(const std::string& place) const {
     return ok() ? *this : Status(code_, place + ": " + message_);
   }
@@ -43,11 +42,11 @@ class [[nodiscard]] Status {
   std::string message_;
 };
 
-// Either a T or the Status that says why there is none. Take value() only after ok().
+// Either a T or the Status that says why there is none. Call value() only if ok().
 template <class T>
 class [[nodiscard]] Result {
  public:
-  // Implicit, so that a function returns either.
+  // Implicit, so that a function can return either.
   Result(T value) : state_(std::move(value)) {}                         // NOLINT
   Result(Status status) : state_(std::move(status)) { assert(!ok()); }  // NOLINT
 

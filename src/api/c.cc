@@ -47,7 +47,7 @@ tilegrad_status CodeOf(const Status& status) {
   }
 }
 
-// Runs a call and keeps its message.
+// Runs a call and stores its error message.
 template <class Call>
 tilegrad_status Run(tilegrad_renderer* renderer, const Call& call) {
   if (renderer == nullptr) return TILEGRAD_INVALID_ARGUMENT;
@@ -78,7 +78,7 @@ tilegrad_options DefaultOptions() {
   return to;
 }
 
-// As much of `value` as the caller's struct holds; nothing where there is none.
+// Writes as much of `value` as the caller's struct holds; nothing if `to` is null.
 template <class S>
 void WriteSized(S value, std::size_t size, S* to) {
   if (to == nullptr) return;
@@ -96,7 +96,7 @@ Status ReadScenes(const tilegrad_scene* scenes, std::size_t count, tilegrad_fram
     Status status = api::ReadEntry("scene", scenes, n, &scene);
     if (status.ok()) status = api::CheckCounts(scene);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
-    // One by one: a wrong count is found by what is there, before it takes memory.
+    // One by one: a wrong count fails at the first bad entry, before it takes memory.
     if (frame->scenes.size() <= n) frame->scenes.emplace_back();
     frame->scenes[n].Set(scene);
     frame->views.push_back(frame->scenes[n].scene);

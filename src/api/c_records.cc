@@ -15,7 +15,7 @@ std::span<T> SpanOf(T* data, std::size_t count) {
   return data == nullptr ? std::span<T>() : std::span<T>(data, count);
 }
 
-// Of a texture whose sides are wrong there are no texels; Render names the sides.
+// 0 for a texture with invalid sides; Render's error names the sides.
 std::size_t TexelsOf(const tilegrad_texture& t) {
   if (t.width < 0 || t.height < 0) return 0;
   return 3 * static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height);
@@ -25,7 +25,7 @@ std::size_t SurfacesOf(const Scene& scene) {
   return std::max<std::size_t>(scene.surfaces.size(), 1);
 }
 
-// For the parts of two records of the same members, here and there.
+// For parts of two records with the same members.
 constexpr auto kCopy = [](const char*, std::span<const float> from, std::span<float> to) {
   std::copy(from.begin(), from.end(), to.begin());
 };
@@ -76,7 +76,7 @@ void SetStreams(const tilegrad_scene& from, Scene* to) {
       });
 }
 
-// NULL of an empty list, whatever memory it has.
+// NULL for an empty list, whatever its data pointer.
 template <class Item>
 const Item* ItemsOf(std::span<const Item> list) {
   return list.empty() ? nullptr : list.data();

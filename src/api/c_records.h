@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the structs of tilegrad/c.h to the records of the C++ interface.
+// Converts the structs of tilegrad/c.h to the records of the C++ interface.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace tilegrad::api {
 
-// Of a struct or an array of structs, which may stand anywhere.
+// struct_size of a struct or of the first of an array; `from` may be unaligned.
 inline std::size_t StructSize(const void* from) {
   std::size_t size;
   std::memcpy(&size, from, sizeof size);
@@ -22,8 +22,8 @@ inline std::size_t StructSize(const void* from) {
 }
 Status CheckStructSize(const char* name, std::size_t size);
 
-// A struct of the caller, whose size may be that of an older or a newer version: `to` keeps its
-// defaults where the caller's ends. A newer one may not say anything that we do not know.
+// Reads a caller's struct, which may be of an older or newer version: `to` keeps its defaults
+// beyond the end of an older one. A newer one must have zeros in all members that we do not know.
 template <class S>
 Status ReadSized(const char* name, const S* from, S* to) {
   if (from == nullptr) return InvalidArgument("{} is NULL", name);
@@ -40,7 +40,7 @@ Status ReadSized(const char* name, const S* from, S* to) {
   return {};
 }
 
-// Entry n, all before which were read, of an array of structs of the caller's size.
+// Reads entry n of an array of structs of the caller's size; read entries in order.
 template <class S>
 Status ReadEntry(const char* name, const S* array, std::size_t n, S* to) {
   if (array == nullptr) return InvalidArgument("{} is NULL", name);
@@ -53,14 +53,14 @@ Status ReadEntry(const char* name, const S* array, std::size_t n, S* to) {
   return ReadSized(name, entry, to);
 }
 
-// A negative number that became a size is none.
+// Rejects counts that were negative before conversion to size_t.
 Status CheckCount(const char* name, std::size_t count);
-// An array that is NULL has no entries: a count says otherwise where a pointer was forgotten.
+// A NULL array has no entries: a count > 0 means that the caller forgot the pointer.
 Status CheckCounts(const tilegrad_scene& scene);
-// A gradient of an array that the scene does not have would be left as it is.
+// An error for a gradient of an array that the scene does not have: it would be left unwritten.
 Status CheckRequested(const tilegrad_scene_gradients& wanted, const Scene& scene);
 
-// A scene, and the lists that it looks at.
+// A scene, and the lists that it views.
 struct CScene {
   std::vector<Texture> textures;
   std::vector<Surface> surfaces;
@@ -70,7 +70,7 @@ struct CScene {
   void Set(const tilegrad_scene& from);
 };
 
-// The gradients of a scene, and the lists that they look at.
+// The gradients of a scene, and the lists that they view.
 struct CGradients {
   std::vector<std::span<float>> textures;
   std::vector<Surface> surfaces;
@@ -79,7 +79,7 @@ struct CGradients {
   SceneGradients gradients;
 
   void Set(const tilegrad_scene_gradients& from, const Scene& scene);
-  // What is not a plain array.
+  // Zeroes what is not a plain array.
   static void Clear(const tilegrad_scene_gradients& to, const Scene& scene);
   void AddTo(const tilegrad_scene_gradients& to) const;
 };

@@ -64,7 +64,7 @@ std::size_t Arena::capacity() const {
 
 namespace {
 
-// Room for `size` bytes, so that no write to the mapping can fail; -1 where there is none.
+// Reserves `size` bytes, so that no write to the mapping can fail; -1 if there is no room.
 int OpenScratchFile(std::size_t size) {
   std::error_code error;
   static std::atomic<unsigned> count = 0;
@@ -97,7 +97,7 @@ Result<ScratchBytes> ScratchBytes::OfFile(const Path& file, std::size_t size) {
   if (fd >= 0) ::close(fd);
   if (bytes == MAP_FAILED)
     return IoError("{}: cannot be mapped: {}", file.string(), std::strerror(error));
-  ::madvise(bytes, size, MADV_RANDOM);  // read ahead, it would fill the memory with other pictures
+  ::madvise(bytes, size, MADV_RANDOM);  // read-ahead would fill the memory with other pictures
   ScratchBytes out;
   out.bytes_ = {static_cast<std::uint8_t*>(bytes), size};
   return out;

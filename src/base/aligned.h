@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for kernels: vectors aligned to cache lines, an arena of scratch that is reused from frame
-// to frame, and bytes that the system may keep on disk.
+// Memory for kernels: vectors aligned to cache lines, a scratch arena reused from frame to frame,
+// and bytes that the system may page out to disk.
 #pragma once
 
 #include <cstddef>
@@ -17,10 +17,10 @@ namespace tilegrad {
 // Two cache lines: the widest vector of any target, and no false sharing.
 inline constexpr std::size_t kAlignment = 128;
 
-// Memory aligned to kAlignment. Large blocks begin on a huge page and ask the system for such
-// pages: fewer page faults at the start, fewer TLB misses in every pass.
+// Memory aligned to kAlignment. Large blocks start on a huge page and are advised to use them:
+// fewer page faults at the start, fewer TLB misses in every pass.
 void* AllocateAligned(std::size_t bytes);
-void FreeAligned(void* data, std::size_t bytes);  // `bytes` as it was allocated
+void FreeAligned(void* data, std::size_t bytes);  // `bytes` as allocated
 
 template <class T>
 struct AlignedAllocator {
@@ -36,9 +36,9 @@ struct AlignedAllocator {
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
 
-// Scratch memory handed out by bumping a pointer and taken back all at once. Memory grows to the
-// largest use and is then reused, so a steady loop that calls Reset() allocates nothing. Not for
-// objects with destructors. Not thread-safe.
+// Scratch memory: Allocate bumps a pointer, Reset frees everything at once. The arena grows to the
+// largest use and then reuses its memory, so a steady loop that calls Reset() allocates nothing.
+// Not for objects with destructors. Not thread-safe.
 class Arena {
  public:
   // Uninitialised memory for n objects, aligned to kAlignment; valid until Reset().
@@ -47,8 +47,7 @@ class Arena {
     static_assert(std::is_trivially_destructible_v<T>);
     return {static_cast<T*>(AllocateBytes(n * sizeof(T))), n};
   }
-  // Takes everything back. If the last round overflowed into extra blocks, they are merged into
-  // one.
+  // Frees everything. If the last round overflowed into extra blocks, merges them into one.
   void Reset();
   std::size_t capacity() const;  // bytes held
 
@@ -58,12 +57,12 @@ class Arena {
   std::size_t used_ = 0;  // in the last block
 };
 
-// Bytes that are read now and then, such as all pictures of a dataset: too many for the memory, so
-// that the system may keep some on disk.
+// Rarely read bytes, such as all pictures of a dataset: too many for memory, so the system may page
+// them out to disk.
 
-// Up to 1 GiB in memory. More are mapped from a file without a name in the folder of temporary
-// files (TMPDIR, else /tmp), which the system frees with the object or the process; in memory all
-// the same if the folder has no room for them.
+// Up to 1 GiB stays in memory. More is mapped from an unnamed file in the temporary folder (TMPDIR,
+// else /tmp), which the system frees with the object or the process; if the folder has no room, it
+// stays in memory too.
 class ScratchBytes {
  public:
   static constexpr std::size_t kInMemory = std::size_t{1} << 30;
@@ -77,10 +76,11 @@ class ScratchBytes {
   }
   ~ScratchBytes() { Free(); }
 
-  // The first `size` bytes of a file, as it is while it is mapped; writes to them stay here.
+  // Maps the first `size` bytes of a file copy-on-write: writes do not reach the file, later
+  // changes of the file may show.
   static Result<ScratchBytes> OfFile(const Path& file, std::size_t size);
 
-  // Zeros instead of what there was. std::bad_alloc if there is no memory either.
+  // Replaces the contents with zeros. Throws std::bad_alloc if memory runs out too.
   void Resize(std::size_t size);
   void Assign(std::span<const std::uint8_t> bytes);
 

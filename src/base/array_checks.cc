@@ -46,7 +46,7 @@ HWY_INLINE bool NoneIsInfiniteOrNan(std::span<const T> values) {
 bool AllFiniteFloat(std::span<const float> values) { return NoneIsInfiniteOrNan(values); }
 bool AllFiniteDouble(std::span<const double> values) { return NoneIsInfiniteOrNan(values); }
 
-// NaN fails every comparison, so what is kept is which values passed.
+// NaN fails every comparison, so this accumulates which values passed.
 template <class T>
 HWY_INLINE bool NoneIsBeyond(std::span<const T> values, T most) {
   const hn::ScalableTag<T> d;

@@ -10,7 +10,7 @@ namespace tilegrad {
 bool AllFinite(std::span<const float> values);
 bool AllFinite(std::span<const double> values);
 
-// Whether |value| <= most for every value; none of them is NaN then.
+// Whether |value| <= most for every value; false if any is NaN.
 bool AllBelow(std::span<const float> values, float most);
 bool AllBelow(std::span<const double> values, double most);
 

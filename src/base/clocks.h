@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clocks for what is measured while it is done.
+// Clocks for measuring work as it runs.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,7 @@ class StageClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// Seconds that processors have worked, as the system counts them.
+// CPU time in seconds, as the system accounts it.
 namespace internal {
 inline double SecondsOf(clockid_t clock) {
   timespec t{};

@@ -28,9 +28,10 @@ TILEGRAD_ERROR_MAKER(Cancelled, kCancelled)
 TILEGRAD_ERROR_MAKER(InternalError, kInternal)
 #undef TILEGRAD_ERROR_MAKER
 
-// The border that no exception crosses: the standard library's own (no memory) become a Status.
+// The boundary that no exception crosses: exceptions of the standard library (out of memory) become
+// a Status.
 
-// What `call` returns. The messages fit into a std::string without memory of its own.
+// Returns call(). The messages are short enough for std::string to hold without allocating.
 template <class Call>
 Status Guarded(const Call& call) noexcept {
   try {

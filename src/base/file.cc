@@ -42,7 +42,7 @@ Status SystemError(const Path& path, const char* doing) {
   return {StatusCode::kIo, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(errno))};
 }
 
-// A missing file, or one below something that is no folder, is kNotFound.
+// kNotFound for a missing file, or a path through something that is no folder.
 Status CannotOpenToRead(const Path& path) {
   const bool missing = errno == ENOENT || errno == ENOTDIR;
   const Status status = SystemError(path, "cannot open");
@@ -70,7 +70,7 @@ Status SyncFolder(const Path& folder) {
   return {};
 }
 
-// Errors name `path`, the name that the caller knows.
+// Errors name `path`, which the caller knows.
 Status WriteTemporary(const Path& temporary, const Path& path, BytePieces pieces) {
   FileHandle file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
   if (file.fd() < 0) return SystemError(path, "cannot create");
@@ -135,7 +135,7 @@ Status WriteToDevice(const Path& path, BytePieces pieces) {
   return {};
 }
 
-// The target of a symbolic link; `path` itself where it is none or dangles.
+// The target of a symbolic link; `path` itself if it is none or dangles.
 Path BehindLinks(const Path& path) {
   std::error_code error;
   if (!std::filesystem::is_symlink(path, error)) return path;
@@ -214,7 +214,7 @@ namespace {
 
 constexpr const char* kEnding = ".tmp";
 
-// The process that TemporaryOf() named a file after.
+// The process in a name made by TemporaryOf().
 std::optional<pid_t> WriterOf(const Path& file) {
   if (file.extension() != kEnding) return std::nullopt;
   const std::string number = file.stem().extension().string();  // ".123"
@@ -225,7 +225,8 @@ std::optional<pid_t> WriterOf(const Path& file) {
   return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
 }
 
-// A file with our own number is from an earlier process: in a container every run may get it.
+// A file with our own process id is from an earlier process: in a container every run may get the
+// same.
 bool IsRunningElsewhere(pid_t writer) {
   return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
 }
@@ -293,7 +294,7 @@ Result<FolderLock> FolderLock::Take(const Path& folder) {
   TILEGRAD_TRY(MakeFolder(folder));
   FolderLock lock(folder);
   if (lock.fd_ < 0) return IoError("{}: cannot open: {}", folder.string(), std::strerror(errno));
-  // IsHeld takes it for a moment: once more, then.
+  // IsHeld takes the lock for a moment, so retry.
   for (int attempt = 0; ::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
        ++attempt) {
     if (attempt == kAttempts)

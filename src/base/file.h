@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole files. A file that we write appears complete under its name or not at all, whatever happens
-// in between.
+// Whole-file reads and atomic writes: a file appears complete under its name or not at all,
+// whatever happens in between.
 #pragma once
 
 #include <cstddef>
@@ -20,64 +20,65 @@ namespace tilegrad {
 using Path = std::filesystem::path;
 using Bytes = std::vector<std::uint8_t>;
 
-// Errors name the path and the system's reason. A directory, or a file above `max_bytes`, is
-// refused before reading.
+// Errors name the path and the system's reason. Refuses directories and files above `max_bytes`
+// before reading.
 Result<Bytes> ReadFile(const Path& path, std::size_t max_bytes = std::size_t{4} << 30);
 Result<std::string> ReadText(const Path& path, std::size_t max_bytes = std::size_t{1} << 30);
 
-// Writes to a temporary name beside `path`, fsyncs, renames over `path`, fsyncs the folder. On any
-// failure (full disk, ...) the temporary is removed and what stood under `path` is untouched.
-// Missing parent folders are created. Symbolic links stay, devices and pipes are written to.
+// Writes to a temporary file beside `path`, fsyncs, renames it over `path`, fsyncs the folder. On
+// any failure (full disk, ...) removes the temporary and leaves the old file untouched. Creates
+// missing parent folders. Keeps symbolic links; writes to devices and pipes directly.
 Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes);
 Status WriteTextAtomic(const Path& path, std::string_view text);
-// The same with contents that lie in several places, one behind the other.
+// The same for contents in several pieces, written in order.
 using BytePieces = std::span<const std::span<const std::uint8_t>>;
 Status WriteFileAtomic(const Path& path, BytePieces pieces);
 
-// Appends and fsyncs if `durable`. A line that was cut by a crash is the reader's to detect.
+// Appends; fsyncs if `durable`. Readers must detect a line cut short by a crash.
 Status AppendText(const Path& path, std::string_view text, bool durable);
 
-// Whether a path leads to anything, a folder, a file; no where that cannot be found out.
+// Whether a path leads to anything (file, folder, ...); false if that cannot be determined.
 bool PathExists(const Path& path);
 bool IsFolder(const Path& path);
 bool IsFile(const Path& path);
 
-Status MakeFolder(const Path& path);  // with parents; existing is fine
-// In this order; an error names the first that cannot be removed. What is not there is fine.
+Status MakeFolder(const Path& path);  // with parents; OK if it exists
+// Removes in this order; an error names the first file that could not be removed. Missing files are
+// fine.
 Status RemoveFiles(std::span<const Path> files);
 
-// Temporary names of files that are being written, and removal of those a killed process left.
+// Temporary names of files being written, and removal of those that a killed process left behind.
 
-// Where this process writes what will be `path`: beside it, `path`.PROCESS.tmp, or a hash in place
-// of a name that would become too long.
+// The name under which this process writes the future `path`: beside it, `path`.PROCESS.tmp, with a
+// hash in place of a name that would become too long.
 Path TemporaryOf(const Path& path);
 
-// Whether a file is called as one that is being written, or was when its process was killed.
+// Whether the name is that of a file being written, or left by a killed process.
 bool IsTemporary(const Path& file);
 
-// The temporaries in a folder whose process does not run any more.
+// The temporaries in a folder whose processes no longer run.
 class LeftTemporaries {
  public:
   explicit LeftTemporaries(const Path& folder);
   void RemoveAll();
-  void RemoveOf(const std::string& name);  // of the file with this name
+  void RemoveOf(const std::string& name);  // those of the file with this name
 
  private:
-  std::multimap<std::string, Path> files_;  // by the name of the file, or the hash in its place
+  std::multimap<std::string, Path> files_;  // by the file's name, or by the hash in its place
 };
 
 // Removes temporaries from `folder`, not from its subfolders, unless their process still runs. The
-// caller must be alone in the folder. Files that cannot be removed stay.
+// caller must hold the folder alone. Files that cannot be removed stay.
 void RemoveTemporaries(const Path& folder);
-// Only those of one file: for folders that also hold other programs' files.
+// Only those of one file: for folders that also hold files of other programs.
 void RemoveTemporariesOf(const Path& file);
 
-// One process at a time in a folder.
+// Allows one process at a time in a folder.
 
-// Held during its lifetime and released by the system if the process is killed.
+// Holds the lock during its lifetime; the system releases it if the process is killed.
 class FolderLock {
  public:
-  FolderLock() = default;  // of nothing
+  FolderLock() = default;  // holds nothing
   ~FolderLock();
   FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   FolderLock& operator=(FolderLock&& other) noexcept {
@@ -85,11 +86,11 @@ class FolderLock {
     return *this;
   }
 
-  // Makes the folder, and locks it itself: no file of ours is left in it. kInvalidArgument if
-  // another process holds it. On a file system without locks of folders (NFS) the result locks
+  // Creates the folder and locks the folder itself, so no lock file stays in it. kInvalidArgument
+  // if another process holds it. On a file system that cannot lock folders (NFS) the result locks
   // nothing.
   static Result<FolderLock> Take(const Path& folder);
-  // Whether somebody holds it, this process included.
+  // Whether any process holds it, this one included.
   static bool IsHeld(const Path& folder);
 
  private:

@@ -31,7 +31,7 @@ class FunctionRef<R(A...)> {
   R (*call_)(void*, A...);
 };
 
-// A callable that owns what it captures without a heap allocation.
+// An owning callable that never allocates on the heap.
 
 template <class Signature, std::size_t kBytes>
 class InlineFunction;
@@ -86,7 +86,8 @@ class InlineFunction<R(A...), kBytes> {
 
   alignas(std::max_align_t) std::byte bytes_[kBytes];
   R (*call_)(std::byte* held, A... a) = nullptr;
-  void (*move_)(std::byte* held, std::byte* to) = nullptr;  // destroys; moves first unless null
+  void (*move_)(std::byte* held, std::byte* to) = nullptr;  // destroys; moves to `to` first unless
+                                                            // null
 };
 
 }  // namespace tilegrad

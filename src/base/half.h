@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// IEEE 754 binary16 (float16), as its bits, to and from float32.
+// Converts the bits of IEEE 754 binary16 (float16) to and from float32.
 #pragma once
 
 #include <bit>
@@ -8,10 +8,10 @@
 
 namespace tilegrad {
 
-inline constexpr std::uint16_t kHalfInfinity = 0x7c00;  // bits; NaN is what lies above
+inline constexpr std::uint16_t kHalfInfinity = 0x7c00;  // bits; larger magnitudes are NaN
 inline constexpr float kLargestHalf = 65504;
 
-// Exact: its numbers are those of float32 with the exponent's bias of 127 instead of 15.
+// Exact: every float16 is a float32 with the exponent bias 127 instead of 15.
 inline float FromHalf(std::uint16_t half) {
   const std::uint32_t bits = half, sign = (bits & 0x8000) << 16, exponent = bits >> 10 & 31,
                       fraction = bits & 1023;
@@ -22,17 +22,18 @@ inline float FromHalf(std::uint16_t half) {
   return std::bit_cast<float>(sign | wide << 23 | fraction << 13);
 }
 
-// The nearest, ties to even: infinity from 65520 on, zero up to 2^-25. NaN stays NaN.
+// Rounds to nearest, ties to even: 65520 and above become infinity, up to 2^-25 zero. NaN stays
+// NaN.
 inline std::uint16_t ToHalf(float value) {
   constexpr std::uint32_t kInfinity = 0x7f800000, kLeastNormal = 0x38800000;  // 2^-14
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(value), magnitude = bits & 0x7fffffff;
   const auto sign = static_cast<std::uint16_t>(bits >> 16 & 0x8000);
   if (magnitude > kInfinity) return static_cast<std::uint16_t>(sign | kHalfInfinity | 0x200);
-  if (magnitude < kLeastNormal) {  // in steps of 2^-24, of which 1024 are the least normal half
+  if (magnitude < kLeastNormal) {  // in steps of 2^-24; the smallest normal half is 1024 of them
     const float steps = std::nearbyint(std::bit_cast<float>(magnitude) * 0x1p24f);
     return static_cast<std::uint16_t>(sign | static_cast<std::uint16_t>(steps));
   }
-  // 13 bits of the fraction go; a carry out of it raises the exponent, as it should.
+  // Drops 13 bits of the fraction; a carry out of it raises the exponent, as it should.
   const std::uint32_t rounded = (magnitude + 0xfff + (magnitude >> 13 & 1)) >> 13;
   constexpr std::uint32_t kBias = (127 - 15) << 10;
   const std::uint32_t half = rounded - kBias;

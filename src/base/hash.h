@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A checksum of bytes, the same on every machine of one byte order. No defence against forgery.
-// Eight bytes at a time: a checkpoint has hundreds of megabytes. HashText (train/data/split.h)
-// stays as it is, since the split of every dataset follows from its values.
+// A checksum of bytes, the same on every machine of one byte order. Not cryptographic. Takes eight
+// bytes at a time, since checkpoints have hundreds of megabytes. HashText (train/data/split.h) must
+// stay as it is: its values determine the split of every dataset.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace tilegrad {
 
 class Hash {
  public:
-  // Adding in two parts gives another sum than adding at once.
+  // Two calls give a different hash than one call with the concatenation.
   void Add(std::string_view bytes) {
     state_ = Mix64(state_ ^ bytes.size());
     while (!bytes.empty()) {
@@ -29,7 +29,7 @@ class Hash {
       bytes.remove_prefix(count);
     }
   }
-  // A vector of numbers, or of structs of numbers without gaps.
+  // A vector of numbers, or of structs of numbers without padding.
   template <class Vector>
   void AddAll(const Vector& values) {
     AddBytes(values.data(), values.size() * sizeof(values[0]));

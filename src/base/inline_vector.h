@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A list that is usually short: up to N elements lie in the object itself, more on the heap.
+// A vector for short lists: stores up to N elements in the object itself, more on the heap.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace tilegrad {
 
-// T is default-constructible and copyable; elements that are not used are T().
+// T is default-constructible and copyable; unused elements are T().
 template <class T, std::size_t N>
 class InlineVector {
  public:
@@ -34,7 +34,7 @@ class InlineVector {
 
   void resize(std::size_t size) {
     if (size > N) {
-      // Moved: a copy left behind would keep its resources alive.
+      // Moves: a copy left behind would keep its resources alive.
       if (size_ <= N) {
         many_.reserve(size);
         for (std::size_t i = 0; i < size_; ++i) many_.push_back(std::exchange(few_[i], T()));

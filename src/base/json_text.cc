@@ -8,7 +8,7 @@
 namespace tilegrad {
 namespace {
 
-// change(text) for every text in `json`, names of members left out.
+// Applies `change` to every string value in `json`, but not to member names.
 template <class Json, class Change>
 void ChangeTexts(Json* json, const Change& change) {
   if (json->is_string()) *json = change(json->template get_ref<const std::string&>());
@@ -55,7 +55,7 @@ Result<nlohmann::json> ParseJson(std::string_view text, const std::string& place
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
     const auto line = first_line + std::count(text.begin(), end, '\n');
     return DataLoss("{}: line {}: not valid JSON", place, line);
-  } catch (const nlohmann::json::exception& error) {  // a number beyond double; has no place
+  } catch (const nlohmann::json::exception& error) {  // a number beyond double; has no position
     return DataLoss("{}: from line {} on: not valid JSON: {}", place, first_line, error.what());
   }
 }
@@ -68,7 +68,7 @@ std::string DumpJson(const Json& json, int indent) {
 template <class Json>
 std::string JsonText(Json json, int indent) {
   ChangeTexts(&json, JsonName);
-  return DumpJson(json, indent);  // names of members
+  return DumpJson(json, indent);  // which replaces bytes in member names
 }
 
 template nlohmann::json ParseJsonOrDiscard(std::string_view);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON from files and to files: the one way in which text that need not be UTF-8 (names of files,
-// of models, of classes) is written and comes back as it was (JsonName in base/text.h). Its
-// definitions are compiled once: a parser or a serializer takes longer to compile than what uses
-// it.
+// Reads and writes JSON; text that need not be UTF-8 (names of files, models, classes) survives the
+// round trip (JsonName in base/text.h). Definitions are compiled once: the parser and the
+// serializer take longer to compile than the code that uses them.
 #pragma once
 
 #include <cstddef>
@@ -14,27 +13,28 @@
 
 namespace tilegrad {
 
-// Guards against deeply nested JSON: the parser, and any code that copies or writes the values,
-// recurses as deep as they are nested.
+// Guards against deeply nested JSON, since the parser and all code that copies or writes values
+// recurse once per level.
 //
-// The position of the first bracket nested within `most` others; npos if there is none. The text
-// need not be valid.
+// Returns the position of the first bracket nested within `most` others; npos if there is none. The
+// text need not be valid.
 std::size_t FirstNestedDeeper(std::string_view json, int most);
 
 // Invalid text gives a discarded value (is_discarded()).
 template <class Json = nlohmann::json>
 Json ParseJsonOrDiscard(std::string_view text);
 
-// An error names the line. `place` is the file's name; `first_line` the number of the text's first
-// line in it.
+// An error names the line. `place` is the file's name; `first_line` is the number of the text's
+// first line in that file.
 Result<nlohmann::json> ParseJson(std::string_view text, const std::string& place,
                                  int first_line = 1);
 
-// `indent` -1: on one line. Bytes that are not UTF-8 become U+FFFD.
+// `indent` -1: on one line. Replaces bytes that are not UTF-8 by U+FFFD.
 template <class Json>
 std::string DumpJson(const Json& json, int indent = -1);
 
-// What ParseJson reads back as it is.
+// Lossless: ParseJson restores all values, strings that are not UTF-8 included. In member names
+// such bytes become U+FFFD.
 template <class Json>
 std::string JsonText(Json json, int indent = -1);
 

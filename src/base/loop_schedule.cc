@@ -18,7 +18,7 @@
 namespace tilegrad {
 namespace {
 
-// Runs a strand on workers that exist as numbers only.
+// Executes a strand on simulated workers.
 class Simulation {
  public:
   explicit Simulation(const LoopMachine& machine)
@@ -26,7 +26,7 @@ class Simulation {
     for (std::size_t w = stacks_.size(); w-- > 1;) idle_.push_back(w);
   }
 
-  // Seconds that each of the strand's own loops takes.
+  // Returns the seconds that each of the strand's own loops takes.
   std::vector<double> Run(const Strand& strand) {
     Begin(strand, nullptr, 0, 0.0);
     while (!events_.empty()) {
@@ -42,7 +42,7 @@ class Simulation {
     const LoopRecord& record;
     std::size_t owner;
     double begin;
-    std::size_t place;  // of its seconds in taken_
+    std::size_t place;  // index of its seconds in taken_
     std::size_t started = 0, ended = 0;
     bool awaited = true, left = false;  // by its owner
     bool HasTask() const { return started < record.tasks.size(); }
@@ -50,11 +50,11 @@ class Simulation {
     // Whether a worker without a loop of its own may take a task.
     bool IsOpen() const { return HasTask() && (awaited || started - ended < record.helpers); }
   };
-  // A strand that a worker is in.
+  // A strand that a worker is executing.
   struct Frame {
     const Strand& strand;
-    OpenLoop* of;               // the loop whose task it is; null: the whole
-    std::size_t stretch = 0;    // that it is in, or whose loop it waits for
+    OpenLoop* of;               // the loop of which it is a task; null: the outermost strand
+    std::size_t stretch = 0;    // the current one, or the one before the awaited loop
     OpenLoop* inner = nullptr;  // the loop that it waits for
   };
 
@@ -63,7 +63,7 @@ class Simulation {
     events_.emplace(time + strand.stretches[0], worker);
   }
 
-  // The worker's stretch is over, or the loop that it waits for, or others may have work for it.
+  // The worker's stretch has ended, or the loop that it waits for, or others may have work for it.
   void Advance(std::size_t worker, double time) {
     auto& stack = stacks_[worker];
     if (!stack.empty() && stack.back().inner == nullptr) {
@@ -92,7 +92,7 @@ class Simulation {
     }
   }
 
-  // After each start time twice as many take part; those who are awake do at once.
+  // After each start time twice as many take part; workers already awake join at once.
   void WakeOthers(double time, bool asleep) {
     std::size_t awake = 1;
     for (const std::size_t other : std::exchange(idle_, {})) {
@@ -101,7 +101,7 @@ class Simulation {
     }
   }
 
-  // At the end of the whole: whether a side loop is left, which its owner now waits for.
+  // At the end of the outermost strand: whether its owner must now wait for a side loop.
   bool AwaitSideLoop(std::size_t worker, double time) {
     Frame& frame = stacks_[worker].back();
     if (frame.of != nullptr) return false;
@@ -115,7 +115,7 @@ class Simulation {
     return true;
   }
 
-  // Of a strand. Its loop's owner may wait for it.
+  // Ends a strand. The owner of its loop may be waiting for it.
   void Close(std::size_t worker, double time) {
     OpenLoop* const loop = stacks_[worker].back().of;
     stacks_[worker].pop_back();
@@ -204,8 +204,9 @@ void Spin(double seconds) {
   }
 }
 
-// What a loop takes beyond its tasks, of which every worker gets one, where nine of ten take
-// longer: what other programs hold up is not the machine's. By the doublings until all take part.
+// The time of a loop beyond its tasks, with one task per worker, that nine of ten loops exceed:
+// delays by other programs do not count. Divided by the number of doublings until all workers take
+// part.
 double MeasureStart(const Workers& workers) {
   constexpr int kLoops = 301;
   constexpr double kBefore = 30e-6, kTask = 100e-6;
@@ -222,7 +223,7 @@ double MeasureStart(const Workers& workers) {
   return std::max(0.0, beyond[kLoops / 10]) / std::max(1, static_cast<int>(doublings));
 }
 
-// The best of a few rounds over arrays that no cache holds: two reads and a write of each number.
+// The best of a few rounds over arrays larger than any cache: two reads and a write per number.
 double MeasureMemory(const Workers& workers) {
   constexpr std::size_t kNumbers = std::size_t{1} << 25, kGrain = std::size_t{1} << 16;
   constexpr int kRounds = 6;

@@ -27,7 +27,7 @@ void LoopTrace::Begin() {
 void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
                     std::size_t helpers) {
   const double bytes = std::exchange(traffic_, 0);
-  if (n == 0 || (n == 1 && helpers == 0)) {  // nothing that another worker could do
+  if (n == 0 || (n == 1 && helpers == 0)) {  // nothing for another worker to do
     if (n == 1) task(0, 0);
     return;
   }
@@ -44,7 +44,7 @@ class LoopTrace::Reader {
   Reader(const LoopTrace& trace, double end)
       : events_(trace.events_), last_(trace.begin_), end_(end) {}
 
-  // Up to the end of the task, or of all.
+  // Reads up to the end of the task, or of the recording.
   Strand ReadStrand() {
     Strand strand;
     while (next_ < events_.size() && events_[next_].tasks > 0) {

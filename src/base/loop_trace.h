@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What parallel loops do, recorded on one thread: how long each of their tasks takes, and what
-// stands between them. base/loop_schedule.h predicts from it what many workers would take.
+// Records parallel loops on one thread: the time of each task, and of the code between loops. From
+// it base/loop_schedule.h predicts the time on many workers.
 #pragma once
 
 #include <cstddef>
@@ -14,33 +14,32 @@ namespace tilegrad {
 
 struct LoopRecord;
 
-// What one thread does in turn: stretches without loops, and loops between them.
+// What one thread executes in sequence: stretches of code without loops, and loops between them.
 struct Strand {
-  // stretches[i] comes before loops[i]; one more stretch than loops. Seconds.
+  // Seconds. stretches[i] precedes loops[i]; one more stretch than loops.
   std::vector<double> stretches;
   std::vector<LoopRecord> loops;
 };
 
 struct LoopRecord {
   LoopSite site{};
-  double bytes = 0;  // that it moves in memory, as far as it says (Workers::NoteTraffic)
+  double bytes = 0;  // its memory traffic, as far as declared (Workers::NoteTraffic)
   std::vector<Strand> tasks;
-  // > 0: a SideLoop, which so many workers take part in until the strand that began it has ended.
+  // > 0: a SideLoop, with this many workers taking part until the strand that began it ends.
   std::size_t helpers = 0;
 };
 
-// Seconds of all stretches.
+// Seconds of all stretches, those of tasks included.
 double WorkOf(const Strand& strand);
 double WorkOf(const LoopRecord& loop);
 
-// Records the loops of the Workers that are made with it. Of one thread, whose processor time it
-// reads: what other programs take away is not the loops'. A reading for each loop and task is all
-// that recording adds.
+// Records the loops of the Workers made with it. Single-threaded; measures CPU time of the thread,
+// so other programs do not count. Costs one clock reading per loop and task.
 class LoopTrace {
  public:
-  // Forgets what was recorded; the clock starts.
+  // Discards earlier records and starts the clock.
   void Begin();
-  // What was done since Begin. Not after a task has thrown.
+  // What ran since Begin. Not after a task has thrown.
   Strand End() const;
 
  private:

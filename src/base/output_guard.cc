@@ -15,7 +15,7 @@ std::optional<struct stat> Stat(const Path& path) {
   return ::stat(path.c_str(), &info) == 0 ? std::optional(info) : std::nullopt;
 }
 
-// Of a folder and those below it; not what a killed call left half-written.
+// Any file in a folder and below; ignores what a killed call left half-written.
 std::optional<Path> AnyFile(const Path& folder) {
   std::error_code error;
   for (std::filesystem::recursive_directory_iterator at(folder, error), end; !error && at != end;

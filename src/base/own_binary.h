@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where this code lies on disk.
+// The path of the running binary.
 #pragma once
 
 #include "base/file.h"
@@ -7,7 +7,7 @@
 namespace tilegrad {
 
 // The file that this code was loaded from: the program, or the shared library or Python module that
-// has it inside. Absolute as far as the loader knows; empty where the system does not tell.
+// contains it. Absolute if the loader knows; empty if the system does not say.
 Path OwnBinary();
 
 }  // namespace tilegrad

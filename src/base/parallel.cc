@@ -19,14 +19,14 @@
 namespace tilegrad {
 namespace {
 
-// How many more threads the system grants now, at most `wanted`: they are started, and end.
+// How many more threads the system grants now, at most `wanted`: starts them, and ends them.
 int GrantedThreads(int wanted) {
   std::atomic<bool> all_there = false;
   std::vector<std::thread> threads;
   try {
     threads.reserve(static_cast<std::size_t>(wanted));
     for (int i = 0; i < wanted; ++i) threads.emplace_back([&] { all_there.wait(false); });
-  } catch (...) {  // that many it is
+  } catch (...) {  // no more are granted
   }
   all_there = true;
   all_there.notify_all();
@@ -34,12 +34,12 @@ int GrantedThreads(int wanted) {
   return static_cast<int>(threads.size());
 }
 
-// The threads of oneTBB, which ends the process where the system refuses it one. So they are tried
-// before any loop needs them, and those that the existing workers may ask for are started at once;
-// they stay. Where the system has not plenty, oneTBB may start no more than these.
+// The threads of oneTBB, which ends the process if the system refuses it a thread. So this tests
+// beforehand whether the threads are available, and starts at once those that the existing workers
+// may request; they stay. If the system is short of threads, limits oneTBB to these.
 class TbbThreads {
  public:
-  // For one more Workers of `count` >= 1: how many they may be, 1..count; the rest is refused.
+  // For another Workers with `count` >= 1: returns how many it may have, 1..count.
   int Add(int count) {
     const std::lock_guard lock(mutex_);
     wanted_ += count - 1;
@@ -53,15 +53,15 @@ class TbbThreads {
     wanted_ -= fewer;
     return count - fewer;
   }
-  // Workers of `count`, as Add has it, end.
+  // For the end of a Workers whose Add returned `count`.
   void Remove(int count) {
     const std::lock_guard lock(mutex_);
     wanted_ -= count - 1;
   }
 
  private:
-  // Whether there are `most`, and spare ones for other processes; else how many there are
-  // of those needed.
+  // Tests whether `most` threads are available, and spare ones for other processes; else how many
+  // of the needed ones.
   void Try(int most, int needed) {
     constexpr int kSpare = 8;   // others in the process may start some before oneTBB does
     if (plenty_) Start(most_);  // no loop may be starting one meanwhile
@@ -71,9 +71,9 @@ class TbbThreads {
     Limit(plenty_ ? most : std::max(started_, std::min(needed, started_ + granted)));
   }
 
-  // More than there are cores (tests of determinism do that) must be allowed, or oneTBB prints a
-  // warning. Of several limits it takes the least, so there is one for all workers, which is never
-  // destroyed: oneTBB may be gone by then.
+  // Must allow more than there are cores (tests of determinism use more), or oneTBB prints a
+  // warning. Of several limits oneTBB takes the least, so there is one for all workers, which is
+  // never destroyed, since oneTBB may be gone by then.
   void Limit(int threads) {
     if (threads == allowed_) return;
     const auto* const before = limit_;
@@ -83,8 +83,9 @@ class TbbThreads {
     allowed_ = threads;
   }
 
-  // Until `threads` of them are in one loop, or for a second: loops of other workers may keep some.
-  // The arena is never destroyed: it keeps the threads. Nor is it forgotten, or it were a leak.
+  // Runs a loop until `threads` of them are in it, or for a second: loops of other workers may hold
+  // some. The arena is never destroyed, since it keeps the threads, but stays reachable, so that it
+  // is no leak.
   void Start(int threads) {
     auto* const arena = arenas_.emplace_back(new tbb::task_arena(threads + 1));
     std::atomic<int> waiting = threads + 1;
@@ -105,7 +106,7 @@ class TbbThreads {
   std::vector<tbb::task_arena*> arenas_;
   tbb::global_control* limit_ = nullptr;
   bool plenty_ = false;
-  // Beyond the threads of callers: oneTBB's limit and ours, what all workers ask for.
+  // Not counting the callers' threads: oneTBB's limit, ours, and the sum over all workers.
   int allowed_ = AvailableCores() - 1, most_ = allowed_, wanted_ = 0;
   int started_ = 0;
 };
@@ -127,7 +128,7 @@ bool ThisProcessOwnsTbb() {
   return tbb_process.compare_exchange_strong(owner, mine) || owner == mine;
 }
 
-// Whether the system has refused threads: told once.
+// Whether the system has refused threads; reported once.
 enum class Refusal { kNone, kFresh, kTold };
 std::atomic<Refusal> refusal{Refusal::kNone};
 
@@ -136,18 +137,18 @@ void NoteRefusal() {
   refusal.compare_exchange_strong(none, Refusal::kFresh);
 }
 
-// The fallback loop, in which the calling thread works too.
+// The fallback loop, in which the calling thread takes part.
 struct OwnLoop {
   const Workers* workers = nullptr;
   std::size_t worker = 0;
 };
 thread_local OwnLoop own_loop;
 
-// Replaces oneTBB by threads that live for one loop. `one_loop`: mutex of the workers, for loops
-// that several threads of the caller begin.
+// Replaces oneTBB by threads that live for one loop. `one_loop`: the workers' mutex, for loops
+// started by several threads of the caller.
 void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n,
                      FunctionRef<void(std::size_t, std::size_t)> task) {
-  if (own_loop.workers == workers) {  // nested: on the thread that meets it
+  if (own_loop.workers == workers) {  // nested: runs on the thread that reaches it
     for (std::size_t i = 0; i < n; ++i) task(i, own_loop.worker);
     return;
   }
@@ -172,7 +173,7 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
     threads.reserve(count);
     for (std::size_t w = 1; w < count; ++w) threads.emplace_back(work, w);
   } catch (...) {
-    NoteRefusal();  // those that exist do the work
+    NoteRefusal();  // the existing threads do the work
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
@@ -250,9 +251,9 @@ void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> tas
     ForOnOwnThreads(this, &own_loop_, n, task);
     return;
   }
-  // Isolated: while a thread waits for a loop, a nested one above all, it may only take that loop's
-  // tasks, so a worker's scratch is never entered twice. Inside the arena, because to execute in an
-  // arena, be it the same one, ends the isolation of the caller.
+  // Isolated: while a thread waits for a loop, above all a nested one, it may only take that loop's
+  // tasks, so a worker's scratch is never entered twice. Inside the arena, because executing in an
+  // arena, even the same one, ends the caller's isolation.
   impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { ForInArena(n, task); }); });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A large file that threads write in parts.
+// A large file that several threads write in parts.
 #pragma once
 
 #include <cstddef>
@@ -11,20 +11,20 @@
 
 namespace tilegrad {
 
-// Appears whole under its name when it is finished, or not at all.
+// Appears complete under its name when finished, or not at all.
 class PartsFile {
  public:
-  // Under a temporary name beside `path`, with room for all of its bytes. kIo: the folder is not
-  // there, may not be written to, or the disk has too little room.
+  // Creates a temporary file beside `path`, with space reserved for all bytes. kIo: the folder does
+  // not exist or is not writable, or the disk has too little room.
   static Result<PartsFile> Create(const Path& path, std::size_t size);
   PartsFile(PartsFile&& other) noexcept
       : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)) {}
   PartsFile& operator=(PartsFile&&) = delete;
   ~PartsFile();
 
-  // Within the size. Thread-safe.
+  // Within the size of the file. Thread-safe.
   Status Write(std::size_t offset, std::span<const std::uint8_t> bytes) const;
-  // Once, after all writes. Flushes, and replaces what stood under the name.
+  // Call once, after all writes. Flushes, and replaces an existing file of that name.
   Status Finish();
 
  private:

@@ -8,7 +8,7 @@
 
 namespace tilegrad {
 
-inline constexpr std::size_t kLineFloats = 16;  // in a cache line
+inline constexpr std::size_t kLineFloats = 16;  // per cache line
 
 // Prefetches the cache line of `data`. The empty asm statement keeps it: GCC 12 treats a function
 // that only prefetches as one without effect and drops the call.
@@ -17,16 +17,16 @@ HWY_INLINE void PrefetchLine(const void* data) {
   asm volatile("");
 }
 
-// Prefetches `count` numbers of four bytes, a line at a time.
+// Prefetches `count` four-byte numbers, a line at a time.
 template <class T>
 HWY_INLINE void PrefetchNumbers(const T* data, std::size_t count) {
   static_assert(sizeof(T) == sizeof(float));
   for (std::size_t i = 0; i < count; i += kLineFloats) PrefetchLine(data + i);
 }
 
-// Prefetches a line for writing: other cores give it up now rather than at the write. As assembly:
-// without -mprfchw GCC would prefetch for reading. Every x86-64 executes the instruction or ignores
-// it.
+// Prefetches a line for writing: other cores give it up now rather than at the write. In assembly,
+// since without -mprfchw GCC would prefetch for reading. Every x86-64 executes the instruction or
+// ignores it.
 HWY_INLINE void PrefetchLineToWrite(float* data) {
 #if HWY_ARCH_X86_64 && HWY_COMPILER_GCC
   asm volatile("prefetchw %0" : : "m"(*data));
@@ -35,7 +35,7 @@ HWY_INLINE void PrefetchLineToWrite(float* data) {
 #endif
 }
 
-// Prefetches a line into L2 only: for data that is used some thousand cycles later.
+// Prefetches a line into L2 only: for data used some thousand cycles later.
 HWY_INLINE void PrefetchLineToL2(const void* data) {
   __builtin_prefetch(data, 0, 2);
   asm volatile("");

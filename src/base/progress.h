@@ -15,28 +15,27 @@ namespace tilegrad {
 struct Progress {
   std::string stage;        // "rendering", "training", ...
   std::uint64_t done = 0;   // units finished
-  std::uint64_t total = 0;  // units of this stage; 0 where unknown
-  std::string note;         // rates and losses worth showing, or empty
+  std::uint64_t total = 0;  // units of this stage; 0 if unknown
+  std::string note;         // rates and losses to show, or empty
 };
 
-// Called from one thread at a time, as often as the work likes; the receiver limits how often it
-// draws.
+// Called from one thread at a time, as often as the work likes; the receiver limits its redraws.
 using ProgressSink = std::function<void(const Progress&)>;
 
-// Told at once of problems that were worked around: the work may be stopped before it ends.
+// Receives problems that were worked around, at once, since the work may be stopped before it ends.
 using WarningSink = std::function<void(const std::string&)>;
 
-// Set from a signal handler or another thread; long work looks at it between units, saves, and
+// Set from a signal handler or another thread; long work checks it between units, saves, and
 // returns StatusCode::kCancelled.
 using StopFlag = std::atomic<bool>;
 
-// Both, for work that has many parts. Nobody watches one that is left out.
+// Both, for work in many parts. Either may be absent.
 struct Watch {
   ProgressSink progress = nullptr;
   const StopFlag* stop = nullptr;
 
   bool stopped() const { return stop != nullptr && *stop; }
-  // Tells; kCancelled, naming the stage, once the work is to end.
+  // Reports progress; returns kCancelled, naming the stage, if the work should stop.
   Status At(const Progress& now) const {
     if (stopped()) return Cancelled("stopped while {}", now.stage);
     if (progress) progress(now);

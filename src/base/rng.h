@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counter-based random numbers: the n-th number of a stream is a pure function of (seed, stream,
-// n), the same on every machine and for any thread count, and the whole state is three integers,
-// which is all a checkpoint has to hold.
+// n), the same on every machine and for any thread count, and the whole state a checkpoint must
+// hold is three integers.
 #pragma once
 
 #include <cmath>
@@ -32,8 +32,8 @@ class Rng {
   std::uint64_t Below(std::uint64_t n) {
     return static_cast<std::uint64_t>((static_cast<Uint128>(Next()) * n) >> 64);
   }
-  // Standard normal by Box-Muller; two uniforms a number, so that the position in the stream stays
-  // predictable.
+  // Standard normal by Box-Muller; two uniforms per number, so that the position in the stream
+  // stays predictable.
   double Normal() {
     const double u = 1.0 - Uniform();
     return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * Uniform());

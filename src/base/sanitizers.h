@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which sanitizer this is built under. GCC 12 defines macros; clang answers __has_feature.
+// The sanitizer of this build. GCC 12 defines macros; clang has __has_feature.
 #pragma once
 
 namespace tilegrad {
@@ -20,7 +20,7 @@ inline constexpr bool kThreadSanitizer = false;
 #endif
 #endif
 
-// Both reserve terabytes of addresses, which no limit of memory may count, and must be the first
+// Both reserve terabytes of address space, so no memory limit may count it, and must be the first
 // library that a process loads.
 inline constexpr bool kSanitizer = kAddressSanitizer || kThreadSanitizer;
 

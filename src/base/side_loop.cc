@@ -18,8 +18,8 @@
 namespace tilegrad {
 namespace {
 
-// Of the workers one in four: with more, the caller's loops would have few workers at the step's
-// begin and all of them later, for which they are too short.
+// One worker in four: with more, the caller's loops would have few workers at the start of the step
+// and all of them later, when they are too short to use them.
 constexpr int kWorkersToAHelper = 4;
 
 std::size_t HelpersOf(int workers) {
@@ -31,11 +31,11 @@ std::size_t HelpersOf(int workers) {
 struct SideLoop::State {
   using Lock = std::unique_lock<std::mutex>;
 
-  std::mutex mutex;  // of all below
+  std::mutex mutex;  // guards everything below
   std::condition_variable ended;
   Task task;
   std::size_t count = 0, next = 0, running = 0;  // tasks; next == count: all have begun
-  std::vector<std::size_t> lanes;                // of helpers, that none has
+  std::vector<std::size_t> lanes;                // free lanes of helpers
   std::exception_ptr error;                      // the first
 
   void RunNext(Lock& lock, std::size_t lane) {
@@ -94,7 +94,7 @@ struct SideLoop::Helpers {
   const Workers& workers;
   std::size_t count;
   std::optional<tbb::task_arena> arena;
-  std::thread own;  // for one loop, where oneTBB is not used
+  std::thread own;  // for one loop, if oneTBB is not used
 
  private:
   void StartThread(const std::shared_ptr<State>& state) {

@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// first, first + 1, ... by lanes. hn::Iota of a variable goes through memory, element by element,
+// first, first + 1, ... by lane. hn::Iota of a variable goes through memory, element by element,
 // and stalls on the load.
 template <class D>
 HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
@@ -39,7 +39,7 @@ template <class D, class V = hn::Vec<D>>
 HWY_INLINE Exp2NegPair<V> Exp2Neg(D d, V z) {
   const hn::RebindToSigned<D> di;
   const V most = hn::Min(z, hn::Set(d, 127.0f));
-  // Adding 1.5 2^23 rounds to an integer, whose bits are then the lowest ones.
+  // Adding 1.5 2^23 rounds to an integer, which then stands in the lowest bits.
   const V shifter = hn::Set(d, 0x1.8p23f), shifted = hn::Add(most, shifter);
   const V r = hn::Sub(hn::Sub(shifted, shifter), most);
   V q = hn::MulAdd(hn::Set(d, 0.000154531634f), r, hn::Set(d, 0.00133908633f));
@@ -48,7 +48,7 @@ HWY_INLINE Exp2NegPair<V> Exp2Neg(D d, V z) {
   q = hn::MulAdd(q, r, hn::Set(d, 0.240226507f));
   q = hn::MulAdd(q, r, hn::Set(d, 0.693147182f));
   const V p = hn::Mul(q, r);
-  // n = 127 makes the bits of 0.
+  // n = 127 gives the bits of 0.
   const auto n = hn::ShiftLeft<23>(hn::BitCast(di, shifted));
   const V two_n = hn::BitCast(d, hn::Sub(hn::Set(di, 127 << 23), n));
   return {hn::MulAdd(two_n, p, two_n), hn::NegMulAdd(two_n, p, hn::Sub(hn::Set(d, 1.0f), two_n))};

@@ -11,7 +11,7 @@
 namespace tilegrad {
 namespace {
 
-constexpr std::uint32_t kByte = 0xEF00;  // and the byte: a character that stands for it
+constexpr std::uint32_t kByte = 0xEF00;  // plus the byte: the character that encodes it
 
 bool StandsForByte(const Utf8Character& c) {
   return c.valid && c.code >= kByte + 0x80 && c.code <= kByte + 0xFF;
@@ -59,7 +59,7 @@ Utf8Character FirstCharacter(std::string_view text) {
   const std::uint8_t lead = byte(0);
   if (lead < 0x80) return {lead, 1, true};
   const std::size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter would do below
+  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // overlong below
   if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) return {lead};
   std::uint32_t code = lead & (0x7fu >> bytes);
   for (std::size_t i = 1; i < bytes; ++i) {
@@ -129,14 +129,14 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
 }  // namespace
 
 bool IsNear(std::string_view word, std::string_view name) {
-  constexpr std::size_t kBegun = 4;  // letters, "--" among them, that are enough to tell
+  constexpr std::size_t kBegun = 4;  // enough letters for a prefix, "--" included
   const std::size_t both = std::min(word.size(), name.size());
   if (both >= kBegun && word.substr(0, both) == name.substr(0, both)) return true;
   return EditDistance(word, name) <= (word.size() < kBegun ? 1 : 2);
 }
 
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& known) {
-  constexpr std::size_t kMost = 3;  // that are named
+  constexpr std::size_t kMost = 3;  // suggestions shown
   std::vector<std::pair<std::size_t, std::string>> found;
   for (const std::string& name : known) {
     if (IsNear(word, name)) found.emplace_back(EditDistance(word, name), name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Letters and characters of text.
+// Text: case, plurals, percent-encoding, UTF-8, escaping.
 #pragma once
 
 #include <concepts>
@@ -12,10 +12,10 @@
 
 namespace tilegrad {
 
-// ASCII's capital letters made small, as names of formats and endings are compared.
+// Lower-cases ASCII letters; for comparing formats and file name extensions.
 std::string LowerCase(std::string_view text);
 
-// "file", or "files" unless there is one; "class", "classes".
+// "file" if `one`, else "files"; "class", "classes".
 std::string Plural(std::string_view thing, bool one);
 // "1 file", "2 files".
 template <std::integral Number>
@@ -23,10 +23,10 @@ std::string Count(Number number, std::string_view thing) {
   return std::to_string(number) + " " + Plural(thing, number == 1);
 }
 
-// Names for files, each once: the second "chair" is "chair_2".
+// Makes names unique: the second "chair" becomes "chair_2".
 class UniqueNames {
  public:
-  // `name`, or if it is taken the first of name_2, name_3, ... that is not; taken from now on.
+  // `name`, or if taken the first free one of name_2, name_3, ...; taken from now on.
   std::string Take(const std::string& name) {
     std::string unique = name;
     for (int i = 2; !taken_.insert(unique).second; ++i) unique = name + "_" + std::to_string(i);
@@ -37,15 +37,15 @@ class UniqueNames {
   std::set<std::string> taken_;
 };
 
-// "my%20wood.png" -> "my wood.png" (RFC 3986). A "+" is no space; a "%" that two hexadecimal digits
-// do not follow stands for itself.
+// "my%20wood.png" -> "my wood.png" (RFC 3986). A "+" stays, and so does a "%" without two
+// hexadecimal digits after it.
 std::string DecodePercent(std::string_view uri);
 
-// Appends a character of Unicode as UTF-8; U+FFFD for what is none (surrogates, above U+10FFFF).
+// Appends a Unicode code point as UTF-8; U+FFFD for invalid ones (surrogates, above U+10FFFF).
 void AppendUtf8(std::uint32_t character, std::string* out);
 
-// The character at the beginning of a text that is not empty: how many bytes it has; 1, and `valid`
-// false, where they are not UTF-8.
+// Decodes the first character of a non-empty text: its length in bytes; 1, with `valid` false, if
+// the bytes are not UTF-8.
 struct Utf8Character {
   std::uint32_t code = 0;
   std::size_t bytes = 1;
@@ -55,38 +55,35 @@ Utf8Character FirstCharacter(std::string_view text);
 
 bool IsUtf8(std::string_view text);
 
-// Names of files are any bytes, JSON is UTF-8. A byte that is not, b, is written as the character
-// U+EF00 + b, which nothing else is used for (as MirBSD's OPTU does); what is one of these already,
-// byte by byte. NameFromJson(JsonName(x)) is x, whatever x is.
+// File names are arbitrary bytes, JSON is UTF-8. A byte b that is not UTF-8 becomes the private-use
+// character U+EF00 + b (as in MirBSD's OPTU); text that already holds such a character is escaped
+// byte by byte. NameFromJson(JsonName(x)) == x for every x.
 std::string JsonName(std::string_view name);
 std::string NameFromJson(std::string_view text);
 
-// What a person may have meant who has mistyped a name.
+// Suggestions for mistyped names.
 
-// Whether `word` is likely to mean `name`: a letter or two are otherwise, or one begins the other.
+// Whether `word` likely means `name`: a letter or two differ, or one is a prefix of the other.
 bool IsNear(std::string_view word, std::string_view name);
 
-// " (did you mean --out?)" with the names, the nearest first, that `word` is likely to mean; empty
-// if there is none.
+// " (did you mean --out?)" with the names that `word` likely means, nearest first; empty if none.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& known);
 
-// Text of strangers (names of files, models, classes) in what people look at.
+// Untrusted text (names of files, models, classes) in output for people.
 
-// For a terminal: characters that would move its cursor, colour or hide text become visible,
-// "\x1b", and so do bytes that are not UTF-8 and marks that turn the direction of writing. Line
-// breaks and tabs stay.
+// For a terminal: escapes characters that would move its cursor, colour or hide text ("\x1b"),
+// bytes that are not UTF-8, and marks that change the writing direction. Line breaks and tabs stay.
 std::string EscapeControls(std::string_view text);
 
-// For Markdown, within a line or a table's cell: shown as it is, never as HTML, links or emphasis.
-// Line breaks are written as "\n".
+// For Markdown, within a line or a table cell: shown literally, never as HTML, links or emphasis.
+// Line breaks become "\n".
 std::string EscapeMarkdown(std::string_view text);
 
-// A field of a CSV file (RFC 4180): in quotes where it needs them.
+// A field of a CSV file (RFC 4180), quoted where necessary.
 std::string EscapeCsv(std::string_view text);
 
-// Text for HTML or XML, between tags or in a quoted attribute. What EscapeControls
-// makes visible is visible there, too: a mark of writing direction would turn what stands beside
-// it.
+// Text for HTML or XML, between tags or in a quoted attribute. Also escapes what EscapeControls
+// escapes: a mark of writing direction would also reorder the text beside it.
 std::string EscapeHtml(std::string_view text);
 
 }  // namespace tilegrad

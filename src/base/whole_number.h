@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real numbers as whole ones. static_cast leaves undefined what becomes of NaN and of numbers that
-// the type cannot hold, and an index or a size of that kind is anywhere; here each has its value.
+// Converts floating-point numbers to integers, with saturation. static_cast is undefined for NaN
+// and for numbers that the type cannot hold, so such an index could point anywhere; this is defined
+// for all.
 #pragma once
 
 #include <concepts>
@@ -8,12 +9,12 @@
 
 namespace tilegrad {
 
-// `x` without its fraction, or the end of the type's range that it lies beyond; NaN becomes 0.
+// `x` truncated and clamped to the range of the type; NaN becomes 0.
 template <std::integral Whole, std::floating_point Real>
 constexpr Whole WholeNumber(Real x) {
   using Range = std::numeric_limits<Whole>;
   if (x != x) return 0;
-  // The upper end may not be a number of type Real, which then has the next power of two.
+  // Real may not represent the maximum, which then rounds up to the next power of two.
   if (x >= static_cast<Real>(Range::max())) return Range::max();
   if (x <= static_cast<Real>(Range::min())) return Range::min();
   return static_cast<Whole>(x);

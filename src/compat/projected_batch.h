@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch of images whose faces come already projected, and what their checks have in common. For
-// callers who project for themselves, as DIB-R's other implementations have it; whoever has
-// vertices and cameras uses Renderer, which clips, covers exactly and interpolates with
-// perspective.
+// A batch of images with faces that are already projected, and its validation. For callers that do
+// their own projection, as in DIB-R's other implementations; with vertices and cameras use
+// Renderer, which clips, decides coverage exactly and interpolates perspective-correctly.
 #pragma once
 
 #include <array>
@@ -17,29 +16,30 @@
 
 namespace tilegrad::compat {
 
-// Faces that come already projected, and the weights that interpolate over them: the rule of
-// DIB-R's implementations, which differs from conventions.h. Coordinates are NDC, x
-// right, y up; nothing is snapped, a pixel centre on an edge is inside, depth and features are
-// linear on the screen, and weights have a small eps in their denominator:
+// Already projected faces, and their interpolation weights: the rule of DIB-R's implementations,
+// which differs from conventions.h. Coordinates are NDC, x right, y up; nothing is snapped, a pixel
+// centre on an edge is inside, depth and features are linear on the screen, and weights have a
+// small eps in their denominator:
 //
 //     W_0 = (b - p) x (c - p),  W_1 = (c - p) x (a - p),  W_2 = (a - p) x (b - p),  S = sum W_k,
 //     w_k = W_k / (S + sign(S) eps)
 //
-// W_k of an edge changes its sign exactly when the edge is turned around, so faces that share an
-// edge leave no crack between them.
+// Reversing an edge negates its W_k exactly, so faces that share an edge leave no crack between
+// them.
 
 template <class T>
 struct ProjectedFacesT {
   std::span<const T> xy;                // [F,3,2] NDC
-  std::span<const T> z;                 // [F,3] camera z: the larger is nearer
-  std::span<const std::uint8_t> valid;  // [F] 0 covers nothing; empty: all are valid
+  std::span<const T> z;                 // [F,3] camera z: larger is nearer
+  std::span<const std::uint8_t> valid;  // [F] 0: covers nothing; empty: all are valid
 
   std::size_t count() const { return xy.size() / 6; }
   bool is_valid(std::size_t face) const { return valid.empty() || valid[face] != 0; }
   const T* corners(std::size_t face) const { return xy.data() + 6 * face; }
 };
 
-// Twice the signed areas that p makes with the edges opposite to corners 0, 1, 2 of [3,2] corners.
+// Twice the signed areas of the triangles from p to the edges opposite corners 0, 1, 2 of [3,2]
+// corners.
 template <class T>
 std::array<T, 3> CornerAreas(const T* v, const T& px, const T& py) {
   const T ax = v[0] - px, ay = v[1] - py, bx = v[2] - px, by = v[3] - py;
@@ -53,7 +53,7 @@ T WeightDenominator(const T& area, const T& eps) {
   return std::signbit(RealPart(area)) ? area - eps : area + eps;
 }
 
-// w_k at p; all 0 where the face has no area.
+// w_k at p; all 0 if the face has no area.
 template <class T>
 std::array<T, 3> ScreenWeights(const T* corners, const T& px, const T& py, const T& eps) {
   std::array<T, 3> w = CornerAreas(corners, px, py);
@@ -68,8 +68,8 @@ template <class T>
 struct ProjectedBatchT {
   std::size_t images = 0, faces = 0;
   std::span<const T> xy;                // [N,F,3,2] corners, NDC: x right, y up
-  std::span<const T> z;                 // [N,F,3] camera z, the larger is nearer
-  std::span<const std::uint8_t> valid;  // [N,F] 0 covers nothing; empty: all are valid
+  std::span<const T> z;                 // [N,F,3] camera z: larger is nearer
+  std::span<const std::uint8_t> valid;  // [N,F] 0: covers nothing; empty: all are valid
 
   ProjectedFacesT<T> image(std::size_t n) const {
     return {xy.subspan(6 * n * faces, 6 * faces),
@@ -82,8 +82,8 @@ inline std::size_t PixelCount(const ImageSize& size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
 
-// Sizes of the batch, that xy is finite, the image's size, and that face_ids [N,H,W] (where it is
-// not empty) are in [-1, F).
+// Checks sizes of the batch, that xy is finite, the image's size, and that face_ids [N,H,W] (unless
+// empty) are in [-1, F).
 template <class T>
 Status ValidateProjected(const ProjectedBatchT<T>& batch, const ImageSize& size,
                          std::span<const std::int32_t> face_ids);

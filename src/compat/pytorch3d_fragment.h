@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // One face at one pixel, which PyTorch3D calls a fragment, and its adjoint: barycentrics, depth,
-// and the signed squared distance to the face's boundary, as PyTorch3D's rasterizer has them.
-// Coordinates are its NDC, x to the left, y up, with z the depth in the camera, > 0 in front.
+// and the signed squared distance to the face's boundary, as in PyTorch3D's rasterizer. Coordinates
+// are its NDC, x left, y up, with z the camera depth, > 0 in front.
 //
-//     A_k = -W_k (projected_batch.h), A = sum A_k     positive where the face's front is seen
+//     A_k = -W_k (projected_batch.h), A = sum A_k     positive for front faces
 //     b_k = A_k / (A + eps)                           linear on the screen
 //     w_k = b_k z_l z_m / max(sum_j ..., eps)         if perspective_correct
 //     c_k = max(w_k, 0) / max(sum_j max(w_j, 0), 1e-5)         if clip_barycentrics
@@ -21,7 +21,7 @@
 
 namespace tilegrad::compat::pytorch3d {
 
-inline constexpr double kFragmentEps = 1e-8;  // areas, depths, lengths squared; as PyTorch3D
+inline constexpr double kFragmentEps = 1e-8;  // for areas, depths, squared lengths; as in PyTorch3D
 inline constexpr double kLeastClippedSum = 1e-5;
 
 struct FragmentRule {
@@ -36,11 +36,11 @@ struct LayeredFragment {
   bool inside;
 };
 
-// What lies between the corners and the barycentrics.
+// Intermediate values between the corners and the barycentrics.
 template <class T>
 struct FragmentWeights {
   std::array<T, 3> b, w, c;
-  T area, sum, clipped_sum;  // A + eps, and the two denominators before they are kept up
+  T area, sum, clipped_sum;  // A + eps, and the two denominators before they are clamped
 };
 
 template <class T>
@@ -150,7 +150,7 @@ void BarycentricsBackward(const T* v, const T& px, const T& py, const FragmentWe
   }
 }
 
-// Adds the adjoint of one fragment to d_v [3,3]. The nearest boundary point is held fixed.
+// Adds the adjoint of one fragment to d_v [3,3]. Holds the nearest boundary point fixed.
 template <class T>
 void FragmentBackward(const T* v, const T& px, const T& py, const FragmentRule& rule,
                       const std::array<T, 3>& d_bary, const T& d_z, const T& d_dist, T* d_v) {

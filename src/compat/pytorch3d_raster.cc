@@ -58,7 +58,7 @@ struct Lists {
     face.resize(pixels * k);
     count.assign(pixels, 0);
   }
-  // Faces come in the order of their indices, so a later one goes behind its equals.
+  // Faces come in index order, so a later one goes after its equals.
   void Insert(std::size_t pixel, std::int64_t id, const T& depth) {
     T* const begin = z.data() + pixel * layers;
     auto at = static_cast<std::size_t>(count[pixel]);
@@ -105,7 +105,8 @@ void DrawFace(const T* v, std::int64_t id, const Centres<T>& centres, const Laye
   for (std::size_t i = begin; i < end; ++i) {
     for (std::size_t j = columns.begin; j < columns.end; ++j) {
       const auto at = FragmentOf(v, centres.x[j], centres.y[i], options.rule);
-      // Weights of a pixel outside of its face may overflow where perspective turns them around.
+      // Weights of a pixel outside of its face may overflow where the perspective divide flips
+      // signs.
       if (!(at.z >= 0 && std::isfinite(at.z))) continue;
       if (!at.inside && !(at.dist < T(options.blur_radius))) continue;
       lists->Insert((i - band.row) * centres.width + j, id, at.z);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The K nearest faces of every pixel, within a blur radius, as PyTorch3D's rasterizer has them
-// (compat/pytorch3d_fragment.h), and the way back. For conversions: Renderer needs no such
-// lists. The same bits for any number of workers.
+// The K nearest faces of every pixel, within a blur radius, as in PyTorch3D's rasterizer
+// (compat/pytorch3d_fragment.h), and the adjoint. For porting code: Renderer needs no such lists.
+// The same bits for any number of workers.
 //
-// A face is listed for a pixel if it has an area (> 1e-8), all its depths are >= 1e-8, and the
-// pixel is inside, or nearer to its boundary than the root of blur_radius. Lists are by depth, near
-// faces first; of equal depths the face with the lower index.
+// A pixel lists a face if its area exceeds 1e-8, all its depths are >= 1e-8, and the pixel is
+// inside, or nearer to its boundary than the root of blur_radius. Lists are sorted by depth,
+// nearest first, then by index.
 #pragma once
 
 #include <cstdint>
@@ -26,13 +26,13 @@ struct LayeredOptions {
   FragmentRule rule;
 };
 
-// Faces [first, first + count) of those packed make up one image.
+// Packed faces [first, first + count) make up one image.
 struct FaceRange {
   std::int64_t first, count;
 };
 
-// [N,H,W,K], and [N,H,W,K,3] for barycentrics; all -1 behind the last face of a pixel. Row 0 is on
-// top, and x falls along a row.
+// [N,H,W,K], and [N,H,W,K,3] for barycentrics; all -1 after the last face of a pixel. Row 0 is on
+// top, and x decreases along a row.
 template <class T>
 struct LayeredImages {
   std::span<std::int64_t> pix_to_face;  // index of the packed face
@@ -40,14 +40,14 @@ struct LayeredImages {
 };
 
 // face_vertices [F,3,3]: x, y, depth; of all images, packed. Errors name the array, the index and
-// what was expected.
+// the expected value.
 template <class T>
 Status RasterizeLayers(std::span<const T> face_vertices, std::span<const FaceRange> images,
                        const LayeredOptions& options, const Workers& workers,
                        const LayeredImages<T>& out);
 
-// dL/d(images) in, shaped as they are; an empty span is zero. d_face_vertices [F,3,3] is
-// overwritten. Which faces are listed is held fixed.
+// dL/d(images), in the same shapes; empty spans mean zero. Overwrites d_face_vertices [F,3,3]. The
+// lists of faces are held fixed.
 template <class T>
 struct LayeredAdjoint {
   std::span<const std::int64_t> pix_to_face;

@@ -47,7 +47,7 @@ class Ac3dText {
     return DataLoss("{}: line {}: {}", place_, lines_.Number(), what);
   }
 
-  // Takes `count` finite numbers off `rest`; `what` they are stands in the error.
+  // Takes `count` finite numbers off `rest`; errors call them `what`.
   template <class T>
   Status Numbers(std::string_view& rest, T* values, int count, const char* what) const {
     for (int i = 0; i < count; ++i) {
@@ -57,8 +57,8 @@ class Ac3dText {
     return {};
   }
 
-  // What follows MATERIAL on its line, or, in version 12 of the format, MAT: one line a property,
-  // up to ENDMAT.
+  // Reads what follows MATERIAL on its line, or, in version 12 of the format, MAT: one property per
+  // line, up to ENDMAT.
   Result<Material> ReadMaterial(std::string_view rest, bool block) {
     Material material{.name = std::string(NextAc3dString(rest)), .base_color = glm::vec4(1)};
     while (block) {
@@ -69,7 +69,7 @@ class Ac3dText {
     TILEGRAD_TRY(MaterialValues(rest, material));
     return material;
   }
-  // Whether any of these shines by itself.
+  // Whether any of these is emissive.
   bool emits() const { return emits_; }
 
  private:
@@ -95,7 +95,7 @@ class Ac3dText {
   bool emits_ = false;
 };
 
-// What an object hands to its children.
+// Properties that children inherit from an object.
 struct Inherited {
   glm::dmat4 transform = glm::dmat4(1);
   std::string texture;
@@ -250,7 +250,7 @@ class Ac3dReader {
     return {};
   }
 
-  // "INDEX U V" a line.
+  // One "INDEX U V" per line.
   Status ReadCorners(const Object& object, std::size_t count) {
     polygon_.corners.clear();
     uvs_.clear();
@@ -269,8 +269,8 @@ class Ac3dReader {
     return {};
   }
 
-  // Every other triangle is turned, so that all keep the first one's side. What repeats a corner
-  // only joins strips.
+  // Flips every other triangle, so that all keep the first one's side. Triangles that repeat a
+  // corner only join strips.
   void AddStrip() {
     const std::vector<std::int32_t>& v = polygon_.corners;
     polygon_.triangles.clear();
@@ -283,7 +283,7 @@ class Ac3dReader {
     }
   }
 
-  // Material and uv of the triangles that a surface has added.
+  // Material and uv of the triangles added by a surface.
   void FinishTriangles(int palette, const Object& object) {
     if (polygon_.triangles.empty()) return;
     const std::int32_t material = MaterialOf(palette, object.inherited.texture);
@@ -321,7 +321,7 @@ class Ac3dReader {
     return {};
   }
 
-  // People delete objects by hand, and leave the number of their group as it was.
+  // When people delete objects by hand, the count in their group stays as it was.
   Status NoteMissing(std::size_t child, std::size_t count) {
     if (!std::exchange(missing_warned_, true)) {
       out.warnings.push_back(

@@ -72,7 +72,7 @@ struct ZipCloser {
 };
 using ZipHandle = std::unique_ptr<zip_t, ZipCloser>;
 
-// Refuses what libzip would wait for (a pipe without a writer) or call a damaged archive.
+// Refuses files for which libzip would block (a pipe without a writer) or report a damaged archive.
 Status CheckRegularFile(const Path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0 && errno == ENOENT) return {};
@@ -93,7 +93,7 @@ Result<ZipHandle> OpenZipHandle(const Path& path) {
   if (zip) return zip;
   const int system = code == ZIP_ER_MEMORY ? ENOMEM : errno;
   if (code == ZIP_ER_NOENT) return NotFound("{}: no such file", path.string());
-  if (code == ZIP_ER_MEMORY || code == ZIP_ER_OPEN || code == ZIP_ER_READ) {  // not the archive's
+  if (code == ZIP_ER_MEMORY || code == ZIP_ER_OPEN || code == ZIP_ER_READ) {  // not its fault
     NoteShortage(system);
     return IoError("{}: cannot be read: {}", path.string(), std::strerror(system));
   }
@@ -192,8 +192,8 @@ Status AddEntry(zip_t* zip, const std::string& name, const Bytes& bytes) {
     zip_source_free(source);
     return InternalError("zip: {}: {}", name, zip_strerror(zip));
   }
-  // A fixed date, so that the same content gives the same file; level 1: renders are flat, more
-  // gains little.
+  // A fixed date, so that the same content gives the same file; level 1: renders are flat, higher
+  // levels gain little.
   if (zip_file_set_dostime(zip, static_cast<zip_uint64_t>(index), 0, (1 << 5) | 1, 0) != 0 ||
       zip_set_file_compression(zip, static_cast<zip_uint64_t>(index), ZIP_CM_DEFLATE, 1) != 0) {
     return InternalError("zip: {}: {}", name, zip_strerror(zip));

@@ -49,7 +49,7 @@ class AssimpStream : public Assimp::IOStream {
   std::size_t at_ = 0;
 };
 
-// The file itself from memory, others from the parent; nothing is ever written.
+// Serves the file itself from memory, others from the parent; never writes.
 class ParentFiles : public Assimp::IOSystem {
  public:
   ParentFiles(const std::string& name, const Bytes& file, AskParent ask)
@@ -105,8 +105,8 @@ class CommaList {
   std::string text;
 };
 
-// What a material says about its image that is not read: uv are those of the first set, as they
-// are, and repeat.
+// What a material says about its image that we ignore: we use the first uv set, untransformed, with
+// repeat.
 std::string NotReadOfImage(const aiMaterial& from, aiTextureType type) {
   const auto value = [&](const char* key, auto fallback) {
     from.Get(key, type, 0, fallback);
@@ -133,7 +133,7 @@ aiTextureType TypeOfImage(const aiMaterial& from) {
                                                          : aiTextureType_BASE_COLOR;
 }
 
-// What else of a material would be seen.
+// Other visible properties of a material that are dropped.
 std::string LeftOutOf(const aiMaterial& from) {
   CommaList list;
   list.Add(from.GetTextureCount(TypeOfImage(from)) > 1, "layers of its image but the first");
@@ -193,7 +193,7 @@ void WarnOfPart(const aiMesh& mesh, std::vector<std::string>* warnings) {
   warn((mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0, "points or lines left out");
 }
 
-// Of the materials that parts have.
+// For the materials that parts use.
 void WarnOfMaterials(const aiScene& from, std::vector<std::string>* warnings) {
   std::set<unsigned> used;
   for (unsigned i = 0; i < from.mNumMeshes; ++i) used.insert(from.mMeshes[i]->mMaterialIndex);
@@ -228,7 +228,7 @@ void DropEmptyFaces(aiMesh& part) {
   part.mNumFaces = static_cast<unsigned>(end - part.mFaces);
 }
 
-// Sets the primitive types that a part really holds. Some importers claim polygons where there are
+// Sets the primitive types that a part really has. Some importers claim polygons where there are
 // only lines, on which triangulation aborts the program.
 void CorrectFaces(const aiScene& scene) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes by Assimp, which runs in a process of its own; its result becomes a mesh here.
+// Meshes read by Assimp, which runs in a child process; converts its result to a mesh.
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -20,7 +20,7 @@
 namespace tilegrad::io {
 namespace {
 
-// What stands in quotes behind `name`, which begins with a space and ends with "=".
+// The quoted value after `name`, which begins with a space and ends with "=".
 std::string_view ValueOf(std::string_view tag, std::string_view name) {
   const std::size_t found = tag.find(name);
   if (found == std::string_view::npos) return {};
@@ -28,14 +28,14 @@ std::string_view ValueOf(std::string_view tag, std::string_view name) {
   return rest.substr(0, rest.find_first_of("\"'"));
 }
 
-// Whether triangles of one object of a 3MF model are painted differently, or colour groups are
-// used: Assimp 5.2 gives an object the material of its last triangle, and does not read the groups.
+// Whether triangles of one object of a 3MF model have different materials, or colour groups are
+// used: Assimp 5.2 gives an object the material of its last triangle, and ignores the groups.
 bool HasPaintedTriangles(std::string_view model_xml) {
-  // Of the base materials' extension, and as slicers have it.
+  // Attributes of the base-material extension, and those of slicers.
   constexpr std::array<std::string_view, 6> kPaint = {
       " pid=", " p1=", " p2=", " p3=", ":mmu_segmentation=", " paint_color="};
   using Paint = std::array<std::string_view, kPaint.size()>;
-  std::optional<Paint> first;  // of this object
+  std::optional<Paint> first;  // in this object
   for (std::size_t at = model_xml.find('<'); at != std::string_view::npos;
        at = model_xml.find('<', at + 1)) {
     const std::string_view tag = model_xml.substr(at, model_xml.find('>', at) - at);
@@ -136,8 +136,7 @@ class Assembly {
       out_.warnings.push_back(
           fmt::format("material \"{}\": not read of its image: {}", from.name, from.not_read));
     }
-    // With a texture, the diffuse colour is often left black or grey by exporters; the image alone
-    // is what people meant.
+    // With a texture, exporters often leave the diffuse colour black or grey; use the image alone.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};
     return material;
   }
@@ -150,8 +149,8 @@ class Assembly {
     return *image;
   }
 
-  // Skins of MD2 are often named without an ending, behind a point where they lie beside the mesh,
-  // or with that of a format which was replaced since.
+  // Skins of MD2 often have no extension, start with a dot for "beside the mesh", or have the
+  // extension of a format that was replaced since.
   std::string ImageName(const std::string& written) const {
     if (MeshEnding(name_) != ".md2" || FindBeside(source_, name_, written)) return written;
     const std::string stem = Path(written.substr(written.starts_with('.') ? 1 : 0)).stem().string();
@@ -172,8 +171,8 @@ class Assembly {
   const FileSource& source_;
   const std::string& name_;
   LoadedMesh out_;
-  std::vector<std::optional<int>> images_;          // texture of each image that is used
-  std::vector<std::optional<Material>> materials_;  // those that are used
+  std::vector<std::optional<int>> images_;          // texture of each used image
+  std::vector<std::optional<Material>> materials_;  // used ones
 };
 
 std::optional<Bytes> Answer(const FileSource& source, std::string_view question) {
@@ -183,7 +182,7 @@ std::optional<Bytes> Answer(const FileSource& source, std::string_view question)
   return content.ok() ? std::optional(std::move(content).value()) : std::nullopt;
 }
 
-// Far above what sound files take: the most seen were 0.1 s and 15 MB a MiB, of FBX as text.
+// Far above what sound files take: at most 0.1 s and 15 MB per MiB were seen, for text FBX.
 GuardLimits LimitsFor(std::size_t bytes) {
   GuardLimits limits;
   const auto mebibytes = static_cast<int>(bytes >> 20);
@@ -194,7 +193,7 @@ GuardLimits LimitsFor(std::size_t bytes) {
 }
 
 Status Explain(const Status& failure, const std::string& place, const std::string& name) {
-  // What was refused by the system or stopped says nothing of the file.
+  // A refusal by the system or a stop says nothing about the file.
   if (failure.code() == StatusCode::kIo || failure.code() == StatusCode::kCancelled) {
     return failure.Within(fmt::format("{}: the {} reader", place, MeshEnding(name)));
   }
@@ -204,10 +203,11 @@ Status Explain(const Status& failure, const std::string& place, const std::strin
                             place, MeshEnding(name), failure.message()));
 }
 
-// Bit 15 of a facet's attribute says that the facet has a colour of its own; of Magics, which
-// writes COLOR= into the header, that it has the header's. Assimp 5.2 reads the one as the other,
-// so Magics' bits are inverted; not where all attributes are 0, which programs without colours
-// leave there. Facets without a colour beside others become white: Assimp makes them grey glass.
+// Bit 15 of a facet's attribute means that the facet has its own colour; in files of Magics, which
+// writes COLOR= into the header, that it has the header's. Assimp 5.2 reads one as the other, so
+// this inverts the bits of Magics, unless all attributes are 0, as programs without colours write
+// them. Facets without a colour beside coloured ones become white: Assimp would make them grey
+// glass.
 void MendStlColors(Bytes& stl) {
   constexpr std::size_t kHeader = 80, kFirstFacet = 84, kFacet = 50, kAttribute = 48;
   constexpr std::uint8_t kMark = 0x80;  // in the second byte
@@ -238,7 +238,7 @@ void WarnOfPaint(const Bytes& threemf, const std::string& place,
 
 constexpr std::string_view kName = "WrapMode";  // and U or V
 
-// Behind the name in a text: `", "enum", "", "",1` to the end of the line.
+// After the name in a text file: `", "enum", "", "",1` to the end of the line.
 int TextValue(std::string_view rest) {
   rest = rest.substr(0, rest.find_first_of("\r\n"));
   const std::size_t comma = rest.rfind(',');
@@ -249,7 +249,7 @@ int TextValue(std::string_view rest) {
   return value;
 }
 
-// Behind the name in a binary: three texts, S with 32 bits of length, then I and the value.
+// After the name in a binary file: three texts, S with 32 bits of length, then I and the value.
 int BinaryValue(std::string_view rest) {
   const auto number = [&]() {
     std::uint32_t value = 0;
@@ -298,7 +298,7 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(Bytes file, source.Read(name));
-  // Assimp 5.2 takes frames that end with the file for frames beyond it.
+  // Assimp 5.2 takes frames that end at the end of the file for frames beyond it.
   if (MeshEnding(name) == ".md2") file.push_back(0);
   if (MeshEnding(name) == ".stl") MendStlColors(file);
   return ReadByAssimp(source, name, file, LimitsFor(file.size()));

@@ -18,7 +18,7 @@ std::size_t Cubed(int side) {
   return n * n * n;
 }
 
-// Where voxel number `i` of a file is in BinvoxGrid::voxels.
+// Index in BinvoxGrid::voxels of voxel number `i` of a file.
 std::size_t PlaceOfVoxel(std::size_t i, std::size_t side) {
   const std::size_t x = i / (side * side), z = i / side % side, y = i % side;
   return (x * side + y) * side + z;
@@ -31,7 +31,7 @@ bool IsFiniteCube(const BinvoxGrid& grid) {
   return std::isfinite(grid.scale) && grid.scale > 0;
 }
 
-// One line of the header; false where it makes no sense.
+// One line of the header; false if it is invalid.
 bool ReadBinvoxLine(std::string_view line, BinvoxGrid* grid) {
   std::istringstream words{std::string(line)};
   std::string key;

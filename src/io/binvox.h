@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Voxels of a cube as the program binvox writes them (P. Min, https://www.patrickmin.com/binvox).
+// Voxel grids of the program binvox (P. Min, https://www.patrickmin.com/binvox).
 #pragma once
 
 #include <array>
@@ -22,9 +22,9 @@ struct BinvoxGrid {
   std::vector<std::uint8_t> voxels;   // [x][y][z] of 0 or 1
 };
 
-// The file has y fastest, then z, then x, in runs of a value and a count. Refuses what is no cube,
-// too large, another number of voxels than the header promises, and values other than 0 and 1;
-// memory is taken only for as many voxels as the runs can hold. `name` stands in messages.
+// The file stores y fastest, then z, then x, run-length encoded as value and count. Refuses grids
+// that are no cube or too large, voxel counts that differ from the header, and values other than 0
+// and 1; allocates only for as many voxels as the runs can hold. Messages call the file `name`.
 Result<BinvoxGrid> DecodeBinvox(std::span<const std::uint8_t> bytes, const std::string& name);
 Result<BinvoxGrid> LoadBinvox(const Path& path);
 Bytes EncodeBinvox(const BinvoxGrid& grid);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of cameras: COLMAP's models (a folder with cameras and images, .txt or .bin), NeRF's
-// transforms.json, and OpenCV's numbers in a JSON file:
+// Camera files: COLMAP models (a folder with cameras and images, .txt or .bin), NeRF's
+// transforms.json, and OpenCV parameters in a JSON file:
 //
 //   {"width": 640, "height": 480,
 //    "K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]],
@@ -9,9 +9,9 @@
 //               {"name": "0002", "R": [[...]], "t": [...]},
 //               {"name": "0003", "rvec": [...], "tvec": [...], "K": ..., "width": ...}]}
 //
-// What a frame omits is taken from the top level; a file without "frames" is one camera. Lens
-// distortion is an error that explains how to remove it: the renderer's rays are straight. Cameras
-// that no image uses may be of any kind.
+// Frames inherit what they omit from the top level; a file without "frames" is one camera. Lens
+// distortion is an error that explains how to undistort, since the renderer has none. Cameras
+// without images may be of any kind.
 #pragma once
 
 #include <optional>
@@ -26,71 +26,72 @@
 namespace tilegrad::io {
 
 struct CameraView {
-  std::string name;  // as the file says, or its number
+  std::string name;  // from the file, or its number
   Camera64 camera;
   ImageSize size;            // of the image
-  LensDistortion lens = {};  // straight unless the options ask for others
+  LensDistortion lens = {};  // kStraight unless the options ask for distortion
 };
 
-// An error, unless it is straight, that says what to do.
+// An error that says what to do if the lens has distortion.
 Status CheckStraight(const LensDistortion& lens);
 
 struct CameraFileOptions {
-  ImageSize size = {};  // where the file does not say; 0 x 0: then it must
+  ImageSize size = {};  // if the file has none; 0 x 0: it must have one
   PixelCentre opencv_centre = PixelCentre::kInteger;  // of K in OpenCV's JSON
-  bool bent = false;           // lenses of COLMAP that bend rays are given back, not refused
-  WarningSink warn = nullptr;  // of COLMAP's models that are not read
+  bool bent = false;           // return COLMAP's lens distortion instead of refusing it
+  WarningSink warn = nullptr;  // receives COLMAP models that were not read
 };
 
-// By what is there: a folder is COLMAP's, a JSON file with K is OpenCV's, else NeRF's. Errors name
-// the file and the line or frame. At least one camera.
+// Chooses the format by content: a folder is COLMAP's, a JSON file with K is OpenCV's, else NeRF's.
+// Errors name the file and the line or frame. At least one camera.
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options);
 
 struct ColmapModel {
   Path folder;
-  std::string note;  // which others were passed over, for people; or empty
+  std::string note;  // a message about other models that were ignored; or empty
 };
-// The COLMAP model in `folder`, which is the model's own or its project's (sparse/0,
-// colmap/sparse/0, ...), or nothing. Of several in sparse/ the one with the most images.
+// Finds the COLMAP model in `folder`, itself a model or a project with models (sparse/0,
+// colmap/sparse/0, ...); nullopt if there is none. Of several in sparse/ takes the one with the
+// most images.
 std::optional<ColmapModel> FindColmapModel(const Path& folder);
 
-// Of what FindColmapModel finds; sizes and pixel centres need no options.
+// Loads the model that FindColmapModel finds; sizes and pixel centres need no options.
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
                                                   const CameraFileOptions& options = {});
 
-// Writers for what LoadCameras reads; numbers come back as they were.
+// Writers for what LoadCameras reads; numbers round-trip exactly.
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text
-std::vector<Path> ColmapFiles(const Path& folder);  // that SaveColmapCameras writes
+std::vector<Path> ColmapFiles(const Path& folder);  // written by SaveColmapCameras
 Status SaveNerfCameras(const Path& file, std::span<const CameraView> views);
 Status SaveOpenCvCameras(const Path& file, std::span<const CameraView> views);
 
-// transforms.json of NeRF programs: the one reader of that format.
+// The only reader of NeRF's transforms.json.
 //
 //   {"camera_angle_x": 0.7,                            or fl_x, fl_y, cx, cy, w, h; and a lens
 //    "frames": [{"file_path": "images/000.png", "mask_path": "masks/000.png",
 //                "transform_matrix": [[4 numbers] x 4]}, ...]}
 //
-// Angles in radians, lengths in pixels of an image of w x h. What a frame says itself goes before
-// what the file says for all; a frame that has a focal length of its own, in pixels or as an angle,
-// takes none from there. null is as good as nothing, 0 is a number.
+// Angles in radians, lengths in pixels of an image of w x h. Values of a frame override those of
+// the file; a frame with its own focal length, in pixels or as an angle, inherits none. null counts
+// as absent, 0 is a value.
 
 struct NerfFrame {
   std::string place;                       // "transforms.json: frame 3", for messages
-  std::optional<std::string> image, mask;  // file_path, mask_path, as they are written
+  std::optional<std::string> image, mask;  // file_path, mask_path, as in the file
   Mat4Array camera_to_world = {};
   std::optional<double> fl_x, fl_y, cx, cy;  // pixels
-  std::optional<double> angle_x, angle_y;    // radians, the whole field of view
-  std::optional<ImageSize> size;             // of the image that these are meant for
+  std::optional<double> angle_x, angle_y;    // radians, the full field of view
+  std::optional<ImageSize> size;             // of the image that these refer to
   LensDistortion lens;                       // k1, k2, k3, p1, p2, camera_model, is_fisheye, ...
 };
 
 // Errors name the file, the frame and the key. At least one frame.
 Result<std::vector<NerfFrame>> ReadNerfFrames(const Path& file);
 
-// The camera of an image of this many pixels, which the frame's numbers are meant for.
+// The camera for an image of `size` pixels, to which the frame's values refer.
 Result<Camera64> CameraOf(const NerfFrame& frame, ImageSize size);
 
-// Windows programs write "images\\0001.png": with slashes, as every system reads it.
+// Replaces the backslashes of Windows paths ("images\\0001.png") by slashes.
 std::string PortablePath(std::string path);
 
 }  // namespace tilegrad::io

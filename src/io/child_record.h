@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: what a child process (guarded_process.h) hands over as bytes: a record of
-// numbers, texts, lists and other records, or why there is none.
+// Internal to io: serialises what a child process (guarded_process.h) returns: a record of numbers,
+// texts, lists and other records, or an error.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace tilegrad::io {
 
-// Pointers to the members of a record in their order, for both directions: a specialisation each.
+// Pointers to the members of a record in order, for reading and writing; specialised per record.
 template <class Record>
 inline constexpr auto kFieldsOf = nullptr;
 
@@ -33,7 +33,7 @@ struct IsList<std::vector<E>> : std::true_type {};
 template <>
 struct IsList<std::string> : std::true_type {};
 
-// Counts bytes if it has nowhere to put them, so that what is written is allocated once.
+// Without a buffer only counts bytes, so that the output is allocated once.
 class Writer {
  public:
   explicit Writer(std::uint8_t* to) : to_(to) {}
@@ -95,7 +95,7 @@ class Reader {
       if (!good_) return;
       list.resize(count);
       Raw(list.data(), count * sizeof(typename T::value_type));
-    } else {  // grows as its elements are read, each of which takes bytes
+    } else {  // grows per element read, since each takes bytes
       for (; good_ && count > 0; --count) Read(list.emplace_back());
     }
   }
@@ -113,7 +113,7 @@ class Reader {
 
 }  // namespace child_record
 
-// As bytes of one version of this program.
+// Format of this version of the program only.
 template <class Record>
 Bytes EncodeRecord(const Result<Record>& record) {
   const Status status = record.status();
@@ -130,8 +130,8 @@ Bytes EncodeRecord(const Result<Record>& record) {
   return out;
 }
 
-// Of untrusted bytes: every count is checked against what is left before anything is allocated.
-// Errors: that of the encoded Result, or kDataLoss. What the numbers mean is the caller's to check.
+// Decodes untrusted bytes: checks every count against the bytes left before allocating. Errors:
+// that of the encoded Result, or kDataLoss. The caller must check what the numbers mean.
 template <class Record>
 Result<Record> DecodeRecord(std::span<const std::uint8_t> bytes) {
   const Status broken = DataLoss("the importer returned incomplete data");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// COLMAP's sparse models: cameras.txt and images.txt, or the same as .bin (little-endian); where a
-// project has its models; the text, written.
+// COLMAP's sparse models: reads cameras.txt and images.txt, or the same as .bin (little-endian);
+// finds a project's models; writes text.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -48,7 +48,7 @@ struct Intrinsics {
   ImageSize size;
   LensDistortion lens;
 };
-// Why one is not to be had matters only if an image uses it.
+// Errors of a camera matter only if an image uses it.
 using Cameras = std::map<std::uint32_t, Result<Intrinsics>>;
 
 struct RawCamera {
@@ -164,8 +164,8 @@ Status ReadImageLine(std::string_view line, const std::string& place, const Came
   return AddView(place, cameras, camera_id, c, std::string(line), views);
 }
 
-// The points that an image sees, X Y POINT3D_ID each. An image has ten words, of which the last is
-// a name: it is no such line even if the name is a number.
+// The points of an image, X Y POINT3D_ID each. An image line has ten words, of which the last is a
+// name: it is no such line even if the name is a number.
 bool IsPoints(std::string_view line) {
   std::size_t count = 0;
   double number = 0;
@@ -175,8 +175,8 @@ bool IsPoints(std::string_view line) {
   return count % 3 == 0;
 }
 
-// COLMAP writes two lines an image, the second with its points, which may be empty. Other programs
-// leave that one out, and filters of empty lines drop it.
+// COLMAP writes two lines per image, the second with its points, which may be empty. Other programs
+// omit it, and filters of empty lines drop it.
 Result<std::vector<CameraView>> ReadImagesText(const Path& file, const Cameras& cameras) {
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::vector<CameraView> views;
@@ -295,7 +295,7 @@ std::vector<Path> ModelsIn(const Path& sparse) {
   return models;
 }
 
-// 0 where they cannot be read.
+// 0 if they cannot be read.
 std::size_t CountImages(const Path& model) {
   const auto views = LoadColmapCameras(model, {.bent = true});
   return views.ok() ? views->size() : 0;
@@ -315,9 +315,9 @@ ColmapModel LargestOf(const std::vector<Path>& models) {
                       models[best].string(), Count(counts[best], "image"), others.substr(2))};
 }
 
-// Written -------------------------------------------------------------------------------------
+// Writing -------------------------------------------------------------------------------------
 
-// What the reader refuses, or would read as another name, is not written.
+// Refuses what the reader would refuse or read under another name.
 Status CheckForColmap(const CameraView& view, const ColmapCamera& camera) {
   const auto [width, height] = view.size;
   if (!IsSize(width, height))

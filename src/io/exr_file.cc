@@ -44,7 +44,7 @@ class ExrStream : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
-// The library would cut the name there, and of two that then agree lose one.
+// The library would truncate the name at a NUL, and drop one of two names that then agree.
 Status CheckName(const std::string& name) {
   constexpr std::size_t kMost = 255;  // Imf::Name::MAX_LENGTH
   if (name.size() > kMost) {
@@ -84,7 +84,7 @@ void Write(const ExrImage& image, Imf::OStream& stream) {
   Imf::FrameBuffer frame;
   for (const ExrChannel& c : image.channels) {
     header.channels().insert(c.name, Imf::Channel(Imf::FLOAT));
-    // The library takes what it reads from as writable.
+    // The library takes a pointer to non-const even for reading.
     frame.insert(
         c.name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(c.values.data())),
                            sizeof(float), sizeof(float) * static_cast<std::size_t>(image.width)));
@@ -94,9 +94,9 @@ void Write(const ExrImage& image, Imf::OStream& stream) {
   file.writePixels(image.height);
 }
 
-// The reading process sends bytes to this one: 'E' and a message, or 'I', width, height, the
-// numbers of channels and of warnings, the names of channels and the warnings, each terminated by
-// 0, and the values.
+// The child sends bytes to this process: 'E' and a message, or 'I', width, height, the numbers of
+// channels and of warnings, the names of channels and the warnings, each terminated by 0, and the
+// values.
 
 constexpr int kMaxChannels = 1024, kMaxWarnings = 2;
 constexpr std::uint8_t kImage = 'I', kError = 'E';
@@ -177,7 +177,7 @@ Bytes ErrorBytes(std::string_view message) {
   return out;
 }
 
-// All channels of the data window, one after the other.
+// All channels of the data window, concatenated.
 std::vector<float> ReadData(Imf::InputPart& in, const std::vector<std::string>& names) {
   const ExrWindow& window = in.header().dataWindow();
   const auto [width, height] = SizeOfWindow(window);
@@ -193,7 +193,7 @@ std::vector<float> ReadData(Imf::InputPart& in, const std::vector<std::string>& 
   return data;
 }
 
-// One channel of the data window into the display window, whose floats begin anywhere.
+// Copies one channel of the data window into the display window, whose floats may be unaligned.
 void PlaceInPicture(const float* data, const ExrWindow& from, const ExrWindow& to,
                     std::uint8_t* picture) {
   const auto at = [](const ExrWindow& window, std::int64_t x, std::int64_t y) {

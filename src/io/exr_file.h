@@ -10,8 +10,8 @@
 
 namespace tilegrad::io {
 
-// Planes of one image, [height][width] each, row 0 on top. Names as EXR readers know them: R, G, B,
-// A, Z; others are layers, "normal.X".
+// Planes of one image, [height][width] each, row 0 on top. Names by OpenEXR convention: R, G, B, A,
+// Z; others are layers, "normal.X".
 struct ExrChannel {
   std::string name;
   std::span<const float> values;
@@ -21,25 +21,25 @@ struct ExrImage {
   std::vector<ExrChannel> channels;
 };
 
-// Errors: no pixel, no channel, a name that is empty, there twice, longer than 255 bytes or with a
-// NUL in it, a plane of the wrong size.
+// Errors: no pixels, no channels, a name that is empty, duplicate, longer than 255 bytes or
+// contains NUL, a plane of the wrong size.
 Result<Bytes> EncodeExr(const ExrImage& image);
-// Whole or not at all.
+// Atomic.
 Status SaveExr(const Path& path, const ExrImage& image);
 
 struct LoadedExr {
   int width = 0, height = 0;
   std::vector<std::string> names;     // of channels, sorted as the library sorts them
   std::vector<float> values;          // [channels][height][width], row 0 on top
-  std::vector<std::string> warnings;  // what of the file is left out
+  std::vector<std::string> warnings;  // parts of the file that were dropped
 };
 
-// The display window of the first part of a file: 0 where it has no data, and what it has outside
-// is left out with a warning. Half and integer channels become float. The library works in a
-// process of its own (guarded_process.h). `name` stands in messages. Errors: not an EXR, cut short
-// or damaged, deep, a channel that is subsampled, more than kMaxImageSide pixels a side.
+// The display window of the file's first part: 0 where it has no data; drops data outside with a
+// warning. Half and integer channels become float. The library runs in a child process
+// (guarded_process.h). Messages call the file `name`. Errors: not an EXR, truncated or damaged,
+// deep, a subsampled channel, more than kMaxImageSide pixels a side.
 Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::string& name);
-// From what that process hands over, which is untrusted: the library may have gone wrong.
+// Decodes the child's output, which is untrusted: the library may have misbehaved.
 Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes);
 Result<LoadedExr> LoadExr(const Path& path);
 

@@ -163,7 +163,7 @@ Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
   return {{"attributes", attributes}, {"indices", glb.AddIndices(p.indices)}};
 }
 
-// A texture as glTF has them: an image, and how it is looked up.
+// A glTF texture: an image and its sampler.
 struct TextureUse {
   int image = 0;
   std::array<TextureWrap, 2> wrap = {TextureWrap::kRepeat, TextureWrap::kRepeat};  // as Material
@@ -173,7 +173,7 @@ struct TextureUse {
 
 TextureUse UseOf(const Material& m) { return {m.base_color_texture, m.wrap, m.nearest}; }
 
-// One for each image, as its first material uses it, then those that use an image otherwise.
+// One per image, as its first material uses it, then other uses of the same image.
 std::vector<TextureUse> TextureUses(const Mesh& mesh) {
   std::vector<TextureUse> uses;
   for (int i = 0; i < static_cast<int>(mesh.textures.size()); ++i) {
@@ -255,7 +255,7 @@ void AddMaterials(GlbBuilder& glb, const Mesh& mesh) {
   AddTextures(glb, uses);
 }
 
-// Large numbers have no linear counterpart; JSON would say null, and readers take white.
+// Large numbers have no linear counterpart; JSON would write null, which readers take for white.
 Status CheckLinearColors(const Mesh& mesh) {
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (IsFinite(SrgbToLinear(mesh.materials[m].base_color))) continue;
@@ -269,13 +269,13 @@ Status CheckLinearColors(const Mesh& mesh) {
   return {};
 }
 
-// A node whose z axis points to the sun: lights shine along -z. Illuminance pi of a white surface
-// is what looks white.
+// A node whose z axis points to the sun: lights shine along -z. An illuminance of pi makes a white
+// surface look white.
 Status AddSun(GlbBuilder& glb, const glm::dvec3& sun) {
   if (!(glm::length(sun) > 0) || !std::isfinite(glm::length(sun)))
     return InvalidArgument("the direction of the sun is ({}, {}, {})", sun.x, sun.y, sun.z);
   const glm::dvec3 to = sun / glm::length(sun);
-  // Half-way quaternion from (0, 0, 1); from behind half a turn about x.
+  // Half-way quaternion from (0, 0, 1); for the opposite direction half a turn about x.
   glm::dvec4 q(-to.y, to.x, 0, 1 + to.z);
   q = glm::dot(q, q) < 1e-12 ? glm::dvec4(1, 0, 0, 0) : q / glm::length(q);
   const Json light = {{"type", "directional"}, {"intensity", std::numbers::pi}, {"name", "sun"}};

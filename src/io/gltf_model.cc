@@ -32,14 +32,13 @@ using Names = std::span<const std::string_view>;
 
 constexpr std::string_view kRead[] = {"KHR_mesh_quantization", "KHR_texture_transform",
                                       "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"};
-// Geometry is read where it is there uncompressed, too; else the file is refused where its bytes
-// are asked for.
+// Reads geometry that also exists uncompressed; else refuses the file when its bytes are requested.
 constexpr std::string_view kCompressions[] = {"KHR_draco_mesh_compression",
                                               "EXT_meshopt_compression"};
-// Images in other formats. A texture's own image is drawn instead where it has one.
+// Images in other formats. A texture's own image is used instead if it has one.
 constexpr std::string_view kImages[] = {"EXT_texture_webp", "KHR_texture_basisu",
                                         "EXT_texture_avif", "MSFT_texture_dds"};
-// They do not change what is drawn at rest.
+// They do not change the picture at rest.
 constexpr std::string_view kUnseen[] = {"KHR_materials_variants",
                                         "KHR_animation_pointer",
                                         "KHR_xmp",
@@ -67,7 +66,7 @@ bool IsIn(Names names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// How a surface shines, and lights: the picture is another, but the object is the file's.
+// Reflectance and lights: the picture changes, but the object is the file's.
 bool ChangesLightOnly(std::string_view name) {
   return name.starts_with("KHR_materials_") || name.starts_with("KHR_lights_") ||
          name.starts_with("EXT_lights_");
@@ -150,7 +149,7 @@ Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& mode
   return std::span(data).subspan(v.byteOffset, v.byteLength);
 }
 
-// An accessor but for what is sparse in it.
+// An accessor without its sparse part.
 Result<GltfAccessor> GltfAccessor::OpenDense(const tinygltf::Model& model,
                                              const tinygltf::Accessor& a, const std::string& what) {
   const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType));
@@ -198,7 +197,7 @@ Status GltfAccessor::ApplySparse(const tinygltf::Model& model, const tinygltf::A
     part.bufferView = view;
     part.componentType = type;
     part.type = components;
-    part.byteOffset = static_cast<std::size_t>(offset);  // one below 0 is beyond any view
+    part.byteOffset = static_cast<std::size_t>(offset);  // a negative offset is beyond any view
     part.count = static_cast<std::size_t>(sparse.count);
     return OpenDense(model, part, what);
   };
@@ -274,7 +273,7 @@ float GltfAccessor::Float(std::size_t element, int component) const {
       return scaled(Read<std::int8_t>(at), 127);
     case TINYGLTF_COMPONENT_TYPE_SHORT:
       return scaled(Read<std::int16_t>(at), 32767);
-    default:  // OpenAttribute lets nothing else pass
+    default:  // excluded by OpenAttribute
       return Read<float>(at);
   }
 }
@@ -286,7 +285,7 @@ std::uint32_t GltfAccessor::Index(std::size_t element) const {
       return *at;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
       return Read<std::uint16_t>(at);
-    default:  // OpenIndices lets nothing else pass
+    default:  // excluded by OpenIndices
       return Read<std::uint32_t>(at);
   }
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: glTF files as tinygltf's model, and checked access to what a model holds.
-// tinygltf itself checks few of the numbers in a file. It is included here alone, with the macros
-// that it is compiled with: the layout of its classes depends on them, and Debian's shared library
-// was built with others.
+// Internal to io: glTF files as tinygltf's model, with checked access, since tinygltf validates few
+// of a file's numbers. The only include of tinygltf, with the macros that it is compiled with: its
+// class layout depends on them, and Debian's shared library was built with others.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -29,38 +28,37 @@
 namespace tilegrad::io {
 
 struct GltfDocument {
-  tinygltf::Model model;              // images encoded: bytes of data URIs, or a buffer view
-  std::vector<std::string> warnings;  // extensions that are not read
+  tinygltf::Model model;              // images still encoded: bytes of data URIs, or a buffer view
+  std::vector<std::string> warnings;  // ignored extensions
 };
 
-// The file `name` with its side files. DataLoss for what is not glTF 2, nested too deep or
-// compressed; ResourceExhausted above 4 GiB. The numbers in the model are not checked yet.
+// Reads the file `name` with its side files. DataLoss if it is not glTF 2, nested too deep or
+// compressed; ResourceExhausted above 4 GiB. Numbers in the model are not validated yet.
 Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::string& name);
 
-// The extension by which the JSON compresses geometry, else nothing.
+// The extension with which the JSON compresses geometry; empty if none.
 std::string_view GltfCompression(std::string_view json);
 
-// DataLoss: the file cannot be read because of that extension.
+// DataLoss that says that the file cannot be read because of the extension.
 Status RefuseGltfCompression(std::string_view extension, const std::string& place);
 
-// DataLoss if the file requires what it cannot be drawn without. One warning names the others that
-// are used, are not read and change what viewers draw.
+// DataLoss if the file requires an extension without which it cannot be drawn. One warning names
+// the other extensions that are ignored and would change the picture.
 Status CheckGltfExtensions(const tinygltf::Model& model, const std::string& place,
                            std::vector<std::string>* warnings);
 
-// Of a texture that has no image but one of a format that is not read: the extension that has it.
+// For a texture whose only image has an unsupported format: the extension that holds it.
 std::string GltfImageExtension(const tinygltf::Texture& texture);
 
-// The bytes of a buffer view, which lie within its buffer. `what` stands in messages.
+// The bytes of a buffer view, checked against its buffer. Messages call it `what`.
 Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& model, int view,
                                                      const std::string& what);
 
-// The elements of an accessor: those of its buffer view, or zeros where it has none, and what a
-// sparse one puts in their place. Open checks every number, so that reading cannot leave the
-// buffer.
+// The elements of an accessor: from its buffer view, or zeros without one, with sparse values
+// substituted. Open checks every number, so that reads stay in the buffer.
 class GltfAccessor {
  public:
-  // Attributes: float, or 8 or 16 bit integers. `components` numbers an element, 0 for any.
+  // Attributes: float, or 8 or 16 bit integers. `components` per element, 0 for any.
   static Result<GltfAccessor> OpenAttribute(const tinygltf::Model& model, int index, int components,
                                             const std::string& what);
   // Indices: unsigned integers of 8, 16 or 32 bits.
@@ -69,7 +67,7 @@ class GltfAccessor {
 
   std::size_t count() const { return count_; }
   int components() const { return components_; }
-  float Float(std::size_t element, int component) const;  // normalised integers become [-1, 1]
+  float Float(std::size_t element, int component) const;  // normalised integers map to [-1, 1]
   std::uint32_t Index(std::size_t element) const;
 
  private:
@@ -86,38 +84,38 @@ class GltfAccessor {
   std::size_t element() const { return size_ * static_cast<std::size_t>(components_); }
 
   std::span<const unsigned char> bytes_;
-  std::shared_ptr<const std::vector<unsigned char>> own_;  // bytes_ of a sparse one
+  std::shared_ptr<const std::vector<unsigned char>> own_;  // backs bytes_ of a sparse accessor
   std::size_t count_ = 0, stride_ = 0, size_ = 0;
   int components_ = 0, type_ = 0;
   bool normalized_ = false;
 };
 
-// Where a texture is looked up: the uv set, and KHR_texture_transform on it, in glTF's own
-// coordinates (v down).
+// How a material samples a texture: the uv set, and KHR_texture_transform, in glTF's coordinates (v
+// down).
 struct GltfUvUse {
   int set = 0;
   glm::dvec2 offset{0}, scale{1};
   double rotation = 0;  // radians
 
-  std::string Key() const;  // the attribute
+  std::string Key() const;  // the attribute's name
   glm::vec2 operator()(glm::vec2 uv) const;
 };
 
-// The base colour, or the diffuse colour of KHR_materials_pbrSpecularGlossiness, which comes first
-// where a file has both.
+// The base colour, or the diffuse colour of KHR_materials_pbrSpecularGlossiness, which takes
+// precedence.
 struct GltfBaseColor {
   glm::dvec4 factor{1};  // linear
   int texture = -1;
   GltfUvUse uv;
 };
 
-// Of a material that does not exist: glTF's default, white.
+// glTF's default, white, if the material does not exist.
 GltfBaseColor GltfBaseColorOf(const tinygltf::Model& model, int material);
 
-// Lists, strips and fans of triangles as faces, with normals, colours (as in the file) and the uv
-// of the material's texture (v up) where the primitive has them; no faces for other modes.
-// `weights`: of its morph targets, which are added to it; missing ones are 0. DataLoss names `what`
-// and the attribute that is missing, has another length or points outside its buffer.
+// Converts triangle lists, strips and fans to faces, with normals, colours (as in the file) and the
+// uvs of the material's texture (v up) if the primitive has them; no faces for other modes.
+// `weights`: of the morph targets, which are applied; missing ones are 0. DataLoss names `what` and
+// the attribute that is missing, has the wrong length or points outside its buffer.
 Result<Mesh> ConvertGltfPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& p,
                                   std::span<const double> weights, const std::string& what);
 

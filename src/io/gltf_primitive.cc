@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Primitives of glTF files as meshes, and what their surface is coloured by.
+// Converts primitives of glTF files to meshes; finds their base colour.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -107,7 +107,7 @@ Result<std::vector<std::uint32_t>> ReadIndices(const tinygltf::Model& model,
   return indices;
 }
 
-// An attribute that the primitive may lack: then nothing.
+// An attribute that the primitive may lack: then empty.
 template <class Vec>
 Result<std::vector<Vec>> ReadAttribute(const tinygltf::Model& model, const tinygltf::Primitive& p,
                                        const std::string& key, const std::string& what) {
@@ -123,7 +123,7 @@ Result<std::vector<Vec>> ReadAttribute(const tinygltf::Model& model, const tinyg
   return out;
 }
 
-// COLOR_0 has three or four components; alpha is 1 where there is none.
+// COLOR_0 has three or four components; alpha defaults to 1.
 Result<std::vector<glm::vec4>> ReadColors(const tinygltf::Model& model,
                                           const tinygltf::Primitive& p, const std::string& what) {
   std::vector<glm::vec4> out;
@@ -147,7 +147,7 @@ struct MorphedAttribute {
   const std::string& what;
 };
 
-// Adds what the morph targets move, by their weights, to one attribute: linear colours included.
+// Adds the weighted morph targets to one attribute: linear colours included.
 template <class Vec>
 Status Morph(const tinygltf::Model& model, const tinygltf::Primitive& p,
              std::span<const double> weights, const MorphedAttribute<Vec>& to) {
@@ -171,7 +171,7 @@ Status Morph(const tinygltf::Model& model, const tinygltf::Primitive& p,
   return {};
 }
 
-// Geometry whose uncompressed copy was left out of the file.
+// Geometry whose uncompressed copy was omitted from the file.
 bool IsCompressed(const tinygltf::Model& model, const tinygltf::Primitive& p) {
   const int at = AttributeIndex(p, "POSITION");
   return p.extensions.count("KHR_draco_mesh_compression") > 0 && at >= 0 &&
@@ -247,7 +247,7 @@ Result<Mesh> ConvertGltfPrimitive(const tinygltf::Model& model, const tinygltf::
   return mesh;
 }
 
-// A glTF or GLB file, with its buffers, as tinygltf's model.
+// Reads a glTF or GLB file, with its buffers, as tinygltf's model.
 
 namespace {
 
@@ -260,9 +260,9 @@ std::uint64_t CountOf(const ParsedJson& object, const char* key) {
   return count != object.end() && count->is_number_unsigned() ? count->get<std::uint64_t>() : 0;
 }
 
-// The buffers of a glTF that are files of their own. tinygltf decodes names by rules of its own
-// ("+" is a space to it) and refuses a file that is longer than its buffer; so it is given the
-// files in the order in which it asks for them, which is that of the buffers.
+// The buffers of a glTF in separate files. tinygltf decodes names by its own rules ("+" means a
+// space) and refuses a file longer than its buffer; so it gets the files in the order in which it
+// requests them, which is that of the buffers.
 class BufferFiles {
  public:
   BufferFiles(const FileSource& source, const std::string& gltf_name, const ParsedJson& document)
@@ -322,8 +322,8 @@ class BufferFiles {
   Status status_;
 };
 
-// Keeps the encoded bytes of data URIs; images are decoded when a material asks for one. An image
-// in a buffer view comes with a place that tinygltf has not checked: it is left alone until then.
+// Keeps the encoded bytes of data URIs; images are decoded when a material needs them. tinygltf has
+// not checked the position of an image in a buffer view: it is left alone until then.
 bool KeepEncoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int,
                  const unsigned char* bytes, int size, void*) {
   if (image->bufferView < 0) image->image.assign(bytes, bytes + size);
@@ -382,9 +382,9 @@ const ParsedJson* Referred(const ParsedJson& document, const char* list, const P
   return i >= 0 && static_cast<std::size_t>(i) < entries->size() ? &(*entries)[i] : nullptr;
 }
 
-// tinygltf takes the address of an image's first byte in its buffer before it asks KeepEncoded,
-// also where the buffer ends before: a standard library that checks indices ends the program there.
-// Whatever else is wrong is left to tinygltf, which finds it before.
+// tinygltf takes the address of an image's first byte in its buffer before it calls KeepEncoded,
+// even if the buffer ends earlier: a standard library with index checks aborts there. tinygltf
+// finds all other errors before.
 Status CheckImages(const ParsedJson& document, const std::string& place) {
   const auto images = document.find("images");
   if (images == document.end() || !images->is_array()) return {};
@@ -403,7 +403,7 @@ Status CheckImages(const ParsedJson& document, const std::string& place) {
 }
 
 Status CheckVersion(const std::string& place, const tinygltf::Model& model) {
-  // Of 2.x, a reader of 2.0 reads what does not say that it is not enough.
+  // A reader of 2.0 reads all 2.x files unless they say that 2.0 is not enough.
   const std::string& least = model.asset.minVersion;
   if (!model.asset.version.starts_with("2.") || (!least.empty() && least != "2.0")) {
     return DataLoss("{}: glTF version \"{}\"; 2.0 is read", place,
@@ -427,7 +427,7 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
     BufferFiles files(source, name, json);
     TILEGRAD_TRY(Parse(bytes, files, place, &document.model));
   } catch (const std::bad_alloc&) {
-    throw;                                 // no fault of the file
+    throw;                                 // not the file's fault
   } catch (const std::exception& error) {  // the JSON library throws on some type errors
     return DataLoss("{}: not valid glTF: {}", place, error.what());
   }

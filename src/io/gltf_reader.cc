@@ -21,7 +21,7 @@
 namespace tilegrad::io {
 namespace {
 
-// Nodes that are nobody's child.
+// Nodes without a parent.
 std::vector<int> GltfRootNodes(const tinygltf::Model& model) {
   std::vector<bool> child(model.nodes.size(), false);
   for (const auto& node : model.nodes) {
@@ -36,7 +36,7 @@ std::vector<int> GltfRootNodes(const tinygltf::Model& model) {
   return roots;
 }
 
-// Of its matrix, or of its translation, rotation and scale.
+// From its matrix, or from its translation, rotation and scale.
 glm::dmat4 GltfLocalMatrix(const tinygltf::Node& node) {
   if (node.matrix.size() == 16) return glm::make_mat4(node.matrix.data());
   glm::dmat4 m(1);
@@ -51,8 +51,8 @@ glm::dmat4 GltfLocalMatrix(const tinygltf::Node& node) {
   return m;
 }
 
-// From each node to the world, whether it is part of a scene or not. Of nodes that form no tree,
-// anything.
+// From each node to the world, whether it is part of a scene or not. Unspecified for nodes that
+// form no tree.
 std::vector<glm::dmat4> GltfWorldMatrices(const tinygltf::Model& model) {
   std::vector<glm::dmat4> world(model.nodes.size(), glm::dmat4(1));
   std::vector<bool> known(model.nodes.size(), false);
@@ -72,7 +72,7 @@ std::vector<glm::dmat4> GltfWorldMatrices(const tinygltf::Model& model) {
   return world;
 }
 
-// JOINTS_n and WEIGHTS_n: four joints more of each vertex.
+// JOINTS_n and WEIGHTS_n: four more joints per vertex.
 struct Influences {
   GltfAccessor joints, weights;
 };
@@ -103,7 +103,7 @@ Result<std::vector<Influences>> ReadInfluences(const tinygltf::Model& model,
   }
 }
 
-// The mean of a vertex's joints, by their weights.
+// The weighted mean of the matrices of a vertex's joints.
 Result<glm::dmat4> MatrixOf(const std::vector<Influences>& influences, std::size_t vertex,
                             std::span<const glm::dmat4> joints, const std::string& what) {
   glm::dmat4 sum(0);
@@ -133,7 +133,7 @@ Result<glm::dmat4> MatrixOf(const std::vector<Influences>& influences, std::size
   return sum / total;
 }
 
-// As Transform of scene/shapes.h, without its turning of faces: what is mirrored is the whole mesh.
+// Like Transform of scene/shapes.h, but without flipping faces: a mirror applies to the whole mesh.
 void TurnNormal(const glm::dmat3& m, glm::vec3* n) {
   const glm::dmat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
   const glm::dvec3 turned = cofactor * glm::dvec3(*n);
@@ -141,8 +141,8 @@ void TurnNormal(const glm::dmat3& m, glm::vec3* n) {
   if (length > 0) *n = glm::vec3(turned / length);
 }
 
-// Of each joint of a skin: from where the vertices were bound to where they stand. `world`: of all
-// nodes. DataLoss names `what` and what does not exist.
+// For each joint of a skin: from the bind pose to the current pose. `world`: of all nodes. DataLoss
+// names `what` and what does not exist.
 Result<std::vector<glm::dmat4>> GltfJointMatrices(const tinygltf::Model& model, int skin,
                                                   std::span<const glm::dmat4> world,
                                                   const std::string& what) {
@@ -169,11 +169,11 @@ Result<std::vector<glm::dmat4>> GltfJointMatrices(const tinygltf::Model& model, 
   return out;
 }
 
-// Whether the primitive says which joints hold its vertices.
+// Whether the primitive has joints.
 bool IsSkinned(const tinygltf::Primitive& p) { return p.attributes.count("JOINTS_0") > 0; }
 
-// Moves the vertices of the primitive's mesh to where their joints hold them. Weights need not sum
-// to 1; a vertex without any goes with its first joint. `exact` gets them before they are rounded.
+// Moves the vertices of the primitive's mesh with their joints. Weights need not sum to 1; a vertex
+// without any follows its first joint. `exact` gets positions before rounding.
 Status ApplyGltfSkin(const tinygltf::Model& model, const tinygltf::Primitive& p,
                      std::span<const glm::dmat4> joints, const std::string& what, Mesh* mesh,
                      std::vector<glm::dvec3>* exact) {
@@ -190,13 +190,13 @@ Status ApplyGltfSkin(const tinygltf::Model& model, const tinygltf::Primitive& p,
 constexpr int kMaxNodeDepth = 256;  // the walk is recursive
 constexpr std::size_t kMostTypeShown = 80;
 
-// Where a node puts the primitives of its mesh.
+// Placement of the primitives of a node's mesh.
 using SharedVertices = std::map<std::string, std::int32_t>;  // first vertex by VertexKey
 
 struct PrimitivePlace {
   glm::dmat4 matrix;
   std::span<const double> weights;  // of morph targets
-  std::vector<glm::dmat4> joints;   // of its skin: then `matrix` does not count
+  std::vector<glm::dmat4> joints;   // of its skin: replace `matrix`
   SharedVertices shared = {};       // of this mesh's primitives so far
 };
 
@@ -252,7 +252,7 @@ int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
     return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
   }
   if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
-  if (image.uri.starts_with("data:")) {  // what tinygltf takes for a file's name
+  if (image.uri.starts_with("data:")) {  // tinygltf took it for a file name
     const std::string type = image.uri.substr(0, std::min(image.uri.find(','), kMostTypeShown));
     return AddTexture(DataLoss("{}: \"{}\" is not read; save it as PNG or JPEG", label, type),
                       label, out);
@@ -301,7 +301,7 @@ Material GltfWalk::ConvertMaterial(int index) {
   return material;
 }
 
-// Primitives with the same key have the same vertices, whatever their uv are.
+// Primitives with the same key have the same vertices, whatever their uvs.
 std::string VertexKey(const tinygltf::Primitive& p) {
   std::string key;
   const auto add = [&](const std::map<std::string, int>& attributes) {

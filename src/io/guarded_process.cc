@@ -62,9 +62,9 @@ struct Header {
   std::uint64_t magic, size;
 };
 constexpr std::uint64_t kChannelMagic =
-    0x746c67642d626f78;  // any number that no other file begins with
+    0x746c67642d626f78;  // any number that no other file starts with
 
-// All of `bytes` by pread or pwrite, from a place of the file on.
+// Transfers all of `bytes` by pread or pwrite, from an offset in the file.
 template <class Byte, class Call>
 bool AllAt(Call call, int fd, std::span<Byte> bytes, std::size_t at) {
   while (!bytes.empty()) {
@@ -95,7 +95,8 @@ Status Refused(const char* what) {
   return IoError("could not get {}: {}", what, std::strerror(errno));
 }
 
-// Bytes that one process leaves for the other. A header that is written last tells whole from cut.
+// Bytes that one process leaves for the other. The header is written last, so that incomplete
+// contents are detected.
 class Mailbox {
  public:
   static Result<Mailbox> Open() {
@@ -104,13 +105,13 @@ class Mailbox {
     return Mailbox(std::move(file));
   }
   int fd() const { return file_.get(); }
-  // Replaces what is there; false if the system refuses (memory, limits).
+  // Replaces the contents; false if the system refuses (memory, limits).
   bool Put(std::span<const std::uint8_t> bytes) const {
     const Header header{kChannelMagic, bytes.size()};
     return ::ftruncate(fd(), 0) == 0 && WriteAt(fd(), bytes, sizeof(header)) &&
            WriteAt(fd(), {reinterpret_cast<const std::uint8_t*>(&header), sizeof(header)}, 0);
   }
-  // Nothing if what is there is not whole or larger than `max_bytes`.
+  // nullopt if the contents are incomplete or larger than `max_bytes`.
   std::optional<Bytes> Get(std::size_t max_bytes) const {
     struct stat info = {};
     Header header = {};
@@ -154,8 +155,8 @@ struct ChildSetup {
 
 enum ChildExit { kChildDone = 0, kChildThrew = 80, kChildOutOfMemory, kChildCannotDeliver };
 
-// The parent's handlers must not run here. A group of its own keeps the terminal's Ctrl-C away,
-// which is the parent's to act on; if the parent goes, so does the child.
+// The parent's handlers must not run here. Its own process group keeps the terminal's Ctrl-C away,
+// which the parent handles; if the parent dies, so does the child.
 void SeparateFromParent(int parent_pid) {
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -166,7 +167,8 @@ void SeparateFromParent(int parent_pid) {
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Closes or redirects every descriptor of the parent but two: nothing is read or printed.
+// Closes or redirects all of the parent's descriptors but two: the child can neither read nor
+// print.
 void CloseDescriptors(int a, int b) {
   const int null = ::open("/dev/null", O_RDWR);
   for (int stream = 0; stream <= STDERR_FILENO; ++stream) ::dup2(null, stream);
@@ -213,14 +215,14 @@ std::optional<Bytes> Ask(const ChildSetup& setup, std::string_view question) {
   return setup.mailbox.Get(setup.limits.memory_bytes);
 }
 
-// Page faults are most of what a short-lived process costs: every page of the parent's heap that it
-// reuses is copied, every new one cleared. So what the parent left free is given back, the next
-// block is made of huge pages, and nothing is given back from then on. An importer that begins with
-// a buffer of 16 MiB took 12 ms before, 2 ms since.
+// Page faults are most of the cost of a short-lived process: every reused page of the parent's heap
+// is copied, every new one cleared. So this returns free memory of the parent to the system, makes
+// the next block of huge pages, and stops returning memory from then on. An importer that starts
+// with a buffer of 16 MiB took 12 ms before, 2 ms since.
 void PrepareHeap() {
   constexpr std::size_t kHugePage = std::size_t{2} << 20, kBlock = std::size_t{30} << 20;
   ::malloc_trim(0);
-  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the largest that it takes
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the largest allowed value
   ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
   void* block = std::malloc(kBlock);
   const auto begin = (reinterpret_cast<std::uintptr_t>(block) + kHugePage - 1) & ~(kHugePage - 1);
@@ -240,7 +242,7 @@ ChildExit Run(const ChildSetup& setup, ChildFunction run) {
   }
 }
 
-// The whole life of the child after the fork. Expects all signals blocked.
+// Runs the child after the fork. Expects all signals blocked.
 [[noreturn]] void RunChildProcess(const ChildSetup& setup, ChildFunction run) noexcept {
   SeparateFromParent(setup.parent_pid);
   CloseDescriptors(setup.socket, setup.mailbox.fd());
@@ -257,7 +259,7 @@ constexpr int kMaxQuestions = 4096;
 
 std::atomic<const StopFlag*> g_stop = nullptr;
 
-// What the child may map in all: what this process has mapped, which it inherits, and the limit.
+// The child's address space limit: what this process has mapped, which it inherits, plus the limit.
 // 0, no limit, under sanitizers: they map terabytes.
 std::size_t AddressSpace(const GuardLimits& limits) {
   if constexpr (kSanitizer) return 0;
@@ -294,7 +296,7 @@ class Child {
   Child& operator=(const Child&) = delete;
 
   // True once it has ended. Somebody else may have reaped it (SIGCHLD ignored, a wait for any
-  // child): then it counts as having ended well, and the mailbox tells the rest.
+  // child): then it counts as a normal exit, and the mailbox decides.
   bool Reap(int flags) {
     if (reaped_) return true;
     pid_t got = 0;
@@ -326,7 +328,7 @@ class Guard {
         deadline_(Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                      std::chrono::duration<double>(limits.wall_seconds))) {}
 
-  // Until the child ends.
+  // Serves the child until it ends.
   Status Watch() {
     while (!child_.Reap(WNOHANG)) {
       if (GuardedMustStop()) return Cancelled("was stopped");
@@ -334,7 +336,7 @@ class Guard {
           std::chrono::ceil<std::chrono::milliseconds>(deadline_ - Clock::now()).count();
       if (left <= 0) return DataLoss("took more than {} s", limits_.wall_seconds);
       std::array<pollfd, 2> wait = {{{socket_.get(), POLLIN, 0}, {child_.end_fd(), POLLIN, 0}}};
-      // Another thread may get the signal that sets the flag.
+      // Another thread may receive the signal that sets the flag.
       const std::int64_t slice = child_.end_fd() < 0 ? 5 : 50;
       if (::poll(wait.data(), wait.size(), static_cast<int>(std::min<std::int64_t>(left, slice))) >
               0 &&
@@ -360,7 +362,7 @@ class Guard {
       return IoError("could not be given {} bytes: {}", content->size(), std::strerror(errno));
     }
     const char known = content.has_value();
-    // A child that asks without taking answers fills the socket; that must not block us.
+    // A child that asks without reading answers fills the socket; that must not block us.
     if (::send(socket_.get(), &known, 1, MSG_NOSIGNAL | MSG_DONTWAIT) != 1) socket_.Close();
     return {};
   }
@@ -374,14 +376,14 @@ class Guard {
   int questions_ = 0;
 };
 
-// The limit of this process that is lower than what the child was to get; 0 if none is.
+// This process's own limit if it is lower than the child's grant; else 0.
 rlim_t OwnLimit(decltype(RLIMIT_AS) resource, std::size_t granted) {
   rlimit own = {};
   if (::getrlimit(resource, &own) != 0 || own.rlim_cur >= granted) return 0;
   return own.rlim_cur;
 }
 
-// Where this process may map less than the child was granted, that was in its way, not the file.
+// If this process may map less than the child was granted, its own limit is to blame, not the file.
 Status TooMuchMemory(const GuardLimits& limits) {
   if (const rlim_t own = OwnLimit(RLIMIT_AS, AddressSpace(limits)); own > 0) {
     NoteShortage(ENOMEM);
@@ -440,7 +442,7 @@ Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLi
   const ChildSetup setup{::getpid(), sockets.child.get(), mailbox, AddressSpace(limits), limits};
   pid_t pid = -1;
   {
-    const BlockedSignals blocked;  // no handler of ours may run in the child
+    const BlockedSignals blocked;  // none of our handlers may run in the child
     pid = ::fork();
     if (pid == 0) RunChildProcess(setup, run);
   }

@@ -37,7 +37,7 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
       const auto header = bytes.subspan(at + 8, 8);
       TILEGRAD_TRY(CheckImageSize(BigEndian(header.first(4)), BigEndian(header.last(4)), name));
     }
-    if (type == "CgBI") {  // blue before red, colours multiplied by alpha: stb_image leaves both so
+    if (type == "CgBI") {  // blue before red, premultiplied alpha: stb_image corrects neither
       return DataLoss("{}: an Xcode PNG (CgBI), which is not read; save it as a standard PNG",
                       name);
     }
@@ -49,8 +49,8 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
 constexpr int kApp14 = 0xee, kHuffmanTables = 0xc4, kStartOfScan = 0xda, kStartOfImage = 0xd8,
               kEndOfImage = 0xd9;
 
-// Files have about ten. Each goes over the whole picture, even if it takes a few bytes: stb_image
-// took 5 s for 100 scans of 16,000 x 16,000 pixels in 25 kB.
+// Files have about ten. Each covers the whole picture, even if it takes a few bytes: stb_image took
+// 5 s for 100 scans of 16,000 x 16,000 pixels in 25 kB.
 constexpr int kMostScans = 100;
 
 // Tables of a class and number, 16 counts of codes by length, and as many values as the counts'
@@ -70,10 +70,10 @@ bool HuffmanTablesFit(ByteSpan segment) {
 // SOF0 to SOF2, the frames that stb_image reads.
 bool IsFrame(int marker) { return marker >= 0xc0 && marker <= 0xc2; }
 
-// What says how a JPEG's components are to be read as colours.
+// Determines the colour space of a JPEG's components.
 struct JpegColors {
   int components = 0;
-  int transform = -1;  // of the segment that Adobe's programs write
+  int transform = -1;  // of the Adobe segment
 
   void Take(int marker, ByteSpan segment) {
     constexpr std::string_view kAdobe = "Adobe";
@@ -83,7 +83,7 @@ struct JpegColors {
       transform = segment[11];
     }
   }
-  // Four components are CMYK (0) or YCCK (2), both inverted, if that segment is there. Without it
+  // Four components are CMYK (0) or YCCK (2), both inverted, if that segment exists. Without it
   // they may be inverted or not; stb_image takes them for YCbCr.
   Status Check(const std::string& name) const {
     if (components != 4 || transform == 0 || transform == 2) return {};
@@ -130,15 +130,15 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
 
 // BMP and TGA: positions are where stb_image 2.27 reads them.
 
-// A TGA's header, and that of a BMP up to its bits a pixel.
+// A TGA's header, and that of a BMP up to its bits per pixel.
 constexpr std::size_t kTgaHeader = 18, kBmpHeader = 30;
 
 Status Truncated(const std::string& name, const char* format, std::size_t need, std::size_t have) {
   return DataLoss("{}: truncated {}: its pixels end at byte {} of {}", name, format, need, have);
 }
 
-// How many colours stb_image reads of a BMP's palette. Headers of 12 bytes have 3 bytes a colour,
-// of which it leaves some out.
+// Number of colours that stb_image reads of a BMP's palette. With 12-byte headers a colour has 3
+// bytes, and it skips some colours.
 std::size_t ColorsOfBmp(std::size_t offset, std::size_t header) {
   const std::size_t before = header == 12 ? 14 + 24 : 14 + header;
   return offset < before ? 0 : (offset - before) / (header == 12 ? 3 : 4);
@@ -153,7 +153,7 @@ Status CheckBmp(ByteSpan bytes, std::size_t width, std::size_t height, const std
   const std::size_t end = offset + (height - 1) * row + used;
   if (end > bytes.size()) return Truncated(name, "BMP", end, bytes.size());
   const std::size_t colors = ColorsOfBmp(offset, header);
-  // stb_image takes no other numbers of bits with a palette.
+  // stb_image supports no other bit depths with a palette.
   if ((bits != 1 && bits != 4 && bits != 8) || colors >= std::size_t{1} << bits) return {};
   for (std::size_t y = 0; y < height; ++y) {
     for (std::size_t x = 0; x < width; ++x) {
@@ -167,7 +167,7 @@ Status CheckBmp(ByteSpan bytes, std::size_t width, std::size_t height, const std
   return {};
 }
 
-// Packets of a head and 1 or as many pixels as it says; they may cross rows.
+// Packets of a head and one pixel, or as many as it says; they may cross rows.
 std::size_t EndOfPackets(ByteSpan bytes, std::size_t at, std::size_t pixels,
                          std::size_t pixel_bytes) {
   while (pixels > 0 && at < bytes.size()) {
@@ -238,7 +238,7 @@ std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
       Bytes out(bytes.begin(), bytes.end());
       out.insert(out.begin() + static_cast<std::ptrdiff_t>(at + 8 + length), kFull - length, 0);
       out[at + 2] = kFull >> 8;
-      out[at + 3] = kFull & 0xff;  // stb_image looks at no checksum
+      out[at + 3] = kFull & 0xff;  // stb_image ignores checksums
       return out;
     }
     at += kFrame + length;

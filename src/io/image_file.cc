@@ -23,7 +23,7 @@
 #define STBI_NO_PIC
 #define STBI_NO_PNM
 #define STBI_NO_PSD
-// Cleared: what a broken file leaves out is black, not what was in memory before.
+// Cleared: missing parts of a broken file become black instead of uninitialised memory.
 #define STBI_MALLOC(size) std::calloc(1, size)
 #define STBI_REALLOC(block, size) std::realloc(block, size)
 #define STBI_FREE(block) std::free(block)
@@ -44,7 +44,7 @@ namespace {
 
 using ByteSpan = std::span<const std::uint8_t>;
 
-// `count` bytes from `at`, or nothing if they are not there.
+// `count` bytes from `at`, or empty if they are out of range.
 ByteSpan Part(ByteSpan bytes, std::size_t at, std::size_t count) {
   return at <= bytes.size() && count <= bytes.size() - at ? bytes.subspan(at, count) : ByteSpan();
 }
@@ -54,7 +54,7 @@ bool Is(ByteSpan bytes, std::string_view text) {
                                                    [](int a, char c) { return a == (c & 0xff); });
 }
 
-// Of a TIFF header with its first directory (TIFF 6.0, section 2).
+// The orientation in a TIFF header with its first directory (TIFF 6.0, section 2).
 int OrientationOfTiff(ByteSpan tiff) {
   constexpr std::uint32_t kTag = 274, kShort = 3;
   constexpr std::size_t kEntry = 12;
@@ -126,8 +126,8 @@ int OrientationOfWebp(ByteSpan bytes) {
   return 1;
 }
 
-// No format packs more bytes of pixels into a byte of file: deflate reaches 1,032, and a PNG with
-// one bit a pixel and a palette unpacks each of those bytes to 8 pixels of 3 bytes: 24,768.
+// The largest ratio of pixel bytes to file bytes of any format: deflate reaches 1,032, and a PNG
+// with one bit per pixel and a palette unpacks each of those bytes to 8 pixels of 3 bytes: 24,768.
 constexpr std::size_t kMaxInflation = 32768;
 
 Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& name) {
@@ -141,7 +141,7 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
     return DataLoss("{}: not an image that can be read (PNG, JPEG, WebP, BMP, TGA, PNM, SGI): {}",
                     name, stbi_failure_reason());
   }
-  if (height < 0 && height >= -kMaxImageSide) height = -height;  // a BMP with its first row on top
+  if (height < 0 && height >= -kMaxImageSide) height = -height;  // a BMP stored top row first
   TILEGRAD_TRY(CheckImageSize(width, height, name));
   const std::size_t unpacked = static_cast<std::size_t>(width) * height * channels;
   if (unpacked / kMaxInflation > bytes.size()) {
@@ -171,7 +171,7 @@ Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::stri
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   if (IsPnm(bytes)) return DecodePnm(bytes, name);
   if (IsSgi(bytes)) return DecodeSgi(bytes, name);
-  TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
+  TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees the file
   const auto padded = WithFullPalette(bytes);
   return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
 }
@@ -189,7 +189,7 @@ ImageU8 Upright(ImageU8 image, int orientation) {
   const bool turned = orientation >= 5;  // rows become columns
   const int w = image.width, h = image.height;
   ImageU8 out(turned ? h : w, turned ? w : h, image.channels);
-  // Where the stored image is read backwards, along its own rows and columns.
+  // Whether the stored image is read backwards along its rows and columns.
   const bool back_x = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
   const bool back_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
   for (int y = 0; y < out.height; ++y) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files: PNG, JPEG, BMP, TGA by stb_image, WebP by libwebp, binary PGM and PPM and SGI in;
-// PNG out.
+// Image files. Reads PNG, JPEG, BMP, TGA (stb_image), WebP (libwebp), binary PGM and PPM, SGI;
+// writes PNG.
 #pragma once
 
 #include <span>
@@ -12,24 +12,24 @@
 
 namespace tilegrad::io {
 
-// Pixels; a larger header is refused before any memory is taken.
+// Pixels; larger headers are refused before allocation.
 inline constexpr int kMaxImageSide = 16384;
 
-// How to turn an image upright: cameras store the sensor's rows and say it in a tag (Exif 2.32,
-// 4.6.4, tag 274). 1 to 8, of a JPEG's Exif segment, a PNG's eXIf or a WebP's EXIF chunk; 1,
-// upright, where there is none or it makes no sense. `bytes` may be anything.
+// The Exif orientation (Exif 2.32, 4.6.4, tag 274) of stored pixels: 1 to 8, from a JPEG's Exif
+// segment, a PNG's eXIf or a WebP's EXIF chunk; 1, upright, if missing or invalid. `bytes` may be
+// anything.
 int OrientationOf(std::span<const std::uint8_t> bytes);
 
-// The image turned and mirrored so that it is upright. `orientation` is 1 to 8.
+// Rotates and mirrors the image so that it is upright. `orientation` is 1 to 8.
 ImageU8 Upright(ImageU8 image, int orientation);
 
-// 1 to 4 channels as in the file (16-bit files are reduced to 8; CMYK becomes RGB). `name` stands
-// in error messages. DecodeImage, of what other files hold, reads no WebP, and is kCancelled where
-// they are not to be read on (StopGuardedBy).
+// 1 to 4 channels as in the file (16-bit files become 8-bit, CMYK becomes RGB). Messages call the
+// file `name`. DecodeImage, for images embedded in other files, reads no WebP and returns
+// kCancelled once StopGuardedBy's flag is set.
 Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
 Result<ImageU8> LoadImage(const Path& path);
 
-// As its file stores it, in which programs count pixels that ignore the tag, and how to turn it.
+// The stored pixels, whose coordinates programs use that ignore the tag, and the orientation.
 struct StoredImage {
   ImageU8 image;
   int orientation = 1;
@@ -39,22 +39,22 @@ Result<StoredImage> LoadStoredImage(const Path& path);
 // 3 or 4 channels: grey becomes RGB, grey with alpha RGBA.
 ImageU8 ToColor(ImageU8 image);
 
-// 1 to 4 channels, 8 bits. SavePng appears whole or not at all.
+// 1 to 4 channels, 8 bits. SavePng is atomic.
 Result<Bytes> EncodePng(const ImageU8& image);
 Status SavePng(const Path& path, const ImageU8& image);
 
-// Pictures that are looked for in a folder, rather than named.
+// Pictures found in a folder rather than named.
 
-// By the endings of their names; sorted.
+// By file name extension; sorted.
 struct PictureNames {
   std::vector<Path> read;    // PNG, JPEG and WebP
-  std::vector<Path> others;  // formats that cameras and programs write, and that are not read
+  std::vector<Path> others;  // unsupported formats of cameras and programs
 
-  // "2 pictures not in PNG, JPEG or WebP: a.heic, b.tif"; empty where there are none.
+  // "2 pictures not in PNG, JPEG or WebP: a.heic, b.tif"; empty if there are none.
   std::string DescribeOthers() const;
 };
 
-// Empty if there is no such folder.
+// Empty if the folder does not exist.
 PictureNames PicturesIn(const Path& folder);
 
 }  // namespace tilegrad::io

@@ -25,7 +25,7 @@ class PnmHeader {
 
   Result<int> Number() {
     PassSpace();
-    constexpr int kMost = 100'000'000;  // no image has as many; ten times that is still an int
+    constexpr int kMost = 100'000'000;  // beyond any image; ten times that still fits an int
     const std::size_t begin = at_;
     int value = 0;
     for (; at_ < bytes_.size() && bytes_[at_] >= '0' && bytes_[at_] <= '9'; ++at_) {
@@ -54,7 +54,7 @@ class PnmHeader {
 
   ByteSpan bytes_;
   const std::string& name_;
-  std::size_t at_ = 2;  // behind "P5"
+  std::size_t at_ = 2;  // after "P5"
 };
 
 std::uint8_t Scale(int sample, int most) {
@@ -130,7 +130,7 @@ class SgiReader {
   }
 
  private:
-  static constexpr std::size_t kTableEntry = 8;  // a row's place and length, of 4 bytes each
+  static constexpr std::size_t kTableEntry = 8;  // a row's offset and length, 4 bytes each
 
   // Rows are stored channel by channel, each from the bottom up.
   std::uint8_t* Target(std::size_t row, std::size_t x) {
@@ -158,8 +158,8 @@ class SgiReader {
                     row / height, what);
   }
 
-  // Packets of one number whose low 7 bits count: 0 ends the row; with bit 7 as many samples
-  // follow, else one that is repeated.
+  // Packets start with a number whose low 7 bits are a count: 0 ends the row; with bit 7 set that
+  // many samples follow, else one sample to repeat.
   Status ReadRuns(std::size_t row) {
     const std::size_t at = BigEndian(bytes_.subspan(kHeaderBytes + 4 * row, 4)),
                       length = BigEndian(bytes_.subspan(kHeaderBytes + 4 * (rows_ + row), 4));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras in JSON, read and written: NeRF's transforms.json, and OpenCV's numbers.
+// Reads and writes cameras in JSON: NeRF's transforms.json, and OpenCV parameters.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,8 +23,8 @@ namespace {
 
 using nlohmann::json;
 
-// A frame of the file, and what stands around it. What the frame omits is taken from the top level.
-// null is as good as nothing. Errors begin with `place`.
+// A frame of the file with its top level, from which it inherits what it omits. null counts as
+// absent. Errors begin with `place`.
 struct JsonFrame {
   const json& frame;
   const json& top;
@@ -39,7 +39,7 @@ struct JsonFrame {
     return own != nullptr ? own : FindIn(top, key);
   }
   Result<double> Number(const char* key) const;
-  // Of rows or flat.
+  // Nested by rows or flat.
   Result<std::vector<double>> Numbers(const char* key) const;
   template <std::size_t N>
   Result<std::array<double, N>> Array(const char* key) const {
@@ -50,9 +50,9 @@ struct JsonFrame {
     std::copy(numbers.begin(), numbers.end(), out.begin());
     return out;
   }
-  // Of the image; 0 x 0 if neither is there.
+  // Of the image; 0 x 0 if both are absent.
   Result<ImageSize> Size(const char* width, const char* height) const;
-  // The frame's own; nothing where that is no text.
+  // The frame's own; nullopt if it is no text.
   std::optional<std::string> Text(const char* key) const;
 };
 
@@ -105,7 +105,7 @@ Result<json> ParseJsonObject(const std::string& text, const Path& file) {
   return parsed;
 }
 
-// Its "frames", or the whole where there are none.
+// Its "frames", or the file itself if there are none.
 Result<std::vector<JsonFrame>> JsonFrames(const json& top, const Path& file) {
   const json* frames = JsonFrame::FindIn(top, "frames");
   if (frames == nullptr) return std::vector<JsonFrame>{{top, top, file.string()}};
@@ -126,7 +126,7 @@ constexpr std::array<std::string_view, 3> kFisheyeModels = {"opencv_fisheye", "r
 constexpr std::array<const char*, 2> kFisheyeFlags = {"is_fisheye", "fisheye"};
 constexpr std::array<const char*, 6> kOtherFlags = {
     "equirectangular", "latlong", "spherical", "orthographic", "is_orthographic", "is_spherical"};
-// In the order of LensDistortion. nerfstudio's k4 without a model is another one than OpenCV's.
+// In the order of LensDistortion. nerfstudio's k4 without a model differs from OpenCV's.
 constexpr std::array<const char*, 5> kBrown = {"k1", "k2", "p1", "p2", "k3"};
 constexpr std::array<const char*, 8> kFullBrown = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
 constexpr std::array<const char*, 4> kFisheye = {"k1", "k2", "k3", "k4"};
@@ -154,7 +154,7 @@ bool IsAmong(const Names& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// In small letters; empty where the file says none.
+// In lower case; empty if the file has none.
 std::string ModelOf(const JsonFrame& frame) {
   const json* model = frame.Find("camera_model");
   if (model == nullptr) return "";
@@ -173,7 +173,7 @@ Status CheckModel(const JsonFrame& frame, const std::string& model) {
   return {};
 }
 
-// Numbers of these names from `first` on, and no other coefficient.
+// Takes the numbers with these names into `first`, ...; no other coefficient may occur.
 template <class Names>
 Status TakeCoefficients(const JsonFrame& frame, const Names& names, double* first) {
   for (const char* key : names) {
@@ -191,8 +191,8 @@ Status TakeCoefficients(const JsonFrame& frame, const Names& names, double* firs
   return {};
 }
 
-// By camera_model of nerfstudio and COLMAP, the flags of instant-ngp, and the coefficients of
-// distortion. An error names the key of what is no lens of lens_distortion.h.
+// From camera_model of nerfstudio and COLMAP, the flags of instant-ngp, and the distortion
+// coefficients. An error names the key of a lens that lens_distortion.h does not support.
 Result<LensDistortion> LensOf(const JsonFrame& frame) {
   const std::string model = ModelOf(frame);
   TILEGRAD_TRY(CheckModel(frame, model));
@@ -213,7 +213,7 @@ Status ReadOptional(const JsonFrame& frame, const char* key, std::optional<doubl
   return {};
 }
 
-// Of the frame if it has any of these, else of the file.
+// Of the frame if it has any of them, else of the file.
 Status ReadFocals(const JsonFrame& frame, NerfFrame* out) {
   for (const json* level : {&frame.frame, &frame.top}) {
     const JsonFrame alone{*level, *level, frame.place};
@@ -258,7 +258,7 @@ Result<NerfFrame> ReadFrame(const JsonFrame& frame) {
   return out;
 }
 
-// Along one axis of so many pixels: given, or as an angle; nothing if neither is there.
+// Along one axis with this many pixels: given, or from an angle; nullopt if neither exists.
 Result<std::optional<double>> FocalOf(const NerfFrame& frame, char axis, int pixels) {
   const auto& focal = axis == 'x' ? frame.fl_x : frame.fl_y;
   const auto& angle = axis == 'x' ? frame.angle_x : frame.angle_y;
@@ -280,7 +280,7 @@ Result<std::vector<NerfFrame>> NerfFramesOf(const std::vector<JsonFrame>& frames
   return out;
 }
 
-// Refuses coefficients of distortion that are not 0.
+// Refuses nonzero distortion coefficients.
 Status CheckNoDistortion(const JsonFrame& frame) {
   for (const char* key : {"dist", "distCoeffs"}) {
     const json* value = frame.Find(key);
@@ -295,7 +295,7 @@ Status CheckNoDistortion(const JsonFrame& frame) {
   return {};
 }
 
-// The size that is written, or else the one that was given.
+// The size in the file, or else the given one.
 Result<ImageSize> SizeOr(Result<ImageSize> written, ImageSize given, const std::string& place,
                          const char* keys) {
   if (!written.ok() || written->width > 0) return written;
@@ -362,7 +362,7 @@ Result<std::vector<CameraView>> NerfViews(const std::vector<NerfFrame>& frames, 
   return views;
 }
 
-// As LoadCameras of a file. `file` stands in messages.
+// Like LoadCameras, for a file's text. Messages call it `file`.
 Result<std::vector<CameraView>> ReadJsonCameras(const std::string& text, const Path& file,
                                                 const CameraFileOptions& options) {
   TILEGRAD_ASSIGN(const json top, ParseJsonObject(text, file));
@@ -382,7 +382,7 @@ json Rows(const std::array<double, N>& m, std::size_t columns) {
   return rows;
 }
 
-// What the reader refuses is not written: no frames, sizes, numbers that JSON has no word for.
+// Refuses what the reader would: no frames, sizes, numbers that JSON cannot express.
 Status SaveJson(const Path& file, const json& top) {
   const std::string text = JsonText(top, 1) + "\n";
   const auto back = ReadJsonCameras(text, file, {});
@@ -405,7 +405,7 @@ Result<std::vector<NerfFrame>> ReadNerfFrames(const Path& file) {
 Result<Camera64> CameraOf(const NerfFrame& frame, ImageSize size) {
   TILEGRAD_ASSIGN(const auto x, FocalOf(frame, 'x', size.width));
   TILEGRAD_ASSIGN(const auto y, FocalOf(frame, 'y', size.height));
-  NerfCamera from;  // pixels are square where one of the two is not known
+  NerfCamera from;  // pixels are square if one of the two is unknown
   from.camera_to_world = frame.camera_to_world;
   from.fl_x = x.value_or(y.value_or(0));
   from.fl_y = y.value_or(from.fl_x);

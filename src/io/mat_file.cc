@@ -140,7 +140,7 @@ namespace {
 
 matvar_t* NewVariable(const char* name, const MatArray& array);
 
-// The library owns what it is given.
+// The library owns its arguments.
 matvar_t* NewCells(const char* name, const MatArray& array, std::vector<std::size_t> dims) {
   std::vector<matvar_t*> elements;
   for (const MatArray& element : array.elements) elements.push_back(NewVariable(nullptr, element));
@@ -173,7 +173,7 @@ matvar_t* NewNumbers(const char* name, const MatArray& array, std::vector<std::s
 
 matvar_t* NewVariable(const char* name, const MatArray& array) {
   std::vector<std::size_t> dims(array.dims.begin(), array.dims.end());
-  std::string text = array.text;  // older versions of the library want it writable
+  std::string text = array.text;  // older versions of the library require non-const
   switch (array.kind) {
     case MatKind::kCell:
       return NewCells(name, array, dims);
@@ -187,7 +187,7 @@ matvar_t* NewVariable(const char* name, const MatArray& array) {
   }
 }
 
-// The library writes to files alone, and closes them without a sync.
+// The library writes only to files, and closes them without fsync.
 Status WriteByLibrary(const Path& path, const MatVariables& variables) {
   mat_t* const file =
       Mat_CreateVer(path.c_str(), "MATLAB 5.0 MAT-file, written by tilegrad", MAT_FT_MAT5);

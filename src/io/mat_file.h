@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// MATLAB's files of versions 5 (what `save` writes up to -v6 and -v7, and scipy.io.savemat) and 7.3
-// (HDF5), as the annotations of CUB-200 and PASCAL3D+ come: in by libmatio, which runs in a process
-// of its own (guarded_process.h), and out.
+// MATLAB files of versions 5 (written by `save` up to -v6 and -v7, and by scipy.io.savemat) and 7.3
+// (HDF5), the format of the annotations of CUB-200 and PASCAL3D+. Read by libmatio in a child
+// process (guarded_process.h); also written.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,12 @@
 
 namespace tilegrad::io {
 
-// Numbers that are all 0 or 1, as masks are, take a bit each: CUB-200 has 5,964 masks in one file.
+// Arrays of only 0 and 1, such as masks, take one bit per number: CUB-200 has 5,964 masks in one
+// file.
 struct MatNumbers {
   std::uint64_t count = 0;
-  std::vector<double> values;      // of all, or
-  std::vector<std::uint8_t> bits;  // eight in each, the first the lowest
+  std::vector<double> values;      // all numbers, or
+  std::vector<std::uint8_t> bits;  // eight per byte, lowest bit first
 
   template <class Number>
   static MatNumbers Of(std::span<const Number> numbers);
@@ -34,12 +35,12 @@ enum class MatKind : std::uint8_t { kNumbers, kText, kStruct, kCell };
 
 struct MatArray {
   MatKind kind = MatKind::kNumbers;
-  std::uint8_t logical = 0;                  // 1: its numbers are truth values
-  std::vector<std::uint64_t> dims = {0, 0};  // the first varies fastest in memory
+  std::uint8_t logical = 0;                  // 1: logical (boolean) numbers
+  std::vector<std::uint64_t> dims = {0, 0};  // the first dimension varies fastest
   MatNumbers numbers;
-  std::string text;                 // UTF-8; rows of a matrix of text one after the other
+  std::string text;                 // UTF-8; rows of a text matrix are concatenated
   std::vector<std::string> fields;  // kStruct
-  // kCell: one for each place; kStruct: for each place its fields, in their order.
+  // kCell: one per place; kStruct: for each place its fields, in their order.
   std::vector<MatArray> elements;
 
   std::size_t places() const;  // the product of dims
@@ -61,26 +62,26 @@ struct MatFile {
   MatVariables variables;
 };
 
-// Numbers, text, structs and cells of any depth up to 16; other variables (sparse, objects,
-// functions) and complex numbers are errors, as are version 4 and everything that is cut off.
-// Errors name the file, and the variable where it is known. Numbers that a damaged file announces
-// and lacks may be any. Whatever the file, nothing crashes.
+// Numbers, text, structs and cells nested up to 16 deep; other variables (sparse, objects,
+// functions), complex numbers, version 4 and truncated files are errors, which name the file and,
+// if known, the variable. Numbers missing from a damaged file may be arbitrary. No file makes it
+// crash.
 Result<MatFile> LoadMat(const Path& path);
-// Between that process and this one. What comes is untrusted: the library may have gone wrong.
+// Decodes the child's output, which is untrusted: the library may have misbehaved.
 Result<MatVariables> MatFromReader(std::span<const std::uint8_t> bytes);
 Bytes MatForReader(const Result<MatVariables>& variables);
 
-// A file of version 5, packed, of variables whose elements fit their dims; whole or not at all.
-// Numbers are stored as doubles, logical ones as bytes.
+// Writes a compressed file of version 5 from variables whose elements match their dims; atomic.
+// Stores numbers as doubles, logical ones as bytes.
 Status SaveMat(const Path& path, const MatVariables& variables);
 
-// A place in a file, for who wants to know what is there. Errors name file and place:
-// "anno_train.mat: sfm_anno(12).trans: expected 2 numbers, got 3".
+// A cursor in a file, for reading with checks. Errors name file and place: "anno_train.mat:
+// sfm_anno(12).trans: expected 2 numbers, got 3".
 class MatPlace {
  public:
   static Result<MatPlace> Variable(const MatFile& file, const std::string& name);
 
-  // Of the array itself.
+  // The array itself.
   std::size_t places() const { return array_->places(); }
   const MatArray& array() const { return *array_; }
   const std::string& where() const { return where_; }
@@ -88,11 +89,11 @@ class MatPlace {
   // Field `name` of place `index` of a struct.
   Result<MatPlace> Field(std::size_t index, const std::string& name) const;
   bool HasField(const std::string& name) const;
-  // All of its numbers, which are finite; `count`: how many are expected.
+  // All numbers, which must be finite; `count` is the expected number.
   Result<std::vector<double>> Numbers(std::size_t count) const;
   Result<double> Number() const;
   Result<std::string> Text() const;  // not empty
-  // A struct, of however many places.
+  // OK for a struct with any number of places.
   Status ExpectStruct() const;
   Status ExpectSize(std::size_t rows, std::size_t columns) const;
 

@@ -43,7 +43,7 @@ struct MatVariableEnd {
 
 std::string g_complaint;  // the library's first
 
-// The type of the text differs between versions of the library.
+// The type of the message differs between versions of the library.
 constexpr auto kNoteComplaint = [](int level, auto* message) {
   if (level <= (MATIO_LOG_LEVEL_CRITICAL) && g_complaint.empty()) g_complaint = message;
 };
@@ -68,7 +68,7 @@ bool HasElements(const matvar_t& variable) {
   return variable.class_type == MAT_C_STRUCT || variable.class_type == MAT_C_CELL;
 }
 
-// What the variable will take once its data are read.
+// Memory of the variable once its data are read.
 std::size_t BytesOfVariable(const matvar_t& variable) {
   std::size_t bytes = sizeof(MatArray);
   if (!HasElements(variable))
@@ -212,8 +212,8 @@ std::uint32_t WordAt(std::span<const std::uint8_t> bytes, std::size_t at, bool s
   return swapped ? __builtin_bswap32(word) : word;
 }
 
-// How many variables a file of version 5 has. libmatio takes one that is cut off for one that ends
-// there.
+// The number of variables in a file of version 5. libmatio takes a truncated variable for the end
+// of the file.
 Result<std::size_t> CountVariables(std::span<const std::uint8_t> bytes, bool swapped) {
   constexpr std::uint32_t kCompressed = 15;
   std::size_t count = 0, at = 128;
@@ -224,7 +224,7 @@ Result<std::size_t> CountVariables(std::span<const std::uint8_t> bytes, bool swa
     if (size > bytes.size() - at - 8)
       return DataLoss("cut off: {} bytes of a variable, where {} are announced",
                       bytes.size() - at - 8, size);
-    // Plain variables are filled up to eight bytes, packed ones are not.
+    // Plain variables are padded to eight bytes, compressed ones are not.
     at += 8 + (type == kCompressed ? size : (size + 7) / 8 * 8);
   }
   return count;
@@ -247,7 +247,7 @@ Result<MatHeader> CheckHeader(std::span<const std::uint8_t> bytes) {
   return out;
 }
 
-// Counts and kinds as MatArray promises them.
+// Checks counts and kinds against the contract of MatArray.
 Status CheckArray(const MatArray& array) {
   const Status broken = DataLoss("the reader returned an array that is not whole");
   std::size_t places = 1;

@@ -20,8 +20,8 @@ bool IsWhole(glm::vec4 color) {
   return glm::all(glm::equal(rgb, glm::round(rgb)));
 }
 
-// What stands for 1. Some programs write bytes, or 16 bits, as floating point: whole numbers, and
-// not only 0 and 1, or numbers beyond all light.
+// The value that means 1. Some programs write 8 or 16 bit integers as floating point: then all
+// numbers are whole, and not only 0 and 1, or are brighter than any light.
 float FullOf(std::span<const glm::vec4> colors, float most) {
   const bool whole = std::all_of(colors.begin(), colors.end(), IsWhole);
   if (whole && most > 255) return 65535;
@@ -34,17 +34,17 @@ glm::vec4 Finished(glm::vec4 c, float full, ColorNumbers numbers) {
   return full == 1 && numbers == ColorNumbers::kLinear ? LinearToSrgb(c) : c;
 }
 
-// Files of many parts say it once.
+// Files with many parts get each warning once.
 void WarnOnce(std::string_view text, std::vector<std::string>* warnings) {
   if (std::find(warnings->begin(), warnings->end(), text) == warnings->end())
     warnings->emplace_back(text);
 }
 
-// Of a material, whose file counts colours to `full`.
+// Converts a material, whose file scales colours to `full`.
 void FinishMaterial(ColorNumbers numbers, float full, Material& material,
                     std::vector<std::string>* warnings) {
   const glm::vec4 c = material.base_color;
-  if (Most(c) <= 1) full = 1;  // 1 is no shade of black
+  if (Most(c) <= 1) full = 1;  // 1 is not meant as near black
   if (Most(c) > 1 + 1e-3f) {
     warnings->push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is {}", material.name,
                                     c.r, c.g, c.b, full > 1 ? "read as 0 to 255" : "cut to 1"));

@@ -24,8 +24,8 @@ struct Format {
   std::string_view endings;  // each between spaces
   Result<LoadedMesh> (*read)(const FileSource& source, const std::string& name);
 };
-// Assimp's importers run in a process of their own; the list holds those that read a sound file
-// right (tests/io/assimp_formats_test.cc).
+// Assimp's importers run in child processes; the list has those that read sound files correctly
+// (tests/io/assimp_formats_test.cc).
 constexpr Format kFormats[] = {
     {" .glb .gltf ", ReadGltf},
     {" .obj ", ReadObj},
@@ -47,7 +47,7 @@ std::string Folder(const std::string& name) {
   return slash == std::string::npos ? "" : name.substr(0, slash + 1);
 }
 
-// Files have many parts of few materials: the last one is dropped if it equals one before it.
+// Files have many parts with few materials: drops the last one if it equals an earlier one.
 void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   const Material& last = mesh.materials.back();
   const auto found = std::find(mesh.materials.begin(), mesh.materials.end() - 1, last);
@@ -72,14 +72,14 @@ glm::vec3 UnitOr(glm::vec3 normal, glm::vec3 fallback) {
   return length > 0 ? glm::vec3(n / length) : fallback;
 }
 
-// Normals follow from the surface: one that is no number costs nobody the mesh.
+// Normals follow from the surface, so a non-finite one is no reason to refuse the mesh.
 void DropNonFiniteNormals(LoadedMesh& loaded) {
   bool dropped = false;
   for (auto* normals :
        {&loaded.mesh.normals, &loaded.mesh.corner_normals, &loaded.tables.normals}) {
     for (glm::vec3& normal : *normals) {
       if (std::isfinite(normal.x) && std::isfinite(normal.y) && std::isfinite(normal.z)) continue;
-      normal = glm::vec3(0);  // MakeNormalsUnit puts the surface's own there
+      normal = glm::vec3(0);  // MakeNormalsUnit replaces it by the surface's own
       dropped = true;
     }
   }
@@ -106,7 +106,7 @@ struct ExactBounds {
   double farthest(int axis) const { return std::max(std::abs(low[axis]), std::abs(high[axis])); }
 };
 
-// Indices are not checked yet.
+// Indices are not validated yet.
 template <class Use>
 void EachUsed(const LoadedMesh& loaded, Use use) {
   for (const Face& face : loaded.mesh.faces) {
@@ -130,8 +130,8 @@ double FloatStep(double value) {
   return std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
 }
 
-// The steps in which the coordinates of an axis come, if all are numbers of float's precision, of
-// which the mesh spans too few; else 0. Text with few digits gives such numbers, too.
+// The step between the coordinates of an axis, if all are numbers of float precision that is too
+// coarse for the mesh; else 0. Text with few digits also gives such numbers.
 double CoarseStep(const LoadedMesh& loaded, const ExactBounds& bounds, int axis) {
   const double step = FloatStep(bounds.farthest(axis));
   if (step * kTooCoarse <= bounds.size()) return 0;
@@ -141,7 +141,7 @@ double CoarseStep(const LoadedMesh& loaded, const ExactBounds& bounds, int axis)
     floats = floats && static_cast<double>(static_cast<float>(p[axis])) == p[axis];
     if (floats && values.size() < 2 * kTooCoarse) values.insert(p[axis]);
   });
-  if (!floats || values.size() < 3) return 0;  // two values, as of a box, say nothing about steps
+  if (!floats || values.size() < 3) return 0;  // two values, as of a box, do not show a step
   double least = std::numeric_limits<double>::infinity();
   for (auto at = values.begin(); at != values.end() && std::next(at) != values.end(); ++at)
     least = std::min(least, *std::next(at) - *at);
@@ -165,7 +165,7 @@ void WarnOfSteps(LoadedMesh& loaded, const ExactBounds& bounds, const glm::dvec3
                   Point(origin), axes, step, bounds.size()));
 }
 
-// A round point near the middle, so that subtracting it leaves round numbers round.
+// A round point near the centre, so that subtracting it keeps round numbers round.
 glm::dvec3 OriginFor(const ExactBounds& bounds) {
   const double unit = std::exp2(std::ceil(std::log2(bounds.size())));
   return unit * glm::round((0.5 * bounds.low + 0.5 * bounds.high) / unit);
@@ -178,10 +178,10 @@ void MoveCameras(LoadedMesh& loaded) {
   }
 }
 
-// Sets the mesh's positions from `exact`, which it takes. Where the mesh is farther from the origin
-// than 256 times its size, float would keep less than 16 bits of its shape: a point near its middle
-// is subtracted before, from cameras too, becomes `origin`, and is a warning. Coordinates that come
-// in steps which the file's own precision is too low for are another.
+// Sets the mesh's positions from `exact`, which it consumes. If the mesh is farther from the origin
+// than 256 times its size, float would keep less than 16 bits of its shape: then subtracts a point
+// near its centre first, from cameras too, stores it in `origin`, and warns. Also warns of
+// coordinates in steps due to the file's own low precision.
 void PlaceNearOrigin(LoadedMesh& loaded) {
   const ExactBounds bounds = BoundsOf(loaded);
   const double farthest = std::max({bounds.farthest(0), bounds.farthest(1), bounds.farthest(2)});
@@ -249,7 +249,7 @@ int AddTextureFile(const FileSource& source, const std::optional<std::string>& f
     out.lost_appearance.push_back(NotFound("{}: no such texture", image_name));
     return -1;
   }
-  // Not by name: an image inside the mesh may have the same one.
+  // Not by name alone: an image inside the mesh may have the same one.
   const std::string key = NormalizeName(*file).value_or(*file);
   const auto [known, added] = out.texture_of_file.try_emplace(key, -1);
   if (!added) return known->second;
@@ -272,7 +272,7 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
   }
   TILEGRAD_TRY(ReadBudget::Take(BytesOf(part), "vertices and faces"));
   out.exact.insert(out.exact.end(), exact.begin(), exact.end());
-  // Until PlaceNearOrigin, positions only serve for normals of parts without any: small numbers,
+  // Until PlaceNearOrigin, positions only serve for missing normals of parts: small numbers,
   // however far away.
   const glm::dvec3 near = part.faces.empty() ? glm::dvec3(0) : exact[part.faces[0][0]];
   for (std::size_t v = 0; v < exact.size(); ++v) part.positions[v] = glm::vec3(exact[v] - near);
@@ -346,7 +346,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   auto loaded = format->read(source, name);
   if (GuardedMustStop()) return Cancelled("{}: stopped while it was read", place);
   TILEGRAD_TRY(watch.Check(place));
-  TILEGRAD_TRY(budget.status().Within(place));  // also where a texture was left out
+  TILEGRAD_TRY(budget.status().Within(place));  // even if a texture was dropped
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   loaded->texture_of_file.clear();
@@ -366,7 +366,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
 Result<LoadedMesh> LoadMesh(const Path& path) {
   if (IsFolder(path))
     return InvalidArgument("{}: is a folder; name a mesh file in it", path.string());
-  // The source begins one folder above the mesh's: textures often lie in "../images".
+  // The source starts one folder above the mesh's: textures often are in "../images".
   Path folder = path.parent_path();
   const Path last = folder.filename();
   if (last.empty() || last == "." || last == "..") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: what mesh_file.cc dispatches to, and what the readers share.
+// Internal to io: the readers that mesh_file.cc dispatches to, and what they share.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -16,11 +16,11 @@
 
 namespace tilegrad::io {
 
-// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
-// many corners still have 32-bit indices.
+// Limit for vertices and for faces: 2^26 faces with all attributes take about 6 GB, and three times
+// as many corners still have 32-bit indices.
 inline constexpr std::size_t kMaxMeshElements = std::size_t{1} << 26;
 
-// All leave positions in LoadedMesh::exact, and validation to mesh_file.cc.
+// Leave positions in LoadedMesh::exact, and validation to mesh_file.cc.
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
@@ -28,40 +28,40 @@ Result<LoadedMesh> ReadAc3d(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name);
 
-// The same of a file that is read already, with limits other than those that suit its size.
+// The same for a file already read, with limits other than those derived from its size.
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
                                 const Bytes& file, const GuardLimits& limits);
 
-// What Assimp does not tell of an FBX file, text or binary: whether some texture does not repeat;
-// its WrapModeU or WrapModeV is not 0. Of damaged files anything, but nothing outside of `file` is
-// read.
+// What Assimp does not report about an FBX file, text or binary: whether a texture clamps (its
+// WrapModeU or WrapModeV is not 0). For damaged files the answer is arbitrary, but reads stay in
+// `file`.
 bool HasClampedFbxTexture(std::span<const std::uint8_t> file);
 
-// The ending of a file name in lower case, with its point.
+// The lower-case extension of a file name, with its dot.
 std::string MeshEnding(const std::string& name);
 
-// A polygon of a file on its way into a mesh; kept by readers as scratch.
+// A polygon being read from a file; readers keep it as scratch.
 struct Polygon {
   std::vector<std::int32_t> corners;  // vertices of the mesh
-  std::vector<Face> triangles;        // set by AddTo: positions in `corners`
+  std::vector<Face> triangles;        // set by AddTo: indices into `corners`
 
-  // Adds its triangles (scene/mesh.h) to the faces.
+  // Adds its triangles (scene/mesh.h: TriangulatePolygon) to the faces.
   void AddTo(LoadedMesh& out);
 
  private:
   std::vector<glm::vec3> positions_;
 };
 
-// For warnings: up to eight names in quotes, and how many more there are.
+// For warnings: up to eight names in quotes, and the number of the rest.
 std::string ShortList(const std::set<std::string, std::less<>>& names);
 
-// A file that a mesh file mentions: as written beside the mesh, then by its base name there, which
-// helps absolute paths of another computer; then the same with "%20" and the like decoded, as some
-// exporters write names. Its name in the source, or nothing.
+// Resolves a file that a mesh file mentions: as written, relative to the mesh, then by its base
+// name there, which helps with absolute paths from another computer; then both percent-decoded,
+// since some exporters write "%20". Returns its name in the source, or nullopt.
 std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
                                       std::string_view mentioned);
 
-// The same where the format says that it is a URI: decoded first, then as written.
+// The same for formats that specify URIs: decoded first, then as written.
 std::optional<std::string> FindByUri(const FileSource& source, const std::string& mesh_name,
                                      std::string_view uri);
 
@@ -70,45 +70,45 @@ std::optional<std::string> FindByUri(const FileSource& source, const std::string
 int AddTexture(const FileSource& source, const std::string& mesh_name,
                const std::string& image_name, LoadedMesh& out);
 
-// The same of a file of the source, each of which becomes one texture; nothing: it was not found.
-// `image_name` is the texture's, and stands in warnings.
+// The same for a file of the source (nullopt: not found); each file becomes one texture. Warnings
+// call the texture `image_name`.
 int AddTextureFile(const FileSource& source, const std::optional<std::string>& file,
                    const std::string& image_name, LoadedMesh& out);
 
 // The same for an image that is already in memory.
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
 
-// Adds a part whose only material is `material`, which refers to textures that are already in
-// out.mesh. `exact`: its positions in the scene, one for each vertex. An error if the whole becomes
-// too large: a small file can place one part many times.
+// Appends a part whose only material is `material`, which refers to textures already in out.mesh.
+// `exact`: its positions in the scene, one per vertex. An error if the mesh becomes too large: a
+// small file can place one part many times.
 Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
                           std::span<const glm::dvec3> exact);
 
-// The same of a part whose vertices are in out.mesh already, from number `first` on.
+// The same for a part whose vertices are already in out.mesh, from index `first` on.
 Status AppendFacesWithMaterial(const Mesh& part, std::int32_t first, const Material& material,
                                LoadedMesh& out);
 
-// Internal to io: colours of vertices, corners and materials as files have them.
+// Internal to io: colours of vertices, corners and materials in files.
 
-// What fractions between 0 and 1 mean: light, as in glTF, or what is shown (sRGB).
+// The encoding of colours in [0, 1]: linear light, as in glTF, or sRGB.
 enum class ColorNumbers { kLinear, kShown };
 
-// Of what has none beside others that have one: white, whatever those are counted to.
+// For elements without a colour beside others with one: white at any scale.
 inline constexpr glm::vec4 kNoColor(1, 1, 1, -1);
 
 bool IsFinite(const glm::vec4& color);
 
-// Makes colours of vertices or corners sRGB from 0 to 1. What is counted to 255 or 65535, as nobody
-// counts light, is divided; what is more than 1 is cut; each with a warning. Colours that are
-// finished stay as they are.
+// Converts vertex or corner colours to sRGB in [0, 1]. Divides values scaled to 255 or 65535, which
+// are sRGB in any case, and clamps values above 1; each with a warning. Leaves finished colours as
+// they are.
 void FinishColors(ColorNumbers numbers, std::vector<glm::vec4>* colors,
                   std::vector<std::string>* warnings);
 
-// The same of all materials, once each.
+// The same for all materials, once each.
 void FinishMaterials(ColorNumbers numbers, LoadedMesh& loaded);
 
-// A warning if colours of vertices or faces have an alpha below 1 that nothing draws, because all
-// materials are opaque.
+// Warns if vertex or face colours have an alpha below 1 without effect because all materials are
+// opaque.
 void WarnOfTransparentColors(LoadedMesh& loaded);
 
 }  // namespace tilegrad::io

@@ -43,7 +43,7 @@ struct NpyHeader {
   std::vector<std::size_t> shape;
 };
 
-// The text after 'key': in a dictionary literal; the writer's spacing is not relied upon.
+// The text after 'key': in a dictionary literal, for any spacing.
 std::optional<std::string_view> HeaderValue(std::string_view dictionary, std::string_view key) {
   for (const char quote : {'\'', '"'}) {
     const std::string quoted = quote + std::string(key) + quote;
@@ -89,7 +89,7 @@ std::optional<NpyHeader> ParseHeader(std::string_view text) {
   return NpyHeader{std::string(descr->substr(1, close - 1)), fortran, *dims};
 }
 
-// Splits magic, version and header length off; returns the header text and where data begins.
+// Splits off magic, version and header length; returns the header text and the offset of the data.
 std::optional<std::pair<std::string_view, std::size_t>> SplitHeader(
     std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -118,7 +118,7 @@ Result<NpyType> FindType(const std::string& descr, const std::string& name) {
       name, descr);
 }
 
-// Product of the shape times the element size, or nothing on overflow.
+// Product of the shape times the element size; nullopt on overflow.
 std::optional<std::size_t> ByteCount(const std::vector<std::size_t>& shape, std::size_t element) {
   std::size_t bytes = element;
   for (std::size_t n : shape) {
@@ -160,7 +160,7 @@ Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::strin
   if (!split) return DataLoss("{}: not a .npy array (bad magic, version or header length)", name);
   const auto header = ParseHeader(split->first);
   if (!header) return DataLoss("{}: the .npy header cannot be read: {}", name, split->first);
-  const bool halves = header->descr == "<f2";  // read as what has their size
+  const bool halves = header->descr == "<f2";  // validated as the type of the same size
   TILEGRAD_ASSIGN(const NpyType type, FindType(halves ? "<u2" : header->descr, name));
   const auto data = bytes.subspan(split->second);
   const auto wanted = ByteCount(header->shape, NpyTypeSize(type));
@@ -249,8 +249,8 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 65535;  // of a zip entry: its length has 16 bits
 
-// A zip entry's name ends at a NUL, and readers look for "a/b" where a name is "a/./b": such an
-// array would be lost, as one of a name that is cut.
+// A zip entry's name ends at a NUL, and readers look for "a/b" if a name is "a/./b": such an array
+// would be lost, as would one with a truncated name.
 Status CheckArrayName(const std::string& name, const Path& path) {
   const std::size_t bytes = EntryName(name).size();
   if (bytes > kMostNameBytes) {

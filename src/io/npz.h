@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NumPy's .npy and .npz: typed arrays in and out.
+// Reads and writes NumPy's .npy and .npz: typed arrays.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ struct NpyArray {
   Bytes data;  // little-endian; size = product of shape * NpyTypeSize(type)
 
   std::size_t count() const { return data.size() / NpyTypeSize(type); }
-  // A copy as T; an error that says what the array is if it has another type (bool reads as uint8).
+  // A copy as T; if the array has another type, an error that describes it (bool reads as uint8).
   template <class T>
   Result<std::vector<T>> As() const;
 };
@@ -57,24 +57,24 @@ Result<std::vector<T>> NpyArray::As() const {
   return std::vector<T>(begin, begin + data.size() / sizeof(T));
 }
 
-// Versions 1 to 3 of the format; Fortran order is converted, and float16 becomes float32. Sizes are
-// checked against the data before memory is taken; big-endian and object arrays are refused. `name`
-// stands in messages.
+// Versions 1 to 3 of the format; converts Fortran order to C order, and float16 to float32. Checks
+// sizes against the data before allocating; refuses big-endian and object arrays. Messages call the
+// file `name`.
 Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::string& name);
 Bytes EncodeNpy(const NpyArray& array);
 Result<NpyArray> LoadNpy(const Path& path);
 
-// Of float32 or float64; `name` stands in the error for other types.
+// float32 or float64 numbers; for other types an error that names `name`.
 Result<std::vector<double>> NumbersOf(const NpyArray& array, const std::string& name);
 
 using NpzArrays = std::map<std::string, NpyArray>;
 Result<NpzArrays> LoadNpz(const Path& path);
-// One array; an error that lists what is there if `name` is not.
+// One array; if there is no `name`, an error that lists the arrays.
 Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name);
-// The same of a file in memory; `place` stands for it in messages.
+// The same for a file in memory; messages call it `place`.
 Result<NpyArray> DecodeNpzArray(const Bytes& npz, const std::string& place,
                                 const std::string& name);
-// Compressed, whole or not at all; the same arrays give the same bytes. One array at least.
+// Compressed, atomic; the same arrays give the same bytes. At least one array.
 Status SaveNpz(const Path& path, const NpzArrays& arrays);
 
 }  // namespace tilegrad::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wavefront OBJ with MTL: the file's vertices in the file's order, once each; uv and normals of
-// corners; a material is a property of a face.
+// Wavefront OBJ with MTL: the file's vertices in its order, once each; per-corner uvs and normals;
+// per-face materials.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <map>
@@ -21,7 +21,8 @@ class ObjLibraries {
   ObjLibraries(const FileSource& source, const std::string& obj_name, LoadedMesh& out)
       : source_(source), obj_name_(obj_name), out_(out) {}
 
-  // What follows mtllib: names, between spaces or quotes, or one that contains spaces.
+  // Reads the argument of mtllib: names, separated by spaces or quotes, or one that contains
+  // spaces.
   Status Read(std::string_view names) {
     if (const auto whole = Find(WholeName(names))) return ReadFile(*whole);
     std::string missing;
@@ -37,7 +38,7 @@ class ObjLibraries {
     return {};
   }
 
-  // Nothing if no library has it.
+  // Null if no library has it.
   const MtlMaterial* Get(const std::string& name) const {
     for (const auto& [map, key] :
          {std::pair(&materials_, name), std::pair(&materials_, std::string(WithoutComment(name))),
@@ -47,7 +48,7 @@ class ObjLibraries {
     return nullptr;
   }
 
-  // The only material of all libraries, or nothing.
+  // The only material of all libraries, or null.
   const MtlMaterial* Only() const {
     return materials_.size() == 1 ? &materials_.begin()->second : nullptr;
   }
@@ -62,7 +63,7 @@ class ObjLibraries {
     return FindBeside(source_, obj_name_, name);
   }
 
-  // Takes the longest name off the front that is a file's, or one word that is none.
+  // Takes the longest prefix that is a file's name, or else one word.
   std::optional<std::string> TakeName(std::string_view& names, std::string_view& name) const {
     constexpr int kMostWords = 16;
     const std::string_view all = names;
@@ -179,7 +180,7 @@ class ObjAssembly {
     return found->second = {place, from.image.scale, from.image.offset, textured};
   }
 
-  // Of faces before any usemtl: nothing, unless there is no choice.
+  // For faces before any usemtl: null, unless there is only one material.
   const MtlMaterial* Unnamed(const ObjLibraries& libraries) {
     const MtlMaterial* const only = from_.materials.empty() ? libraries.Only() : nullptr;
     if (const auto names = libraries.Names(); !names.empty()) {
@@ -206,8 +207,7 @@ class ObjAssembly {
     const std::string image(whole ? from.image.name : WithoutComment(from.image.name));
     material.base_color_texture = AddTexture(source_, name_, image, out_);
     material.wrap.fill(from.image.clamp ? TextureWrap::kClamp : TextureWrap::kRepeat);
-    // With a texture, Kd is often left black or grey by exporters; the image alone is what people
-    // meant.
+    // With a texture, exporters often leave Kd black or grey; use the image alone.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.opacity};
     return material;
   }
@@ -233,7 +233,7 @@ class ObjAssembly {
     face_uvs_.push_back(index);
   }
 
-  // A normal of no length becomes the surface's own (mesh_file.cc).
+  // A zero normal is replaced by the surface's own (mesh_file.cc).
   void AddNormal(std::int32_t index) {
     out_.mesh.corner_normals.push_back(index < 0 ? glm::vec3(0) : from_.normals[index]);
     face_normals_.push_back(index);

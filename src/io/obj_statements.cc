@@ -15,18 +15,18 @@
 namespace tilegrad::io {
 namespace {
 
-// Walks over statements: comments and empty lines are left out, lines that end with a backslash are
-// joined with the next one. Lines end with \n, \r\n or \r. UTF-8's byte order mark is left out.
+// Iterates over statements: skips comments and empty lines, joins a line that ends with a backslash
+// with the next one. Lines end with \n, \r\n or \r. Skips a UTF-8 byte order mark.
 class ObjLines {
  public:
   explicit ObjLines(std::string_view text) : rest_(WithoutByteOrderMark(text)) {}
 
-  // The keyword, and what follows it, without white space at the ends; valid until the next call.
+  // The keyword, and its arguments without surrounding white space; valid until the next call.
   bool Next(std::string_view& keyword, std::string_view& rest) {
     joined_.clear();
     std::string_view line;
     while (NextLine(line)) {
-      // A comment may well end with a backslash: the folder of a Windows path.
+      // A comment may end with a backslash: the folder of a Windows path.
       if (joined_.empty() && line.starts_with('#')) continue;
       if (line.ends_with('\\')) {
         joined_.append(line.substr(0, line.size() - 1)) += ' ';
@@ -64,13 +64,14 @@ class ObjLines {
 
 constexpr std::array<const char*, 3> kKindNames = {"vertex", "texture coordinate", "normal"};
 
-// Positive indices may point forward in the file, so the largest of each kind waits for the end.
+// Positive indices may refer forward in the file, so the largest of each kind is checked at the
+// end.
 struct Largest {
   std::int64_t index = 0;
   std::size_t line = 0;
 };
 
-// Names, shading and grouping, which a triangle mesh has no place for and loses nothing by.
+// Names, shading and grouping, which a triangle mesh does not need.
 bool SaysNothingAboutTriangles(std::string_view keyword) {
   constexpr std::array<std::string_view, 11> kKeywords = {
       "o", "g", "s", "mg", "lod", "bevel", "c_interp", "d_interp", "vp", "shadow_obj", "trace_obj"};
@@ -96,7 +97,7 @@ class ObjParser {
 
  private:
   Status Statement(std::string_view keyword, std::string_view rest) {
-    // Most lines are of the first two.
+    // Most lines are one of the first two.
     const char letter = keyword.size() == 1 ? keyword[0] : '\0';
     if (letter == 'v') return Vertex(rest);
     if (letter == 'f') return Face(rest);
@@ -113,7 +114,8 @@ class ObjParser {
     return {};
   }
 
-  // Up to `most` numbers, up to the end or a comment. Returns how many; -1: `bad_` is none.
+  // Reads up to `most` numbers, up to the end or a comment. Returns their count; -1: `bad_` is no
+  // number.
   int Numbers(std::string_view rest, double* values, int most, bool finite = true) {
     int count = 0;
     for (bad_ = NextToken(rest); !bad_.empty() && bad_[0] != '#' && count < most;
@@ -183,7 +185,7 @@ class ObjParser {
 
   Status LineOrPoints(std::string_view rest) {
     const std::size_t before = out.corners.size();
-    TILEGRAD_TRY(Corners(rest));  // to see that they exist
+    TILEGRAD_TRY(Corners(rest));  // checks that they exist
     out.corners.resize(before);
     lines_or_points_ = true;
     return {};
@@ -195,7 +197,7 @@ class ObjParser {
     return {};
   }
 
-  // "v/vt/vn", any of the last two left out.
+  // "v/vt/vn", the last two optional.
   Status Corner(const std::string_view whole) {
     std::string_view token = whole;
     ObjCorner corner = {-1, -1, -1};
@@ -276,7 +278,7 @@ class ObjParser {
   std::set<std::string, std::less<>> not_read_;
 };
 
-// What only other ways of lighting use.
+// Keywords for other lighting models only.
 bool IsOfOtherLighting(std::string_view keyword) {
   constexpr std::array<std::string_view, 14> kKeywords = {
       "ka", "ks", "ns", "ni", "tf",  "illum", "sharpness",
@@ -284,7 +286,7 @@ bool IsOfOtherLighting(std::string_view keyword) {
   return std::find(kKeywords.begin(), kKeywords.end(), keyword) != kKeywords.end();
 }
 
-// Options of images that are skipped, and how many words follow each.
+// Skipped options of images, with the number of their arguments.
 struct SkippedOption {
   std::string_view name;
   int least, most;     // those after `least` are numbers
@@ -337,7 +339,7 @@ class MtlParser {
                     keyword, got.substr(0, 80));
   }
 
-  // Numbers at the beginning, `most` at the most, taken off `rest`.
+  // Takes up to `most` leading numbers off `rest`.
   static int TakeNumbers(std::string_view& rest, float* values, int most) {
     int count = 0;
     for (std::string_view after = rest; count < most; rest = after) {
@@ -377,7 +379,7 @@ class MtlParser {
     return TakeNumbers(rest, &material().opacity, 1) == 1 ? Status() : Error("d", rest);
   }
 
-  // Files that have both mean the same; some write "Tr 1" beside "d 1", so d counts.
+  // Files with both mean the same; some write "Tr 1" beside "d 1", so d wins.
   Status Transparency(std::string_view rest) {
     float transparency = 0;
     if (TakeNumbers(rest, &transparency, 1) != 1) return Error("Tr", rest);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Geomview's OFF and COFF as text: a line of counts, a line a vertex, a line a face.
+// Geomview's OFF and COFF as text: a line of counts, a line per vertex, a line per face.
 #include <algorithm>
 
 #include "base/error.h"
@@ -32,8 +32,8 @@ struct OffCounts {
   bool colors = false;
 };
 
-// "OFF" or "COFF", and the counts in the same line or the next one; some writers leave out the
-// space between ("OFF490 518 0").
+// "OFF" or "COFF", and the counts on the same line or the next one; some writers omit the space
+// between ("OFF490 518 0").
 Result<OffCounts> ReadCounts(OffFile& file) {
   std::string_view line;
   if (!file.Next(line)) return DataLoss("{}: empty", file.place);
@@ -48,7 +48,7 @@ Result<OffCounts> ReadCounts(OffFile& file) {
     return file.Error("the counts are missing");
   if (!ParseNumber(NextToken(line), counts.vertices) || !ParseNumber(NextToken(line), counts.faces))
     return file.Error("expected the numbers of vertices and faces");
-  // Three characters a vertex or face are the least: "0 0 0" and "3 0 1 2" take more.
+  // A vertex or face takes at least three characters: "0 0 0" and "3 0 1 2" take more.
   const std::size_t most = file.lines.Rest().size() / 3;
   if (counts.vertices > most || counts.faces > most) {
     return file.Error(fmt::format("{} vertices and {} faces are more than the file can hold",
@@ -57,11 +57,11 @@ Result<OffCounts> ReadCounts(OffFile& file) {
   return counts;
 }
 
-// Colours of vertices or of faces. Integers count from 0 to 255, unless they are 0 or 1, in files
-// that have fractions, too, or nothing beyond 1.
+// Colours of vertices or of faces. Integers range from 0 to 255, except in colours of only 0 and 1
+// in files that also have fractions or nothing above 1.
 class OffColors {
  public:
-  // What ends a line. False if that is neither nothing nor three or four numbers.
+  // Reads the rest of a line. False unless it is empty or three or four numbers.
   bool Add(std::string_view rest) {
     glm::vec4 color(1);
     bool fractions = false, good = true;
@@ -82,7 +82,7 @@ class OffColors {
     return true;
   }
 
-  // One a line, white where others have one; nothing if no line has.
+  // One per line, white for lines without one; empty if no line has one.
   std::vector<glm::vec4> Take() const {
     std::vector<glm::vec4> colors;
     for (const Row& row : rows_) {

@@ -84,7 +84,7 @@ bool ParseLine(std::string_view line, PlyHeader& header) {
   return keyword == "comment" || keyword == "obj_info";
 }
 
-// The fewest bytes of a row: a list may be empty, a number in text is a digit and a space.
+// The minimum bytes of a row: a list may be empty, a number in text is a digit and a space.
 std::size_t LeastRowSize(const PlyElement& element, PlyHeader::Encoding encoding) {
   std::size_t size = 0;
   for (const PlyProperty& p : element.properties) {

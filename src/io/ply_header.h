@@ -15,13 +15,13 @@
 
 namespace tilegrad::io {
 
-// Internal to io: numbers as binary files store them.
+// Internal to io: number types of binary files.
 
 enum class StoredType { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
 
 struct StoredTypeRow {
   std::size_t size;                // bytes
-  double (*load)(const void* at);  // little-endian, anywhere in memory
+  double (*load)(const void* at);  // little-endian, unaligned
 };
 
 template <class T>
@@ -45,7 +45,7 @@ inline const StoredTypeRow& RowOf(StoredType type) {
 struct PlyProperty {
   std::string name;
   StoredType type;
-  std::optional<StoredType> count_type;  // set for a list, which begins with its length
+  std::optional<StoredType> count_type;  // set for a list: the type of its length
 };
 
 struct PlyElement {
@@ -58,13 +58,13 @@ struct PlyHeader {
   enum class Encoding { kText, kLittleEndian, kBigEndian } encoding = Encoding::kText;
   std::vector<PlyElement> elements;
   std::vector<std::string> textures;  // of each "comment TextureFile NAME"
-  std::string_view data;              // what follows the header
+  std::string_view data;              // after the header
 
-  // The number of rows of an element, 0 if there is none of that name.
+  // The number of rows of an element, 0 if there is no such element.
   std::size_t CountOf(std::string_view element) const;
 };
 
-// Errors name `place` and the line; an element with more rows than the data could hold is one.
+// Errors name `place` and the line; among them elements with more rows than the data could hold.
 Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place);
 
 }  // namespace tilegrad::io

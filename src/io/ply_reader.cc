@@ -26,9 +26,9 @@ bool IsPlyIndices(const PlyProperty& property) {
   return property.name == "vertex_indices" || property.name == "vertex_index";
 }
 
-// A place, a normal, a colour or a uv without all of its numbers is none.
+// Ignores a position, a normal, a colour or a uv with missing components.
 struct PlyColumns {
-  // Of faces (to kAlpha) and of vertices (from kRed).
+  // For faces (to kAlpha) and for vertices (from kRed).
   enum Slot { kTexNumber, kRed, kGreen, kBlue, kAlpha, kX, kY, kZ, kNx, kNy, kNz, kU, kV, kSlots };
   struct Column {
     Slot slot = kSlots;  // of a number that is read
@@ -36,7 +36,7 @@ struct PlyColumns {
     double scale = 1;
   };
 
-  // Numbers from `first` up to `end` are read.
+  // Reads the numbers from `first` up to `end`.
   PlyColumns(const PlyElement& element, Slot first, Slot end) {
     for (const PlyProperty& p : element.properties) {
       of.push_back(ColumnOf(p));
@@ -58,7 +58,7 @@ struct PlyColumns {
 
  private:
   static Column ColumnOf(const PlyProperty& p) {
-    // As exporters name them.
+    // Names used by exporters.
     static constexpr std::array<std::pair<std::string_view, Slot>, 27> kNames = {
         {{"x", kX},          {"y", kY},          {"z", kZ},
          {"nx", kNx},        {"ny", kNy},        {"nz", kNz},
@@ -72,7 +72,7 @@ struct PlyColumns {
     if (p.count_type) return {.list = IsPlyIndices(p) || p.name == "texcoord"};
     const auto* row = std::ranges::find(kNames, p.name, &std::pair<std::string_view, Slot>::first);
     if (row == kNames.end()) return {};
-    // Integer colours count from 0 to the type's largest value.
+    // Integer colours range from 0 to the type's largest value.
     const bool color = row->second >= kRed && row->second <= kAlpha;
     const double scale = p.type == StoredType::kU8 ? 255 : p.type == StoredType::kU16 ? 65535 : 1;
     return {.slot = row->second, .scale = color ? scale : 1};
@@ -84,7 +84,7 @@ struct PlyColumns {
   }
 };
 
-// The numbers of the body, one after the other, however they are written.
+// The numbers of the body in sequence, in any encoding.
 class PlyValues {
  public:
   PlyValues(std::string_view data, PlyHeader::Encoding encoding)
@@ -105,7 +105,7 @@ class PlyValues {
     return true;
   }
 
-  // A list of finite numbers. Its length is held against what is left before memory is taken.
+  // A list of finite numbers. Checks its length against the data left before allocating.
   bool NextList(const PlyProperty& property, std::vector<double>& list) {
     std::size_t length = 0;
     if (!NextLength(property, length)) return false;
@@ -114,7 +114,7 @@ class PlyValues {
         list, [&](double& value) { return Next(property.type, value) && std::isfinite(value); });
   }
 
-  // Passes over a number or a list, whatever it holds. False if the data ends.
+  // Skips a number or a list, whatever its contents. False if the data ends.
   bool Skip(const PlyProperty& property) {
     std::size_t count = 1;
     if (property.count_type && !NextLength(property, count)) return false;
@@ -129,7 +129,7 @@ class PlyValues {
   }
 
  private:
-  // The length of a list, which the data that is left can hold.
+  // The length of a list, checked against the data left.
   bool NextLength(const PlyProperty& property, std::size_t& length) {
     double value = 0;
     if (!Next(*property.count_type, value)) return false;
@@ -146,10 +146,11 @@ class PlyValues {
 struct PlyFace {
   std::size_t first = 0, count = 0;  // among the corners of all faces
   glm::vec4 color;
-  double image = -1;  // the number of its texture
+  double image = -1;  // index of its texture
 };
 
-// What follows the header: vertices, faces and strips of triangles become a mesh without materials.
+// Converts what follows the header: vertices, faces and triangle strips become a mesh without
+// materials.
 class PlyBody {
  public:
   PlyBody(const PlyHeader& header, const std::string& place, LoadedMesh& out)
@@ -171,7 +172,7 @@ class PlyBody {
     return {};
   }
 
-  // Which of the header's images each triangle names, from 0; empty if no face names one.
+  // The header's image that each triangle refers to, from 0; empty if no face refers to one.
   const std::vector<double>& images() const { return images_; }
 
  private:
@@ -182,7 +183,7 @@ class PlyBody {
                     row, property.name);
   }
 
-  // What is left out of rows that are there is said.
+  // Warns of ignored properties.
   PlyColumns ColumnsOf(const PlyElement& element, PlyColumns::Slot first, PlyColumns::Slot end) {
     PlyColumns columns(element, first, end);
     for (std::size_t k = 0; k < columns.of.size() && element.count > 0; ++k) {
@@ -192,14 +193,14 @@ class PlyBody {
     return columns;
   }
 
-  // Normals may be anything: DropNonFiniteNormals comes later.
+  // Normals need not be finite: DropNonFiniteNormals comes later.
   bool ReadNumber(const PlyProperty& property, const PlyColumns::Column& column, double& to) {
     if (!values_.Next(property.type, to)) return false;
     to /= column.scale;
     return std::isfinite(to) || (column.slot >= kNx && column.slot <= kNz);
   }
 
-  // The next row: numbers into `row` by slot, each list that is read to `take` with its property.
+  // Reads the next row: numbers into `row` by slot, lists to `take` with their property.
   template <class Take>
   Status ReadRow(const PlyElement& element, std::size_t i, const PlyColumns& columns,
                  std::array<double, kSlots>& row, Take take) {
@@ -233,7 +234,7 @@ class PlyBody {
     return {};
   }
 
-  // Kept until all vertices are there: elements may come in any order.
+  // Keeps them until all vertices are read: elements may come in any order.
   Status Faces(const PlyElement& element) {
     const PlyColumns columns = ColumnsOf(element, kTexNumber, kX);
     const auto& has = columns.has;
@@ -287,7 +288,7 @@ class PlyBody {
     for (std::size_t k = 0; k < face.count; ++k) uvs_.emplace_back(uvs[2 * k], uvs[2 * k + 1]);
   }
 
-  // Strips of triangles, one after the other, with -1 between them.
+  // Triangle strips, concatenated, with -1 between them.
   Status Strips(const PlyElement& element) {
     const PlyColumns columns = ColumnsOf(element, kSlots, kSlots);
     std::array<double, kSlots> row{};
@@ -389,7 +390,7 @@ class PlyBody {
   Polygon polygon_;           // scratch: the last polygon
 };
 
-// A material for each image that faces name by their number, and a white one.
+// A material for each image that faces refer to by number, and a white one.
 class PlyTextures {
  public:
   PlyTextures(const PlyHeader& header, const FileSource& source, const std::string& name,

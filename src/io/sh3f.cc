@@ -77,7 +77,7 @@ std::string Get(const Properties& properties, const std::string& key) {
   return it == properties.end() ? "" : it->second;
 }
 
-// Numbers with white space between; what is none ends the list.
+// Numbers separated by white space; anything else ends the list.
 std::vector<float> Numbers(std::string_view text) {
   std::vector<float> out;
   for (float value = 0; ParseNumber(NextToken(text), value);) out.push_back(value);

@@ -16,7 +16,7 @@ namespace tilegrad::io {
 struct FurnitureEntry {
   std::string id, name, creator;
   std::string model;  // path of the OBJ in the archive, without a leading slash
-  // Row-major, to be applied to positions: afterwards y is up and the front faces +z.
+  // Row-major, for positions: turns the model so that y is up and the front faces +z.
   std::optional<std::array<float, 9>> rotation;
 };
 

@@ -20,15 +20,15 @@ inline std::string_view TextOf(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-// The text without UTF-8's byte order mark, if it begins with one.
+// The text without a UTF-8 byte order mark.
 inline std::string_view WithoutByteOrderMark(std::string_view text) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
   if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   return text;
 }
 
-// Walks over lines; Number() is 1-based. A last line needs no line end; UTF-8's byte order mark at
-// the beginning is left out.
+// Iterates over lines; Number() is 1-based. The last line needs no line end; skips a UTF-8 byte
+// order mark.
 class Lines {
  public:
   explicit Lines(std::string_view text) : rest_(WithoutByteOrderMark(text)) {}
@@ -50,7 +50,7 @@ class Lines {
   std::size_t number_ = 0;
 };
 
-// OK, or an error that says how to save the file: UTF-16 is no text to these readers.
+// An error for UTF-16 text, which says how to save the file.
 inline Status CheckTextEncoding(std::string_view text, const std::string& place) {
   if (!text.starts_with("\xff\xfe") && !text.starts_with("\xfe\xff")) return {};
   return DataLoss("{}: text in UTF-16; save it as UTF-8", place);
@@ -59,14 +59,15 @@ inline Status CheckTextEncoding(std::string_view text, const std::string& place)
 // Space, \t, \n, \v, \f, \r.
 constexpr bool IsWhiteSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-// Loops: find_first_of searches the set anew for each character, and words are short.
+// Loops, since find_first_of searches the set again for each character, and words are short.
 inline std::string_view Trimmed(std::string_view text) {
   while (!text.empty() && IsWhiteSpace(text.front())) text.remove_prefix(1);
   while (!text.empty() && IsWhiteSpace(text.back())) text.remove_suffix(1);
   return text;
 }
 
-// Takes the next run of characters other than white space off `rest`; empty at the end.
+// Removes the next token (no white space) from the front of `rest` and returns it; empty at the
+// end.
 inline std::string_view NextToken(std::string_view& rest) {
   while (!rest.empty() && IsWhiteSpace(rest.front())) rest.remove_prefix(1);
   std::size_t end = 0;
@@ -76,8 +77,8 @@ inline std::string_view NextToken(std::string_view& rest) {
   return token;
 }
 
-// The whole token as a number of type T, "nan" and "inf" included, also as old programs of Windows
-// write them ("1.#QNAN"): as NaN. A leading '+' is fine.
+// Parses the whole token as a T, including "nan" and "inf", and "1.#QNAN" of old Windows programs
+// as NaN. Accepts a leading '+'.
 template <class T>
 bool ParseAnyNumber(std::string_view token, T& value) {
   if constexpr (std::is_floating_point_v<T>) value = std::numeric_limits<T>::quiet_NaN();
@@ -92,7 +93,7 @@ bool ParseAnyNumber(std::string_view token, T& value) {
   return false;
 }
 
-// The same of a finite one.
+// The same for finite numbers.
 template <class T>
 bool ParseNumber(std::string_view token, T& value) {
   if (!ParseAnyNumber(token, value)) return false;

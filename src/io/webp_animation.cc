@@ -12,7 +12,7 @@ namespace tilegrad::io {
 namespace {
 
 constexpr int kLongest = 65535;             // milliseconds: 16 bits in the file
-constexpr std::size_t kMostFrames = 16384;  // all of them together last less than 2^31 ms
+constexpr std::size_t kMostFrames = 16384;  // together they last less than 2^31 ms
 
 Status InRange(const char* name, int value, int low, int high) {
   if (value >= low && value <= high) return {};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The environment of every computation of this library: workers, memory, the number type, and the
-// place where errors are recorded. There are no globals; contexts are independent, and mixing
-// operands of two is an error.
+// The environment of every computation of this library: workers, memory, number type, and error
+// state. There are no globals; contexts are independent, and mixing operands of two is an error.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +15,15 @@
 
 namespace tilegrad::nn {
 
-// Belongs to one thread at a time (operations themselves run on all workers).
+// Not thread-safe: use from one thread at a time (operations themselves run on all workers).
 //
-// Errors: an operation whose operands do not fit records the reason here and returns an invalid
-// Var; operations on invalid Vars return invalid Vars. So formulas need no error handling:
-// status(), checked once per step or before its result is used, holds the first error.
+// Errors: an operation with operands that do not match records the reason here and returns an
+// invalid Var; operations on invalid Vars return invalid Vars. So formulas need no error handling:
+// check status(), which holds the first error, once per step or before using a result.
 class Context {
  public:
-  // `workers` must outlive the context. `dtype` (kF32 or kF64) is that of the parameters which
-  // layers make, and of tensors made without naming one.
+  // `workers` must outlive the context. `dtype` (kF32 or kF64) is the type of parameters that
+  // layers create, and of tensors created without naming one.
   explicit Context(const Workers& workers, DType dtype = DType::kF32);
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
@@ -37,7 +36,7 @@ class Context {
   Tensor Empty(const Shape& shape) const { return Empty(shape, dtype_); }
   Tensor Full(const Shape& shape, double value) const;  // dtype()
   Tensor Zeros(const Shape& shape) const { return Full(shape, 0.0); }
-  // Copies values.size() == shape.elements() numbers, converted to dtype().
+  // Copies shape.elements() numbers from `values`, converted to dtype().
   Tensor From(const Shape& shape, std::span<const float> values) const;
   Tensor From(const Shape& shape, std::span<const double> values) const;
   Tensor Indices(std::span<const std::int32_t> values) const;  // [n] of kI32
@@ -51,8 +50,8 @@ class Context {
   }
 
   const Status& status() const { return status_; }
-  void Fail(Status status);  // the first error is kept
-  Status TakeStatus();       // returns the error, if any, and forgets it
+  void Fail(Status status);  // keeps the first error
+  Status TakeStatus();       // returns the error, if any, and clears it
 
   bool recording() const { return recording_; }
   void set_recording(bool on) { recording_ = on; }
@@ -69,7 +68,7 @@ class Context {
   std::uint64_t order_ = 0;
 };
 
-// Sets whether operations record how to differentiate them, for a scope.
+// Sets whether operations record their derivatives, for a scope.
 class RecordingScope {
  public:
   RecordingScope(Context& context, bool on) : context_(context), before_(context.recording()) {
@@ -84,7 +83,7 @@ class RecordingScope {
   bool before_;
 };
 
-// Evaluation that keeps nothing for a backward pass: { NoGrad off(context); ... }
+// Evaluation without a backward pass: { NoGrad off(context); ... }
 class NoGrad : public RecordingScope {
  public:
   explicit NoGrad(Context& context) : RecordingScope(context, false) {}

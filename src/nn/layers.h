@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers with named parameters and buffers, and their composition.
+// Layers with named parameters and buffers, and modules composed of them.
 //
 //   Sequential net;
 //   net.Add<Conv2dLayer>("conv1", context, ConvShape{.in = 4, .out = 64, .kernel = 5}, rng);
@@ -19,7 +19,7 @@
 
 namespace tilegrad::nn {
 
-enum class Mode { kTrain, kEval };  // of batch norm: statistics of the batch, or the running ones
+enum class Mode { kTrain, kEval };  // for batch norm: statistics of the batch, or the running ones
 
 struct NamedVar {
   std::string name;
@@ -37,19 +37,19 @@ class ModuleVisitor {
 class Module {
  public:
   virtual ~Module() = default;
-  // Errors: as operations, see Context.
+  // Errors: as for operations, see Context.
   virtual Var Forward(const Var& x, Mode mode) = 0;
   // Names begin with `prefix`, which is empty or ends in '.'. The order is fixed.
   virtual void Visit(const std::string& prefix, ModuleVisitor& visitor) = 0;
 };
 
 std::vector<NamedVar> Parameters(Module& module);
-// Parameters and buffers: what a checkpoint holds.
+// Parameters and buffers: the contents of a checkpoint.
 std::vector<NamedTensor> State(Module& module);
-// What a pass in training mode changes: running statistics.
+// Only what a pass in training mode changes: running statistics.
 std::vector<NamedTensor> Buffers(Module& module);
 std::int64_t CountParameters(Module& module);
-// CopyByName into parameters and buffers.
+// Copies by name (CopyByName) into parameters and buffers.
 Status LoadState(Module& module, const std::vector<NamedTensor>& state);
 
 struct LinearShape {
@@ -64,7 +64,7 @@ class LinearLayer : public Module {
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
   Var weight;  // [out, in]
-  Var bias;    // [out]; invalid without
+  Var bias;    // [out]; invalid if there is none
 };
 
 struct ConvShape {
@@ -76,20 +76,20 @@ struct ConvShape {
 
 class Conv2dLayer : public Module {
  public:
-  // FillDefault by the fan-in of the weight's shape.
+  // FillDefault with the fan-in of the weight's shape.
   Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng);
   Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
   Var weight;  // [out, in, kernel, kernel]
-  Var bias;    // [out]; invalid without
+  Var bias;    // [out]; invalid if there is none
 
  private:
   ConvOptions options_;
 };
 
-// Of [n, c] and [n, c, h, w]. Running statistics as PyTorch: new = (1 - momentum) old + momentum
-// batch, with the unbiased variance.
+// For [n, c] and [n, c, h, w]. Running statistics as in PyTorch: new = (1 - momentum) old +
+// momentum batch, with the unbiased variance.
 class BatchNorm : public Module {
  public:
   BatchNorm(Context& context, std::int64_t channels, const BatchNormOptions& options = {});
@@ -97,8 +97,8 @@ class BatchNorm : public Module {
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
   static constexpr double kMomentum = 0.1;
-  Var weight, bias;                       // gamma 1, beta 0 at the start
-  Tensor running_mean, running_variance;  // 0 and 1 at the start
+  Var weight, bias;                       // initially gamma 1, beta 0
+  Tensor running_mean, running_variance;  // initially 0 and 1
 
  private:
   void Track(const BatchNormResult& batch, std::int64_t count);
@@ -123,7 +123,7 @@ class Flatten : public Module {
   void Visit(const std::string&, ModuleVisitor&) override {}
 };
 
-// One after the other.
+// Runs modules in sequence.
 class Sequential : public Module {
  public:
   template <class M, class... A>
@@ -150,21 +150,21 @@ class Residual : public Module {
   Sequential body;
 };
 
-// Initial values of parameters. The stream of random numbers is the caller's, so equal seeds
-// give equal networks for any number of workers.
+// Parameter initialisation. The caller provides the random stream, so equal seeds give equal
+// networks for any number of workers.
 
 void FillConstant(Tensor& tensor, double value);
 void FillNormal(Tensor& tensor, Rng& rng, double deviation);          // N(0, deviation^2)
 void FillUniform(Tensor& tensor, Rng& rng, double low, double high);  // [low, high)
 
-// What PyTorch gives to linear and convolution weights and to their biases by default: uniform in
+// PyTorch's default for linear and convolution weights and their biases: uniform in
 // +-1/sqrt(fan_in) (He et al. 2015 with a = sqrt 5).
 void FillDefault(Tensor& tensor, Rng& rng, std::int64_t fan_in);
 
-// What networks are put together from.
+// Building blocks of networks.
 
 // Adds convolution, batch norm and activation to `net` as "<name>.conv", "<name>.norm",
-// "<name>.act". A convolution that a norm follows has no bias: the norm would take it out again.
+// "<name>.act". A convolution followed by a norm has no bias, which the norm would cancel.
 struct ConvBlock {
   ConvShape conv;
   bool norm = false;
@@ -176,8 +176,8 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
 LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
                        std::int64_t out, Rng& rng);
 
-// "name": x + two 3x3 convolutions of x, of as many channels, the first followed by norm and ReLU,
-// the second by norm.
+// "name": x + two 3x3 convolutions of x with the same number of channels, the first followed by
+// norm and ReLU, the second by norm.
 void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
                       std::int64_t channels, Rng& rng);
 

@@ -173,7 +173,7 @@ std::byte* AddressArena::Allocate(std::size_t bytes) {
   return data;
 }
 
-// Takes what is free at the end of the last region, plus as much as is missing.
+// Takes the free space at the end of the last region, plus as much as is missing.
 std::byte* AddressArena::Grow(std::size_t size) {
   ++growths_;
   if (regions_.empty() || regions_.back().reserved - regions_.back().used < size) AddRegion(size);

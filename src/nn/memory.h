@@ -14,16 +14,16 @@
 namespace tilegrad::nn {
 
 struct MemoryStats {
-  std::size_t live_bytes = 0;  // in blocks that some tensor holds now
+  std::size_t live_bytes = 0;  // in blocks that tensors hold now
   std::size_t peak_bytes = 0;  // the largest live_bytes since the start or ResetPeak()
-  std::size_t held_bytes = 0;  // that live blocks lay in at some time: what the system had to give
-  std::size_t misses = 0;      // requests for which held_bytes had to grow
+  std::size_t held_bytes = 0;  // ever used by live blocks: taken from the system
+  std::size_t misses = 0;      // requests that made held_bytes grow
   std::size_t requests = 0;
 };
 
 struct Block;
 
-// Shared ownership of one block; the last owner gives it back to its pool.
+// Shared ownership of one block; the last owner returns it to its pool.
 class BlockRef {
  public:
   BlockRef() = default;
@@ -37,7 +37,7 @@ class BlockRef {
   ~BlockRef();
 
   std::byte* data() const;
-  bool unique() const;  // this is the only owner
+  bool unique() const;  // whether this is the only owner
   explicit operator bool() const { return block_ != nullptr; }
 
  private:
@@ -67,11 +67,11 @@ class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
   std::unique_ptr<State> state_;
 };
 
-// Memory of the small objects that every training step creates and drops: graph nodes, lists of
-// Vars. It returns to a pool, so that a step like the one before allocates nothing from the heap.
-// Tensors use a separate pool: MemoryPool.
+// Memory for the small objects that every training step creates and drops: graph nodes, lists of
+// Vars. It returns to a pool, so that a step with the same sizes as the one before allocates
+// nothing from the heap. Tensors use a separate pool: MemoryPool.
 
-// Keeps its pool alive. Made without one it allocates on the heap. Not thread-safe: as a Context.
+// Keeps its pool alive. Without a pool allocates on the heap. Not thread-safe, like Context.
 template <class T>
 class StepAllocator {
  public:
@@ -110,12 +110,12 @@ using StepVector = std::vector<T, StepAllocator<T>>;
 // A pool for the allocators of one context.
 std::shared_ptr<std::pmr::memory_resource> MakeStepMemory();
 
-// A best-fit allocator in one long range of addresses: it takes the smallest free range that fits
-// and merges free neighbours. So the memory of activations can serve gradients of other sizes,
-// which size classes could not do.
+// A best-fit allocator in one long address range: takes the smallest free range that fits and
+// merges free neighbours. So the memory of activations can serve gradients of other sizes, unlike
+// with size classes.
 
-// Not thread-safe. Equal sequences of calls from equal states behave equally: a training step that
-// starts in the state of the one before needs no more memory.
+// Not thread-safe. Deterministic: a training step that starts in the same state as the previous one
+// needs no more memory.
 class AddressArena {
  public:
   AddressArena() = default;
@@ -123,27 +123,27 @@ class AddressArena {
   AddressArena(const AddressArena&) = delete;
   AddressArena& operator=(const AddressArena&) = delete;
 
-  static std::size_t Rounded(std::size_t bytes);  // what Allocate really takes
-  // Uninitialised, aligned to kAlignment. Throws std::bad_alloc where the system has no memory, as
-  // operator new does, and is as before then.
+  static std::size_t Rounded(std::size_t bytes);  // the size that Allocate actually takes
+  // Uninitialised, aligned to kAlignment. Throws std::bad_alloc if the system has no memory, like
+  // operator new, and is then unchanged.
   std::byte* Allocate(std::size_t bytes);
-  void Free(std::byte* data, std::size_t bytes);  // of Allocate(bytes)
+  void Free(std::byte* data, std::size_t bytes);  // `bytes` as passed to Allocate
   void Trim();                                    // returns free memory to the system
 
-  std::size_t held() const { return held_; }        // memory that is or ever was in use
+  std::size_t held() const { return held_; }        // memory in use now or ever
   std::size_t growths() const { return growths_; }  // how often held() had to grow
 
  private:
   using FreeRanges = std::pmr::map<std::byte*, std::size_t>;
   struct Region {
     std::byte* begin;
-    std::size_t reserved, used, usable;  // addresses; given out once; with memory behind them
+    std::size_t reserved, used, usable;  // addresses reserved; handed out so far; backed by memory
   };
   FreeRanges::iterator BestFit(std::size_t size);
   std::byte* Grow(std::size_t size);
   void AddRegion(std::size_t bytes);
 
-  std::pmr::unsynchronized_pool_resource nodes_;  // of the map: no allocation in the steady state
+  std::pmr::unsynchronized_pool_resource nodes_;  // of the map: no allocation in steady state
   FreeRanges free_{&nodes_};
   std::vector<Region> regions_;  // the last one grows
   std::size_t held_ = 0, growths_ = 0;

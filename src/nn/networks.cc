@@ -23,8 +23,8 @@ Status CheckImage(const Var& x, std::size_t halvings) {
                          step);
 }
 
-// Twice the height and the width, nearest, with one pixel around it: of the other edge to the left
-// and right, of the same edge above and below.
+// Doubles height and width (nearest) and pads one pixel: circular to the left and right, replicated
+// above and below.
 class UpsampleMap : public Module {
  public:
   Var Forward(const Var& x, Mode) override {
@@ -229,7 +229,7 @@ Var Standardised(const Var& x) {
 Result<Vgg16> Vgg16::Load(Context& context, const std::vector<NamedTensor>& weights) {
   Vgg16 network;
   std::int64_t channels = 3;
-  int index = 0;  // in torchvision's "features", where rectifiers and pools have one, too
+  int index = 0;  // in torchvision's "features", where rectifiers and pools count, too
   for (const int convolutions : kStages) {
     for (int i = 0; i < convolutions; ++i, index += 2) {
       const std::string name = "features." + std::to_string(index);

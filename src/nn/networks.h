@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Networks that several tasks use: U-Nets, critics, and VGG16 for comparisons of images.
+// Networks shared by several tasks: U-Nets, critics, and VGG16 for comparing images.
 #pragma once
 
 #include <span>
@@ -13,21 +13,20 @@ namespace tilegrad::nn {
 
 // U-Nets: an encoder down to a code and a decoder with skip connections from each level.
 //
-// Down as in pix2pix (Isola et al. 2017), a 4x4 convolution of stride 2 to each level; up by
-// nearest resizing and a 3x3 convolution, which leaves no checkerboard. What comes out is a map
-// around a body: its left and right edges are neighbours, and what lies beyond its upper and lower
-// edges is what lies at them.
+// Down as in pix2pix (Isola et al. 2017), a 4x4 convolution of stride 2 per level; up by nearest
+// resizing and a 3x3 convolution, which avoids checkerboard artefacts. The output is a map around a
+// body: padding is circular between left and right edges, and replicates the upper and lower ones.
 struct UNetShape {
   std::int64_t in = 3, out = 3;  // channels of the images
   std::int64_t base = 64;        // channels after the first level; they double to at most
   std::int64_t most = 512;       // this many
-  int levels = 8;                // halvings: an image's sides are multiples of 2^levels
-  bool skips = true;             // false: the decoder sees the code alone
-  int enlarge = 0;               // further doublings behind the last level, of `base` channels
+  int levels = 8;                // halvings: image sides must be multiples of 2^levels
+  bool skips = true;             // false: the decoder gets only the code
+  int enlarge = 0;               // further doublings after the last level, with `base` channels
   Activation::Function output = nullptr;  // e.g. &Sigmoid
 };
 
-// Whether images of this side can be halved that often, to at least two pixels.
+// Whether images of this side can be halved that many times, to at least two pixels.
 inline bool CanHalve(std::int64_t side, std::int64_t levels) {
   const std::int64_t step = std::int64_t{1} << levels;
   return side % step == 0 && side >= 2 * step;
@@ -37,8 +36,8 @@ class UNet : public Module {
  public:
   UNet(Context& context, const UNetShape& shape, Rng& rng);
 
-  // Its two halves, for what stands between them. Levels: x, then each level's; the last is the
-  // code. `code` has the shape of that one.
+  // Encoder and decoder separately, to insert something between them. Levels: x, then each level's
+  // output; the last is the code. `code` has the shape of the last.
   StepVector<Var> Encode(const Var& x, Mode mode);
   Var Decode(const Var& code, const StepVector<Var>& levels, Mode mode);
   // x [n, in, h, w] -> [n, out, h, w] times 2^enlarge
@@ -47,19 +46,19 @@ class UNet : public Module {
 
  private:
   std::vector<Sequential> down_, up_;  // up_[i] undoes down_[i]
-  std::vector<Sequential> grow_;       // behind up_[0]
+  std::vector<Sequential> grow_;       // after up_[0]
   bool skips_;
 };
 
-// A critic of images, and what it is trained by.
+// A critic of images, and its training loss.
 
 // PatchGAN (Isola et al. 2017): `halvings` 4x4 convolutions of stride 2, leaky ReLU of 0.2 after
-// each, the channels doubling from `base`, then a 3x3 one to one number for each patch. For the
-// gradient penalty no batch norm: a sample's score must depend on that sample alone.
+// each, the channels doubling from `base`, then a 3x3 one to one number per patch. No batch norm,
+// for the gradient penalty: a sample's score must depend on that sample alone.
 struct CriticShape {
   std::int64_t in = 3, base = 64;
   int halvings = 4;
-  PadMode padding_mode = PadMode::kZero;  // kCircular for textures that wrap around
+  PadMode padding_mode = PadMode::kZero;  // kCircular for wrap-around textures
 };
 class Critic : public Module {
  public:
@@ -74,27 +73,27 @@ class Critic : public Module {
 };
 
 // A critic at x [n, ..]: the mean over samples of its mean score, and the mean over samples of
-// (|d mean score / d x| - 1)^2, one norm for each sample (Gulrajani et al. 2017, the paper's
-// equation 15). Both can be differentiated by the critic's weights, not by x.
+// (|d mean score / d x| - 1)^2, one norm per sample (Gulrajani et al. 2017, the paper's equation
+// 15). Both are differentiable by the critic's weights, not by x.
 struct PenalisedScore {
   Var score, penalty;  // scalars
 };
 PenalisedScore ScoreWithPenalty(Module& critic, const Var& x);
-Var GradientPenalty(Module& critic, const Var& x);  // the second of the two
+Var GradientPenalty(Module& critic, const Var& x);  // PenalisedScore::penalty alone
 
-// The convolutional part of VGG16, with weights supplied by the user, to compare images by their
-// features (Johnson et al. 2016; Zhang et al. 2018 say which layers).
+// The convolutional part of VGG16, with weights supplied by the user, for comparing images by their
+// features (Johnson et al. 2016; layers as in Zhang et al. 2018).
 
 class Vgg16 {
  public:
-  // Weights by torchvision's names ("features.0.weight", "features.0.bias", ..), as ReadSafetensors
-  // gives them; others are ignored. Channels are those of the tensors, so narrower networks of the
-  // same build will do. An error names the tensor that is missing or does not fit what comes before
-  // it.
+  // Weights by torchvision's names ("features.0.weight", "features.0.bias", ..), as read by
+  // ReadSafetensors; ignores others. Takes the number of channels from the tensors, so narrower
+  // networks of the same architecture work. An error names the tensor that is missing or does not
+  // match the previous layer.
   static Result<Vgg16> Load(Context& context, const std::vector<NamedTensor>& weights);
 
-  // x [n, 3, h, w], RGB in [0, 1] (the means and deviations of ImageNet are applied here). Returns
-  // the activations after the last rectifier of each of the five stages. The weights take no
+  // x [n, 3, h, w], RGB in [0, 1] (normalised here with ImageNet's means and deviations). Returns
+  // the activations after the last rectifier of each of the five stages. The weights get no
   // gradient.
   std::vector<Var> Features(const Var& x) const;
 
@@ -105,7 +104,8 @@ class Vgg16 {
   std::vector<Convolution> convolutions_;  // in the order of use
 };
 
-// sum over layers of mean |a - b|: the paper's equation 16. As many layers of both.
+// sum over layers of mean |a - b|: the paper's equation 16. Both must have the same number of
+// layers.
 Var PerceptualL1(std::span<const Var> a, std::span<const Var> b);
 
 }  // namespace tilegrad::nn

@@ -98,8 +98,8 @@ Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t 
   return entry;
 }
 
-// Notes the names of an object's entries as they come, twice where they stand twice. (What keeps
-// the order while it parses, ordered_json or a callback, looks through all entries at each.)
+// Records the names of an object's entries in order, including duplicates. (Parsers that keep the
+// order, ordered_json or a callback, search all entries at each.)
 class EntryNames : public nlohmann::json_sax<Json> {
  public:
   std::vector<std::string> names;
@@ -127,8 +127,8 @@ class EntryNames : public nlohmann::json_sax<Json> {
   std::size_t depth_ = 0;
 };
 
-// Of two tensors that share bytes one would be a copy: with many, a small file fills the memory.
-// `ranges`: first byte, end and name of each tensor.
+// Of two tensors that share bytes one would be a copy: with many, a small file would fill the
+// memory. `ranges`: first byte, end and name of each tensor.
 Status CheckApart(std::vector<std::tuple<std::size_t, std::size_t, std::string>> ranges) {
   std::sort(ranges.begin(), ranges.end());
   std::size_t last_end = 0;
@@ -248,7 +248,7 @@ void AppendMember(const std::string& name, const std::string& json, std::string*
   *text += DumpJson(Json(name)) + ':' + json;
 }
 
-// What the file holds of a tensor.
+// A tensor as stored in the file.
 struct StoredTensor {
   const char* dtype;
   std::span<const std::uint8_t> data;
@@ -304,7 +304,7 @@ Status CheckTexts(const TensorFile& file) {
   return {};
 }
 
-// A file before it is written.
+// A file ready to be written.
 struct EncodedFile {
   std::string header;  // its length included
   std::vector<StoredTensor> tensors;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// safetensors files: the field's plain format for named tensors.
+// safetensors files: the standard format for named tensors.
 // https://github.com/huggingface/safetensors#format: u64 header length (little endian), JSON
-// header, then the data that the header's offsets point into.
+// header, then the data to which the header's offsets refer.
 #pragma once
 
 #include <map>
@@ -20,22 +20,23 @@ struct TensorFile {
 };
 
 // Reads dtypes F32, F64, U8, I32 and I64, and F16 as F32, which is exact. Checks every length,
-// offset and shape in the header against the file before it allocates; an inconsistent or truncated
-// file gives kDataLoss, whose message names the tensor.
+// offset and shape in the header against the file before allocating; kDataLoss for an inconsistent
+// or truncated file, naming the tensor.
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes);
-// The metadata alone: also of files whose tensors this cannot read.
+// Only the metadata, even of files with unsupported tensors.
 Result<std::map<std::string, std::string>> SafetensorsMetadata(std::span<const std::uint8_t> bytes);
 Result<TensorFile> ReadSafetensors(Context& context, const Path& path);
 
-// How a file holds tensors of F32.
+// Storage of F32 tensors in a file.
 enum class StoredFloats {
-  kFull,  // as they are
-  kHalf,  // F16: each number the nearest one, ties to even
+  kFull,  // unchanged
+  kHalf,  // F16: rounded to nearest, ties to even
 };
-// Names must be unique and not "__metadata__"; they and the metadata UTF-8. kHalf: InvalidArgument
-// names the tensor with a number that float16 has not: 65520 or more, or not finite.
+// Names must be unique and not "__metadata__"; names and metadata must be UTF-8. kHalf:
+// InvalidArgument names a tensor with numbers that float16 cannot hold: 65520 or more, or not
+// finite.
 Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats = StoredFloats::kFull);
 Status WriteSafetensors(const Path& path, const TensorFile& file,
-                        StoredFloats floats = StoredFloats::kFull);  // whole or not at all
+                        StoredFloats floats = StoredFloats::kFull);  // atomic
 
 }  // namespace tilegrad::nn

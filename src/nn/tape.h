@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reverse-mode differentiation. A Var is a tensor that knows how it was computed; Grad walks that
-// graph backwards. The rule of each operation is written in the same operations on Vars, so the
-// gradient is itself a Var that can be differentiated again, to any order:
+// graph backwards. Each operation's backward rule uses the same operations on Vars, so the gradient
+// is itself a Var that can be differentiated again, to any order:
 //
 //   Var loss = Mean(Square(Linear(x, w, b) - y));
 //   auto d = Grad(loss, {w, b});  // d[0]: dL/dw, d[1]: dL/db
@@ -25,24 +25,24 @@ namespace tilegrad::nn {
 
 struct Node;
 
-// A value and its place in the graph. Cheap to copy; shares tensor and node.
+// A value and its position in the graph. Cheap to copy; copies share tensor and node.
 class Var {
  public:
-  Var() = default;  // invalid, and of no context
+  Var() = default;  // invalid, without a context
   Var(Context& context, Tensor value, std::shared_ptr<Node> node = nullptr, int slot = 0)
       : context_(&context), value_(std::move(value)), node_(std::move(node)), slot_(slot) {}
 
   bool valid() const { return !value_.empty(); }
-  Context& context() const { return *context_; }  // not of a default-made Var
+  Context& context() const { return *context_; }  // not for a default-constructed Var
   const Tensor& value() const { return value_; }
-  Tensor& value() { return value_; }  // optimisers write here; not while a graph still needs it
+  Tensor& value() { return value_; }  // for optimisers to write; not while a graph still needs it
   const Shape& shape() const { return value_.shape(); }
   DType dtype() const { return value_.dtype(); }
   bool requires_grad() const { return node_ != nullptr; }
-  double item() const;  // the number of a one-element Var; NaN of an invalid one
+  double item() const;  // the number of a one-element Var; NaN if invalid
 
   const std::shared_ptr<Node>& node() const { return node_; }
-  int slot() const { return slot_; }  // which output of the node
+  int slot() const { return slot_; }  // output index of the node
   bool has_context() const { return context_ != nullptr; }
 
  private:
@@ -55,27 +55,26 @@ class Var {
 Var Constant(Context& context, Tensor value);   // no gradient flows into it
 Var Constant(Context& context, double value);   // a scalar
 Var Parameter(Context& context, Tensor value);  // Grad can differentiate by it
-Var Detach(const Var& x);                       // the value of x, cut off from its graph
+Var Detach(const Var& x);                       // the value of x, detached from its graph
 
 struct GradOptions {
-  bool create_graph = false;  // the gradients can be differentiated; the graph of `output` is kept
-  bool keep_graph = false;  // keep it although create_graph is off; else it is released on the way
-  Var d_output = {};        // adjoint of `output`, of its shape; default: 1 for one element
+  bool create_graph = false;  // keep the graph of `output`; gradients are differentiable
+  bool keep_graph = false;    // keep it although create_graph is off; else the walk releases it
+  Var d_output = {};          // adjoint of `output`, of its shape; default: 1 for one element
 };
 
-// d output / d inputs[i], of the shapes of `inputs`; zeros where output does not depend on it. On
-// errors (output has more than one element and no d_output, a graph that was released, an operand
-// of a first-order operation in a second derivative) the context notes it and every entry is
-// invalid.
+// d output / d inputs[i], with the shapes of `inputs`; zeros if output does not depend on it. On
+// errors (output has more than one element and no d_output, a released graph, an operand of a
+// first-order operation in a second derivative) the context records it and every entry is invalid.
 StepVector<Var> Grad(const Var& output, std::span<const Var> inputs,
                      const GradOptions& options = {});
 StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
                      const GradOptions& options = {});
 
-// A gradient as optimisers take it: a value, or a product a^T b of matrices [k, m] and [k, n] that
-// is not computed yet. A linear layer's weight has such a gradient (a: the adjoint of the layer's
-// output, b: its input): Adam computes it block by block and uses each block at once, so that the
-// whole, as large as the weight, never lies in memory.
+// A gradient for optimisers: a value, or a product a^T b of matrices [k, m] and [k, n], not yet
+// computed. A linear layer's weight has such a gradient (a: the adjoint of the layer's output, b:
+// its input): Adam computes it block by block and uses each block at once, so that the whole, as
+// large as the weight, is never in memory.
 class Gradient {
  public:
   Gradient() = default;  // invalid
@@ -84,37 +83,37 @@ class Gradient {
 
   bool valid() const { return first_.valid(); }
   bool is_product() const { return second_.valid(); }
-  const Var& a() const { return first_; }  // of a product, as b()
+  const Var& a() const { return first_; }  // of a product, like b()
   const Var& b() const { return second_; }
   Shape shape() const {
     return is_product() ? Shape{first_.shape()[1], second_.shape()[1]} : first_.shape();
   }
   DType dtype() const { return first_.dtype(); }
-  Var Value() const;  // computes a product, anew at each call
+  Var Value() const;  // computes a product at every call
 
  private:
   Var first_, second_;
 };
 
-// Hears of each gradient as soon as it is final, while those of earlier layers are still to come:
-// sums over processes begin meanwhile.
+// Receives each gradient as soon as it is final, while those of earlier layers are still pending,
+// so that sums over processes can begin.
 class GradientListener {
  public:
   virtual ~GradientListener() = default;
   virtual void Begin(std::span<const Var> parameters) = 0;
-  // Of parameters[i]: each once unless the walk fails, in an order that the graph decides.
+  // For parameters[i]: each once unless the walk fails, in an order determined by the graph.
   virtual void Ready(std::size_t i, const Gradient& gradient) = 0;
 };
 
-// Grad without options, for an optimiser. Products look at a and b when they are used: until then
-// nothing that the output was computed from may be overwritten but `parameters`. `listener`: or
+// Grad without options, for an optimiser. Products read a and b when they are used: until then, of
+// all that the output was computed from, only `parameters` may be overwritten. `listener` may be
 // null.
 StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters,
                                GradientListener* listener = nullptr);
 
-// An operation that is computed elsewhere (a renderer, a loss) and has a first derivative only.
-// `backward` receives one adjoint for each output (empty Tensor: zero) and returns one for each
-// input (empty Tensor: zero), of the input's shape and dtype.
+// An operation computed elsewhere (a renderer, a loss) with a first derivative only. `backward`
+// receives one adjoint per output (empty Tensor: zero) and returns one per input (empty Tensor:
+// zero), of the input's shape and dtype.
 struct ExternalOp {
   const char* name = "external";
   std::vector<Var> inputs = {};
@@ -130,7 +129,7 @@ struct UncomputedAdjoint {
   Gradient product;
 };
 
-// The input of a rule: the adjoints that arrived, and which gradients are wanted.
+// The input of a backward rule: the adjoints of the outputs, and which gradients are needed.
 class Adjoint {
  public:
   // `left`: where a rule may leave a product, or null.
@@ -138,13 +137,13 @@ class Adjoint {
           UncomputedAdjoint* left)
       : y_(y), d_outputs_(d_outputs), needs_(needs), left_(left) {}
   const Var& dy() const { return d_outputs_[0]; }
-  // dy() for an operation that may overwrite it: call once, and not dy() afterwards.
+  // dy() for an operation that may overwrite it: call once, and do not call dy() afterwards.
   Var TakeDy() const { return std::move(d_outputs_[0]); }
   std::span<const Var> d_outputs() const { return d_outputs_; }
   const Var& y() const { return y_; }  // the output, if the operation saved it
   bool needs(std::size_t input) const { return needs_[input] != 0; }
-  // The adjoint of `input` is a^T b: returns that or, where it is not needed at once, defers it to
-  // its consumer and returns an invalid Var. For one input of an operation.
+  // The adjoint of `input` is a^T b: returns that or, if it is not needed at once, defers it to its
+  // consumer and returns an invalid Var. For one input per operation.
   Var Product(std::size_t input, const Var& a, const Var& b) const;
 
  private:
@@ -154,8 +153,8 @@ class Adjoint {
   UncomputedAdjoint* left_;
 };
 
-// Returns the adjoint of each input; an invalid Var where none flows or none is needed.
-// It may hold half a kilobyte: a few Vars.
+// Returns the adjoint of each input; an invalid Var if it is zero or not needed.
+// Captures may take half a kilobyte: a few Vars.
 using Vars = InlineVector<Var, 4>;
 using Rule = InlineFunction<Vars(const Adjoint&), 512>;
 
@@ -164,18 +163,18 @@ struct OpInfo {
   bool save_output = false;  // the rule reads Adjoint::y()
 };
 
-// Makes the Var of an operation's result. The rule is kept only if a gradient can be requested.
+// Creates the Var of an operation's result. Keeps the rule only if a gradient can be requested.
 Var Record(const OpInfo& info, Tensor value, std::span<const Var> inputs, Rule rule);
 Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, Rule rule);
 
-// The invalid Var of the operands' context, after noting `status` there.
+// Records `status` in the operand's context and returns an invalid Var of it.
 Var Fail(const Var& operand, Status status);
 // True if all are valid, of one context and of float dtype; else records why in the contexts of
 // `operands`.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);
 // True if a tensor can have the shape of a result; else records why in the context of `operand`.
 bool IsPossibleResult(const char* op, const Var& operand, const Shape& result);
-// The invalid result that follows from an invalid operand.
+// The invalid result of an operation with an invalid operand.
 Var Invalid(std::initializer_list<const Var*> operands);
 
 }  // namespace tilegrad::nn

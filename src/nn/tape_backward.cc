@@ -72,7 +72,7 @@ class Backward {
     bool wanted = false;     // is a requested input: its adjoint must survive
     InlineVector<Var, 1> d;  // adjoint of each output, summed over the uses met so far
     Gradient product;        // or that of a leaf which met one use
-    // For a listener, of a requested input: its number, and the uses that have not been met.
+    // For a listener, of a requested input: its index, and the number of uses not yet met.
     std::size_t input = 0, uses = 0;
     bool announced = false;
   };
@@ -108,7 +108,7 @@ class Backward {
     }
   }
 
-  // Tells of the inputs that `node` was the last to use.
+  // Announces the inputs whose last use was `node`.
   void Announce(const Node& node) {
     for (const auto& edge : node.edges) {
       if (!edge.node || !context_.status().ok()) continue;
@@ -119,7 +119,7 @@ class Backward {
     }
   }
 
-  // And of the rest, which nothing uses.
+  // Announces the other inputs, which nothing uses.
   void AnnounceUnused() {
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       const auto it = visits_.find(inputs_[i].node().get());
@@ -130,7 +130,7 @@ class Backward {
 
   void Step(Node& node) {
     Visit& visit = visits_[&node];
-    if (visit.d.empty()) return;  // nothing arrived: the derivative is zero
+    if (visit.d.empty()) return;  // no adjoint arrived: the derivative is zero
     if (node.released) {
       context_.Fail(InvalidArgument(
           "the graph of \"{}\" was released by an earlier Grad; give that one keep_graph",

@@ -17,11 +17,11 @@
 namespace tilegrad::nn {
 
 // Operations compute in kF32 (SIMD) and kF64 (the scalar references); kI32 holds indices, the
-// others are for files only.
+// others are only for files.
 enum class DType : std::uint8_t { kF32, kF64, kU8, kI32, kI64 };
 
 std::size_t BytesOf(DType dtype);
-const char* NameOf(DType dtype);  // as safetensors spells it: "F32", ...
+const char* NameOf(DType dtype);  // safetensors name: "F32", ...
 
 template <class T>
 inline constexpr DType kDTypeOf = DType::kU8;
@@ -38,7 +38,7 @@ inline constexpr DType kDTypeOf<std::int64_t> = DType::kI64;
 class Shape {
  public:
   static constexpr int kMaxRank = 5;
-  // More than any memory holds, and few enough that no sum of sizes in bytes overflows.
+  // More than any memory holds, and small enough that no sum of sizes in bytes overflows.
   static constexpr std::int64_t kMostElements = std::int64_t{1} << 40;
 
   Shape() = default;
@@ -49,7 +49,7 @@ class Shape {
   int rank() const { return rank_; }
   std::int64_t operator[](int axis) const { return extents_[static_cast<std::size_t>(axis)]; }
   std::int64_t& operator[](int axis) { return extents_[static_cast<std::size_t>(axis)]; }
-  // The same with another extent of one axis.
+  // The same shape with another extent of one axis.
   Shape With(int axis, std::int64_t extent) const {
     Shape other = *this;
     other[axis] = extent;
@@ -60,8 +60,8 @@ class Shape {
     extents_[static_cast<std::size_t>(rank_++)] = extent;
   }
   std::int64_t elements() const;
-  // Whether a tensor can have it: no extent is negative, and their product, empty ones left out, is
-  // at most kMostElements.
+  // Whether a tensor can have this shape: no extent is negative, and their product, zeros skipped,
+  // is at most kMostElements.
   bool IsPossible() const;
   // Product of the extents of axes [begin, end).
   std::int64_t Product(int begin, int end) const;
@@ -79,7 +79,7 @@ class Tensor {
   Tensor(BlockRef block, const Shape& shape, DType dtype)
       : block_(std::move(block)), shape_(shape), dtype_(dtype) {}
 
-  bool empty() const { return !block_; }  // no storage; a [0, 3] tensor has one
+  bool empty() const { return !block_; }  // no storage; a [0, 3] tensor has storage
   const Shape& shape() const { return shape_; }
   DType dtype() const { return dtype_; }
   std::size_t elements() const { return static_cast<std::size_t>(shape_.elements()); }
@@ -107,7 +107,7 @@ class Tensor {
   std::byte* raw() { return block_.data(); }
   const std::byte* raw() const { return block_.data(); }
 
-  // The same storage seen with another shape of as many elements.
+  // The same storage with another shape of as many elements.
   Tensor Reshaped(const Shape& shape) const {
     assert(shape.elements() == shape_.elements());
     return {block_, shape, dtype_};
@@ -119,14 +119,14 @@ class Tensor {
   DType dtype_ = DType::kF32;
 };
 
-// Calls f(T{}) with T = float or double as the dtype says. The dtype must be one of the two.
+// Calls f(T{}) with T = float or double according to the dtype, which must be one of the two.
 template <class F>
 decltype(auto) WithFloatType(DType dtype, F&& f) {
   assert(dtype == DType::kF32 || dtype == DType::kF64);
   return dtype == DType::kF64 ? f(double{}) : f(float{});
 }
 
-// Tensors with names, as checkpoints hold them.
+// Named tensors, as in checkpoints.
 
 struct NamedTensor {
   std::string name;  // "encoder.conv1.weight"
@@ -137,8 +137,8 @@ struct NamedTensor {
 const Tensor* Find(const std::vector<NamedTensor>& tensors, const std::string& name);
 
 // Copies the tensors of `from` into those of `to` by name, converting between F32 and F64 (other
-// dtypes must be equal). Every name of `to` must be there with its shape; else nothing is changed
-// and the error names the first that is not. Further names in `from` are ignored.
+// dtypes must be equal). Every name of `to` must exist in `from` with the same shape; else changes
+// nothing and returns an error that names the first that does not. Ignores other names in `from`.
 Status CopyByName(const std::vector<NamedTensor>& from, std::vector<NamedTensor> to);
 
 }  // namespace tilegrad::nn

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The slope of a loss along a random direction of the numbers of an owned scene, by a complex step
-// through the reference: nothing is subtracted, so that it is exact to rounding. For proofs, as
+// The derivative of a loss along a random direction in the parameters of an owned scene, by a
+// complex step through the reference: without subtraction, hence exact to rounding. For proofs, as
 // owned_scene.h.
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace tilegrad {
 
-// The loss is the sum of the images that `request` asks for times their cotangents.
+// The loss is the sum over the images in `request` of image times cotangent.
 struct SlopeProblem {
   const OwnedScene<float>& scene;
   const RenderOptions& options;
@@ -27,9 +27,9 @@ struct SlopeProblem {
 
 struct Slope {
   double by_step, by_gradient;
-  double size;        // the sum of the sizes of the gradient's terms
-  std::size_t count;  // of them
-  // A few hundred roundings for each of some thousand terms, and of the loss itself.
+  double size;        // sum of the magnitudes of the gradient's terms
+  std::size_t count;  // number of terms
+  // A few hundred roundings for each of some thousand terms and for the loss.
   double rounding() const { return 1e-11 * (size + 1); }
 };
 
@@ -42,7 +42,7 @@ inline std::complex<double> SlopeLoss(const SlopeProblem& p,
   const auto add = [&](const AlignedVector<Complex>& image, const std::vector<double>& weights) {
     for (std::size_t i = 0; i < image.size(); ++i) {
       const bool seen = p.face_ids[i % p.face_ids.size()] >= 0;
-      if (seen || std::isfinite(image[i].real())) sum += image[i] * weights[i];  // not far depth
+      if (seen || std::isfinite(image[i].real())) sum += image[i] * weights[i];  // finite depth
     }
   };
   add(frame.color, p.d_frame.color);
@@ -54,11 +54,11 @@ inline std::complex<double> SlopeLoss(const SlopeProblem& p,
   return sum;
 }
 
-// Along a direction, random in [-1, 1], of the numbers that ForEachNumber calls `kind`; `gradient`:
-// theirs, in its order.
+// Along a random direction, components in [-1, 1], of the numbers that ForEachNumber calls `kind`;
+// `gradient`: of these numbers, in the same order.
 inline Slope SlopeAlong(const SlopeProblem& problem, const std::string& kind,
                         const std::vector<double>& gradient, Rng rng) {
-  constexpr double kStep = 1e-40;  // its square is far below the last digit of anything
+  constexpr double kStep = 1e-40;  // its square vanishes beside any number
   using Complex = std::complex<double>;
   auto moved = OwnedCast<Complex>(problem.scene);
   Slope slope = {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that own their arrays, in any scalar type, with their gradients and cotangents, and all
-// their numbers by name: what proofs need that hold the Renderer to the reference, and the
-// reference to differences (tests/render, src/proof/selftest).
+// Scenes that own their arrays, in any scalar type, with gradients, cotangents and access to all
+// numbers by name: for proofs that compare the Renderer with the reference, and the reference with
+// differences (tests/render, src/proof/selftest).
 #pragma once
 
 #include <array>
@@ -58,7 +58,7 @@ struct OwnedTexture {
   Filter filter = Filter::kBilinear;
 };
 
-// Owns what a Scene looks at.
+// Owns what a Scene views.
 template <class T>
 struct OwnedScene {
   ShadingModel shading;
@@ -93,7 +93,7 @@ struct OwnedScene {
 };
 
 // Calls visit(name, number) for every number of a scene that has a gradient. `scene` may be an
-// OwnedScene of anything with the same members, so gradients are visited in the same order.
+// OwnedScene or anything with the same members, so gradients are visited in the same order.
 template <class T, class Visit>
 void ForEachNumber(OwnedScene<T>& s, const Visit& visit) {
   const auto all = [&](const char* name, auto&& values) {
@@ -147,7 +147,7 @@ OwnedScene<T> OwnedCast(const OwnedScene<U>& s) {
   return out;
 }
 
-// Gradients of a scene: the same members, all 0, and the views that a renderer fills.
+// Gradients of a scene: the same members, all 0, and the views that a renderer writes to.
 template <class T>
 struct OwnedGradients {
   OwnedScene<T> d;
@@ -206,8 +206,8 @@ struct OwnedCotangents {
   FrameGradientsT<T> View() const { return {color, alpha, attributes, normals, uv, depth}; }
 };
 
-// The images of an owned scene and the gradients of the sum of images times cotangents, by the
-// Renderer and by the reference.
+// The images of an owned scene and the gradients of sum(images * cotangents), by the Renderer and
+// by the reference.
 
 template <class T>
 struct OwnedRendering {
@@ -215,7 +215,7 @@ struct OwnedRendering {
   OwnedScene<T> d;  // gradients
 };
 
-// A copy of images.
+// Copies images.
 template <class T>
 FrameImagesT<T> OwnedImages(const ImagesT<T>& images) {
   FrameImagesT<T> out;
@@ -249,7 +249,7 @@ inline Status RenderOwned(OwnedScene<float>& scene, const RenderOptions& options
   return {};
 }
 
-// With visibility given as ids of the scene's faces [H,W].
+// With visibility given as face ids of the scene [H,W].
 template <class T>
 OwnedScene<T> OwnedRefBackward(OwnedScene<T>& scene, const RenderOptions& options,
                                const OwnedCotangents<T>& d_frame,

@@ -40,7 +40,7 @@ double Dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// The naive renderer's answer on some rows.
+// The naive renderer's result on some rows.
 struct Truth {
   std::vector<int> rows;
   std::vector<double> alpha;        // [H,W], of those rows
@@ -111,7 +111,7 @@ class Measurement {
     return renderer_.Render({&job_.scene, 1}, setting, {.color = false, .attributes = false},
                             &frame_);
   }
-  // d_positions_ <- the gradient of L with upstream gradients `d_alpha`, of what was rendered last.
+  // d_positions_ <- the gradient of L with upstream gradients `d_alpha`, for the last render.
   Status Backward(const std::vector<float>& d_alpha) {
     const SceneGradients d_scene{.positions = d_positions_};
     return renderer_.Backward(frame_, {.alpha = d_alpha}, {&d_scene, 1});
@@ -295,7 +295,7 @@ std::string Table(const StudyResult& r) {
   return out + "\n";
 }
 
-// An error of nothing has no logarithm: half a unit in the last place of 1 stands for it.
+// Zero has no logarithm: half a unit in the last place of 1 replaces it.
 double Shown(double error) { return std::max(error, 0x1p-25); }
 
 }  // namespace
@@ -347,7 +347,7 @@ std::string StudyPicture(const std::vector<StudyResult>& results) {
                              fmt::format("{} pixels, delta = {:.3g}", r.size, r.delta)},
                             {}};
     for (const TradeoffRow& row : r.tradeoff.rows) {
-      if (row.rule == AlphaRule::kPaper) continue;  // no curve goes through it
+      if (row.rule == AlphaRule::kPaper) continue;  // it is on no curve
       series.points.push_back({std::max(Cost(row), 1e-3), Shown(row.largest),
                                fmt::format("max_alpha_error = {:g}", row.max_alpha_error)});
     }

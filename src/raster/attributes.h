@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Attributes of a mesh: what is interpolated across its faces (colours, uv, normals, ...).
+// Attributes of a mesh: values interpolated across its faces (colours, uv, normals, ...).
 #pragma once
 
 #include <cstddef>

@@ -76,7 +76,7 @@ BinLists SortIntoBins(const DrawnFaces& faces, const SquareGrid& grid, BinListBu
 }
 
 // All faces into the only bin. Reserves the maximum, not the need: which worker gets which image
-// varies between calls, and once every size has been seen nothing may be allocated.
+// varies between calls, and once every size has occurred nothing may allocate.
 BinLists ListAll(const DrawnFaces& faces, BinListBuffers* buffers) {
   buffers->faces.clear();
   buffers->faces.reserve(faces.storage.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binning: which faces each bin has to process. Stable: within a bin faces ascend, which the tie
-// rule and deterministic sums rely on.
+// Binning: lists the faces that each bin has to process. Stable: faces ascend within a bin, as the
+// tie rule and deterministic sums require.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct PixelRect {
   int x0, y0, x1, y1;
 };
 
-// Calls visit(rect) for the tiles of a rectangle that begins where a tile does.
+// Calls visit(rect) for the tiles of a rectangle, which must start on a tile boundary.
 template <class Visit>
 void ForTiles(const PixelRect& rect, const Visit& visit) {
   for (int y = rect.y0; y < rect.y1; y += kTileSize) {
@@ -32,7 +32,7 @@ void ForTiles(const PixelRect& rect, const Visit& visit) {
 // One face list per bin, as compressed rows: bin b holds faces[begin[b]] .. faces[begin[b+1]-1].
 struct BinLists {
   std::span<const std::int32_t> begin;  // [bins + 1]
-  std::span<const std::int32_t> faces;  // indices into what was binned, ascending within a bin
+  std::span<const std::int32_t> faces;  // indices into the binned faces, ascending within a bin
 
   std::span<const std::int32_t> operator[](std::size_t bin) const {
     const auto from = static_cast<std::size_t>(begin[bin]);
@@ -60,7 +60,7 @@ struct SquareGrid {
     const int y0 = static_cast<int>(cell / columns) << bits;
     return {x0, y0, x0 + size < width ? x0 + size : width, y0 + size < height ? y0 + size : height};
   }
-  // The cell that pixel (x, y) lies in.
+  // The cell of pixel (x, y).
   std::size_t cell(int x, int y) const {
     return static_cast<std::size_t>(y >> bits) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(x >> bits);
@@ -72,11 +72,11 @@ inline SquareGrid TileGrid(int width, int height) { return {width, height, kTile
 // The memory behind a BinLists; reused from frame to frame.
 struct BinListBuffers {
   AlignedVector<std::int32_t> begin, faces;
-  AlignedVector<std::int32_t> cursor;  // [chunks of faces][bins] where a chunk's next face goes
+  AlignedVector<std::int32_t> cursor;  // [chunks of faces][bins] position of a chunk's next face
   BinLists View() const { return {begin, faces}; }
 };
 
-// Lists every drawn face (its index in `faces.storage`) for each bin in which its box holds a pixel
+// Lists every drawn face (its index in `faces.storage`) in each bin where its box contains a pixel
 // centre. `bins`: BinGrid of the faces' image. `workers` null: the calling thread.
 BinLists BinDrawnFaces(const DrawnFaces& faces, const SquareGrid& bins, BinListBuffers* buffers,
                        const Workers* workers = nullptr);

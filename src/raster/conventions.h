@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rules of the rasterizer, decided once. docs/conventions.md says the same in prose.
+// The rules of the rasterizer, defined once. docs/conventions.md explains them in prose.
 //
 // 1. Screen. x right, y down, pixels; pixel (column j, row i) is the square [j, j+1) x [i, i+1) and
 //    its centre is (j + 0.5, i + 0.5). Camera and projection: scene/camera.h.
@@ -94,10 +94,10 @@ inline constexpr int kTileSize = 1 << kTileBits;  // pixels
 inline constexpr int kBinBits = 6;
 inline constexpr int kBinSize = 1 << kBinBits;  // pixels; faces are drawn by bins, of 4 x 4 tiles
 inline constexpr int kMaxImageSize = 16384;     // pixels, each axis
-// Coordinates up to here give edge functions that step through a tile in 32 bits (see coverage.h);
-// every vertex on the largest image is inside.
+// Within this range the edge functions can step through a tile in 32 bits (see coverage.h); every
+// vertex on the largest image is inside.
 inline constexpr float kGuardBand = 16384.0f;  // pixels
-// Coordinates beyond are moved here, for coverage only: the exact edge functions need 128 bits.
+// Coordinates beyond are clamped, for coverage only: the exact edge functions need 128 bits.
 inline constexpr double kMaxSnap = 0x1p40;       // pixels
 inline constexpr double kFlatHeight = 1.0 / 64;  // pixels, rule 8
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Screen positions of face corners, packed for vector loads while faces are set up. Code with faces
-// in its lanes reads them from here instead of gathering.
+// in its lanes loads them from here instead of gathering.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,14 @@
 namespace tilegrad::raster {
 
 inline constexpr std::size_t kPacketFaces = 16;   // no vector has more lanes of floats
-inline constexpr std::size_t kCornerNumbers = 6;  // of a face: x of corners 0, 1, 2, then y
-inline constexpr std::size_t kPacketGroup = 16;   // there is room for a multiple of so many packets
+inline constexpr std::size_t kCornerNumbers = 6;  // per face: x of corners 0, 1, 2, then y
+inline constexpr std::size_t kPacketGroup = 16;   // room for a multiple of this many packets
 
-// Coordinate of faces that do not take part in the soft mask, and of those that fill up the last
-// packets: beyond the reach of every kernel.
+// Coordinate of faces outside the soft mask and of padding in the last packets: beyond the reach of
+// every kernel.
 inline constexpr float kNowhere = 3e38f;
 
-// [packet][kCornerNumbers][kPacketFaces], pixels. A packet is read as a whole.
+// [packet][kCornerNumbers][kPacketFaces], pixels. A packet is loaded as a whole.
 struct CornerPackets {
   AlignedVector<float> values;
 
@@ -26,11 +26,11 @@ struct CornerPackets {
     return (faces + kFaces - 1) / kFaces * kPacketGroup;
   }
   std::size_t packets() const { return values.size() / (kCornerNumbers * kPacketFaces); }
-  // Reuses the memory.
+  // Reuses memory.
   void Resize(std::size_t faces) {
     values.resize(PacketsOf(faces) * kCornerNumbers * kPacketFaces);
   }
-  // One number of a packet's faces.
+  // One of the corner numbers for a packet's faces.
   float* at(std::size_t packet, std::size_t number) { return values.data() + At(packet, number); }
   const float* at(std::size_t packet, std::size_t number) const {
     return values.data() + At(packet, number);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faces as planes, in vectors: what interpolate.h and interpolate_backward.h have in common.
+// Faces as planes, vectorised: shared by interpolate.h and interpolate_backward.h.
 #if defined(TILEGRAD_RASTER_CORNER_PLANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_CORNER_PLANES_INL_H_
 #undef TILEGRAD_RASTER_CORNER_PLANES_INL_H_
@@ -114,8 +114,8 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
 }
 
-// Faces whose 1/depth varies by more than this factor are set up in double. Of such a face (one cut
-// at the near plane, say) the image shows the far end, where perspective attributes are the
+// Faces whose 1/depth varies by more than this factor are set up in double. The image shows the far
+// end of such a face (clipped at the near plane, say), where perspective attributes are the
 // quotient of two small differences of large terms: float rounding at the near end would swamp
 // them. In either mode the near corners have small weights there but move far on the screen with
 // their vertices, so the gradient needs the digits of small weights.
@@ -132,7 +132,7 @@ struct WeightLanes {
   float value[kMostFaceLanes], dx[kMostFaceLanes], dy[kMostFaceLanes];
 };
 
-// WeightPlanes again for the lanes in `steep`.
+// Recomputes WeightPlanes for the lanes in `steep`.
 inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, Lane origin_y,
                                          hn::Mask<LaneTag> steep, Plane out[3]) {
   const LaneTag d;
@@ -152,7 +152,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   hn::StoreMaskBits(d, steep, bits);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
-    // Thin, or too large for float to tell: stays flat.
+    // Thin, or too large to decide in float: stays flat.
     if (lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0) continue;
     const FacePlane<double> plane = MakeFacePlane(
         ScreenCorners<double>{{x[0][i], x[1][i], x[2][i]}, {y[0][i], y[1][i], y[2][i]}, {0, 0, 0}});
@@ -168,7 +168,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   }
 }
 
-// Where the corners' attributes begin.
+// Offsets of the corners' attributes.
 HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::int32_t* faces,
                                       const CornerIndices& vertices) {
   const bool by_vertex = input.attributes.rate == Rate::kVertex;
@@ -182,11 +182,11 @@ HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::
   return out;
 }
 
-// What the planes of a vector of faces are built from.
+// The inputs from which the planes of a vector of faces are built.
 struct CornerPlanes {
   Plane weight[3], q;
   Lane m[3];   // 1/depth times `scale`, or 1
-  Lane scale;  // makes the largest m 1: N and Q then stay in range whatever unit depth has
+  Lane scale;  // normalises the largest m to 1: N and Q stay in range whatever the unit of depth
   CornerIndices attributes;
 };
 
@@ -239,7 +239,7 @@ class AttributeQuads {
   mutable float last_[4] = {};
 };
 
-// Channels `first` to first + 3 at corner k; those that do not exist hold anything finite.
+// Channels `first` to first + 3 at corner k; missing channels hold any finite number.
 HWY_INLINE void CornerAttributes(const InterpolateInput& input, const CornerPlanes& corners, int k,
                                  int first, Lane (&out)[4]) {
   LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, corners.attributes.at[k], first),

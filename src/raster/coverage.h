@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coverage in integers: the fill rule of conventions.h, without rounding error. Scalar; shared by
-// the reference and the set-up of the vector kernel, so that both take the same decision.
+// the reference and the set-up of the vector kernel, so that both decide alike.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,10 @@ std::int64_t Snap(const T& pixels) {
   return std::llrint(p * static_cast<double>(kSubpixels));
 }
 
-// Faces up to this wide and high are small: relative to a pixel centre within the face's box, the
-// products of their exact edge functions fit into 32 bits.
+// Faces up to this wide and high are small: relative to a pixel centre within the face's box,
+// products in their exact edge functions fit into 32 bits.
 inline constexpr std::int32_t kSmallExtent = 30 * 1024;  // subpixels
-// And they are not farther away than this.
+// Small faces are also no farther from the origin than this.
 inline constexpr std::int32_t kFarSubpixels = 1 << 30;
 
 // A face in subpixels.
@@ -73,7 +73,7 @@ struct SnappedFace {
   }
 };
 
-// `face` as it is wound.
+// `face` with its original winding.
 template <class T>
 SnappedFace SnapFace(const ScreenMeshT<T>& mesh, std::size_t face) {
   SnappedFace out;
@@ -85,7 +85,7 @@ SnappedFace SnapFace(const ScreenMeshT<T>& mesh, std::size_t face) {
   return out;
 }
 
-// Wound so that its area is not negative, as EdgeAt needs it.
+// Rewound so that its area is not negative, as EdgeAt requires.
 template <class T>
 SnappedFace SnapFaceClockwise(const ScreenMeshT<T>& mesh, std::size_t face) {
   SnappedFace out = SnapFace(mesh, face);
@@ -112,7 +112,7 @@ inline bool Covers(const SnappedFace& face, int column, int row) {
                         : CoversAs<Int128>(face, column, row);
 }
 
-// Bits of FaceReject that follow from the shape on the screen.
+// Bits of FaceReject determined by the shape on the screen.
 inline std::uint8_t ShapeReject(const SnappedFace& face, bool cull_back) {
   const int sign = face.AreaSign();
   if (sign == 0) return kFaceDegenerate;

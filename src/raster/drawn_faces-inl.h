@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of drawn_faces.h; lanes are faces. The same numbers, bit by bit, as the scalar code
-// of coverage.h and face_plane.h (no fused operations).
+// Vector body of drawn_faces.h; lanes are faces. Bitwise equal to the scalar code of coverage.h and
+// face_plane.h (no fused operations).
 #if defined(TILEGRAD_RASTER_DRAWN_FACES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_DRAWN_FACES_INL_H_
 #undef TILEGRAD_RASTER_DRAWN_FACES_INL_H_
@@ -30,7 +30,7 @@ struct ShapeCorners {
   FaceVec x[3], y[3], z[3];
 };
 
-// Faces f to f + count - 1; the first of them again in lanes beyond.
+// Faces f to f + count - 1; lanes beyond repeat the first.
 HWY_INLINE ShapeCorners LoadShapeCorners(const ScreenMesh& mesh, std::size_t f, std::size_t count) {
   const std::int32_t* const corners[3] = {&mesh.v0[f], &mesh.v1[f], &mesh.v2[f]};
   ShapeCorners out;
@@ -50,7 +50,7 @@ HWY_INLINE ShapeCorners LoadShapeCorners(const ScreenMesh& mesh, std::size_t f, 
   return out;
 }
 
-// Corners in subpixels. What is beyond any image saturates.
+// Corners in subpixels. Coordinates beyond any image saturate.
 struct SnappedLanes {
   FaceInt x[3], y[3];
 };
@@ -62,7 +62,7 @@ HWY_INLINE FaceInt SnapLanes(FaceVec pixels) {
   return hn::NearestInt(hn::Min(hn::Max(scaled, hn::Neg(far)), far));
 }
 
-// The least and the largest of three along one axis.
+// The minimum and maximum of three along one axis.
 struct RangeLanes {
   FaceInt low, high;
 };
@@ -77,7 +77,7 @@ HWY_INLINE FaceIntMask IsSmall(const RangeLanes& range) {
   return hn::And(within, hn::Lt(hn::Sub(range.high, range.low), hn::Set(di, kSmallExtent + 1)));
 }
 
-// Pixels [begin, end) of the image along one axis whose centre lies in the range.
+// Pixels [begin, end) of the image along one axis with centres in the range.
 struct PixelLanes {
   FaceInt begin, end;
 };
@@ -218,7 +218,8 @@ HWY_INLINE void StoreBins(const BinWords& words, std::uint32_t keep, BinRange* o
   }
 }
 
-// Writes the first pieces of the records of the lanes in `keep`. Returns where the next one goes.
+// Writes the first pieces of the records of the lanes in `keep`. Returns the address of the next
+// one.
 template <int kCount>
 HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, DrawnFace* out) {
   const FaceIntTag di;
@@ -256,8 +257,7 @@ HWY_INLINE ShapeLanes ShapesOf(const ShapeCorners& c) {
   return out;
 }
 
-// Sets reject[0] to reject[count - 1], of face f and those behind it. Returns bits of those that
-// are drawn.
+// Sets reject[0] to reject[count - 1], for faces from f on. Returns bits of the drawn ones.
 HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& shapes,
                                       bool cull_back, std::size_t f, std::size_t count,
                                       std::uint8_t* reject) {
@@ -323,7 +323,7 @@ HWY_INLINE FaceIntMask FitsStamp(const ShapeLanes& shapes, const PixelLanes& col
   return hn::And(shapes.small, hn::And(fits(columns), fits(rows)));
 }
 
-// Writes the records of those faces in `keep` that may cover a pixel. Returns how many.
+// Writes the records of those faces in `keep` that may cover a pixel. Returns their number.
 HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& corners,
                                  ShapeLanes* shapes, std::size_t f, std::uint32_t drawn,
                                  const FaceList& to) {
@@ -385,8 +385,8 @@ HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t c
   }
 }
 
-// `corner_packets` may be null. `out` has null, or room for all of the faces. Returns how many were
-// written.
+// `corner_packets` may be null. `out` has null, or room for all of the faces. Returns the number of
+// records written.
 std::size_t SetUpSomeFaces(const ScreenMesh& mesh, const SomeFaces& range, std::uint8_t* reject,
                            CornerPackets* corner_packets, const FaceList& out) {
   const std::size_t lanes = hn::Lanes(FaceIntTag());

@@ -18,7 +18,7 @@ namespace {
 
 HWY_EXPORT(SetUpSomeFaces);
 
-// Fills lanes without a face.
+// Pads lanes without a face.
 void FillUp(std::size_t faces, CornerPackets* corners) {
   for (std::size_t packet = faces / kPacketFaces; packet < corners->packets(); ++packet) {
     const std::size_t from = packet == faces / kPacketFaces ? faces % kPacketFaces : 0;

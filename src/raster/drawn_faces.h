@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What drawing needs of every face, set up once per image: shape, box, edge functions, depth.
+// Per-face data for drawing, set up once per image: shape, box, edge functions, depth.
 #pragma once
 
 #include <cstddef>
@@ -15,23 +15,23 @@
 
 namespace tilegrad::raster {
 
-// Faces whose box is at most this many pixels wide and high get their coverage computed at set-up,
-// as the bits of a square of this size (a stamp).
+// Faces whose box is at most this many pixels wide and high get their coverage at set-up, as a bit
+// square of this size (a stamp).
 inline constexpr int kStamp = 4;
 
-// A face that has a pixel centre of the image in its box; one that fits a stamp covers one, too.
-// Edge k at pixel (column, row) is
+// A face with a pixel centre of the image in its box; if it fits a stamp, it covers one. Edge k at
+// pixel (column, row) is
 // edge[k] + step_x[k] * (column - column_begin) + step_y[k] * (row - row_begin), and the pixel is
 // covered if none is negative: the exact edge functions, divided by kSubpixels and rounded down,
 // which keeps their sign because a step of one pixel is a multiple of kSubpixels.
 struct DrawnFace {
-  static constexpr std::int32_t kByTiles = 0;   // not SnappedFace::small; neither pixels nor edges
-                                                // are set (TileFaceSetup makes them per tile)
+  static constexpr std::int32_t kByTiles = 0;   // not SnappedFace::small; pixels and edges are not
+                                                // set (TileFaceSetup computes them per tile)
   static constexpr std::int32_t kByEdges = -1;  // small, the box exceeds a stamp: edges are set
 
   std::int32_t face;  // index into the ScreenMesh
-  // kByTiles, kByEdges, or the stamp: bit kStamp * row + column says that the face covers that
-  // pixel, counted from (column_begin, row_begin). Edges may be unset then.
+  // kByTiles, kByEdges, or the stamp: bit kStamp * row + column is set if the face covers that
+  // pixel, relative to (column_begin, row_begin). With a stamp, edges may be unset.
   std::int32_t pixels;
   std::int16_t column_begin, column_end, row_begin, row_end;  // pixels, within the image
   DepthPlane<float> depth;
@@ -45,16 +45,16 @@ struct BinRange {
   std::int16_t columns, rows;
 };
 
-// Faces are set up in chunks, which workers share; each lists its own, from the place in `storage`
-// that the chunk's first face has in the mesh. Reused from frame to frame: grows to the largest
+// Faces are set up in chunks, shared among workers; each chunk writes its own list, which starts in
+// `storage` at the mesh index of its first face. Reused from frame to frame: grows to the largest
 // mesh seen.
 struct DrawnFaces {
   static constexpr std::size_t kChunk = 8192;  // faces
-  AlignedVector<DrawnFace> storage;            // between the lists: anything
+  AlignedVector<DrawnFace> storage;            // unspecified between the lists
   AlignedVector<BinRange> bins;                // of each
-  AlignedVector<std::size_t> counts;           // [chunks] how many each has listed
+  AlignedVector<std::size_t> counts;           // [chunks] lengths of the lists
 
-  std::span<const DrawnFace> list(std::size_t chunk) const {  // face ascends
+  std::span<const DrawnFace> list(std::size_t chunk) const {  // ascending by face
     return std::span(storage).subspan(chunk * kChunk, counts[chunk]);
   }
   std::span<const BinRange> bins_of_list(std::size_t chunk) const {
@@ -68,10 +68,10 @@ struct SomeFaces {
   bool cull_back;
 };
 
-// What to set up for the faces of an image; null: not wanted.
+// What to set up for the faces of an image; null: nothing.
 struct FaceSetUp {
-  DrawnFaces* drawn = nullptr;       // those that are drawn and may cover a pixel of the image
-  CornerPackets* corners = nullptr;  // of those that take part in the soft mask
+  DrawnFaces* drawn = nullptr;       // drawn faces that may cover a pixel of the image
+  CornerPackets* corners = nullptr;  // faces that take part in the soft mask
 };
 
 // Where records are written.
@@ -80,7 +80,7 @@ struct FaceList {
   BinRange* bins;
 };
 
-// Sets the bits of `reject` [F] that follow from the shape on the screen (degenerate, culled);
+// Sets the bits of `reject` [F] determined by the shape on the screen (degenerate, culled);
 // bits that are set on entry stay, and such faces are not drawn. `workers` null: the calling
 // thread.
 void SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,

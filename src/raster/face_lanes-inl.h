@@ -43,7 +43,7 @@ HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
   }
   return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
 }
-// The other way.
+// The inverse.
 template <class D>
 HWY_INLINE hn::Mask<D> MaskOf(D d, std::uint32_t bits) {
   const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
@@ -51,7 +51,7 @@ HWY_INLINE hn::Mask<D> MaskOf(D d, std::uint32_t bits) {
   return hn::LoadMaskBits(d, bytes);
 }
 
-// The first `count` lanes; the first of them again where there are more.
+// The first `count` lanes; lanes beyond repeat the first.
 HWY_INLINE FaceInt LoadSome(const std::int32_t* from, std::size_t count) {
   const FaceIntTag di;
   if (count >= hn::Lanes(di)) return hn::LoadU(di, from);
@@ -115,7 +115,7 @@ HWY_INLINE void LoadVertices(const ScreenMesh& mesh, const std::int32_t* vertex,
 // Four pixels.
 using QuadIntTag = hn::RebindToSigned<QuadTag>;
 
-// Which of them show a face.
+// Which pixels show a face.
 HWY_INLINE hn::Mask<QuadTag> SeesFace(const std::int32_t* faces) {
   const QuadIntTag di;
   return hn::RebindMask(QuadTag(), hn::Gt(hn::LoadU(di, faces), hn::Set(di, kNoFace)));

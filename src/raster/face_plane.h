@@ -98,8 +98,8 @@ FacePlane<T> MakeFacePlane(const ScreenMeshT<T>& mesh, std::size_t face) {
   return MakeFacePlane(CornersOf(mesh, face));
 }
 
-// 1/depth over a face; linear on the screen, kept between the values of the corners, which rounding
-// of a sliver would leave.
+// 1/depth over a face; linear on the screen, clamped to the range of the corners, which rounding of
+// a sliver could leave.
 template <class T>
 struct DepthPlane {
   T x0, y0, base, gx, gy;
@@ -122,9 +122,9 @@ void SwapUnlessOrdered(ScreenCorners<T>* c, int i, int j) {
   std::swap(c->z[i], c->z[j]);
 }
 
-// Corners in an order that does not depend on where a face starts and how it is wound: coinciding
-// faces (both sides of a double-sided face) then have the same bits, so that the tie rule decides
-// between them and not rounding.
+// Corners in an order independent of a face's first corner and winding: coinciding faces (both
+// sides of a double-sided face) then have the same bits, so that the tie rule decides between them
+// and not rounding.
 template <class T>
 ScreenCorners<T> OrderedCorners(const ScreenMeshT<T>& mesh, std::size_t face) {
   ScreenCorners<T> c = CornersOf(mesh, face);
@@ -148,9 +148,9 @@ DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
   return plane;
 }
 
-// Set up in double and counted from the middle of what the image holds of the face's box. A face
-// that was cut reaches far out of the image, where its 1/depth is hundreds of times what it is in
-// the image: seen from a corner out there, little would be left of it in float.
+// Set up in double, relative to the centre of the visible part of the face's box. A clipped face
+// reaches far out of the image, where its 1/depth is hundreds of times that in the image: relative
+// to a corner out there, float would leave few digits.
 inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face) {
   const ScreenCorners<float> c = OrderedCorners(mesh, face);
   const DepthPlane<double> plane = NarrowDepthPlane(Wide(c));

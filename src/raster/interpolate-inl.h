@@ -43,7 +43,7 @@ HWY_INLINE Plane BarycentricPlane(const CornerPlanes& corners, int k) {
   return n;
 }
 
-// Where an output stands: group 0 has three outputs and Q.
+// Position of an output: group 0 has three outputs and Q.
 HWY_INLINE int FirstOutput(int group) { return group == 0 ? 0 : 4 * group - 1; }
 HWY_INLINE int GroupOutputs(int group) { return group == 0 ? 3 : 4; }
 
@@ -82,8 +82,8 @@ HWY_INLINE void SetUpQuads(const InterpolateInput& input, const SeenFaces& seen,
   }
 }
 
-// What pixels read about the visible faces, by slot. Held by value: if it were referenced,
-// compilers would assume that vector stores change it and reload it.
+// What pixels read about the visible faces, by slot. Held by value: behind a reference, compilers
+// would assume that vector stores change it, and reload it.
 struct SlotArrays {
   const std::int32_t* slot_of_face;
   const float *origin_x, *origin_y;
@@ -100,7 +100,7 @@ struct SlotArrays {
 };
 
 // Evaluates the planes of a group at four pixels of a row; out[k] is output k of the four. `faces`:
-// theirs; (px, py): the centre of the first.
+// of the pixels; (px, py): the centre of the first.
 template <bool kWithQ>
 HWY_INLINE void EvaluateQuads(const SlotArrays& slots, const std::int32_t* faces, float px,
                               float py, Quad (&out)[4]) {
@@ -129,7 +129,7 @@ struct InterpolateJob {
 struct QuadRow {
   float* to[4];            // the row's pixels of each output
   std::ptrdiff_t step[4];  // to the next row
-  int outputs;             // how many there are
+  int outputs;             // their number
   int count;               // pixels
 
   HWY_INLINE QuadRow(const InterpolateJob& job, int group, int i) {

@@ -5,8 +5,8 @@
 //
 //     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k     (1: screen-linear)
 //
-// (Q is kept at or above the smallest m_k: rounding in coverage lets a pixel centre lie a hair
-// outside of its face, where a plane that varies much may cross zero)
+// (Q is clamped to at least the smallest m_k: rounding in coverage lets a pixel centre lie slightly
+// outside of its face, where a steep plane may cross zero)
 //
 // where N_c and Q are planes: three numbers per face and channel. (m is scaled so that its largest
 // is 1, which changes neither I nor its gradient.) With h_c = dL/dI_c / Q and s = sum_c h_c I_c,
@@ -34,14 +34,14 @@ struct InterpolateInput {
   bool barycentrics;  // two more planes: the weights of corners 1 and 2
 };
 
-// Channels, plus two where barycentrics are wanted.
+// Channels, plus two for barycentrics if requested.
 inline int InterpolateOutputs(const InterpolateInput& input) {
   return input.attributes.channels + (input.barycentrics ? 2 : 0);
 }
 
-// The planes of the faces seen, for the forward pass: four outputs of a slot stand side by side, so
-// that a pixel loads what it needs of its face at once. Group 0 holds outputs 0 to 2 and Q, the
-// groups behind it four outputs each. Scratch of one worker.
+// The planes of the visible faces, for the forward pass: four outputs of a slot are adjacent, so
+// that a pixel loads what it needs of its face at once. Group 0 holds outputs 0 to 2 and Q, later
+// groups four outputs each. Scratch of one worker.
 class PlaneQuads {
  public:
   // For up to `slots` slots. Never shrinks.
@@ -52,7 +52,7 @@ class PlaneQuads {
   float* quads(int group, int part) {
     return data_.data() + 4 * slots_ * static_cast<std::size_t>(3 * group + part);
   }
-  // [slot][4]: what group 0 is kept at or above: only Q is.
+  // [slot][4]: lower bounds for group 0; only Q has one.
   float* least() { return quads(groups_, 0); }
 
  private:
@@ -74,8 +74,8 @@ struct PlanarView {
   std::ptrdiff_t plane, row;  // steps
 };
 
-// Where Interpolate writes: outputs [0, channels) to `attributes`, then the two barycentrics. From
-// the first pixel of the rows on, and only the first `columns` of each.
+// The destination of Interpolate: outputs [0, channels) to `attributes`, then the two barycentrics.
+// Starts at the first pixel of the rows, and writes only the first `columns` of each.
 struct InterpolateOutput {
   PlanarView<float> attributes, barycentrics;
   int columns;
@@ -84,7 +84,7 @@ struct InterpolateOutput {
 // Writes pixels of `rows`, which are kBinSize wide; 0 at background pixels.
 void Interpolate(const InterpolateInput& input, const FaceRows& rows, const InterpolateOutput& out,
                  InterpolateScratch* scratch);
-// The same where all pixels are background; of `rows`, `faces` is not read.
+// The same if all pixels are background; does not read `faces` of `rows`.
 void InterpolateBackground(const InterpolateInput& input, const FaceRows& rows,
                            const InterpolateOutput& out);
 

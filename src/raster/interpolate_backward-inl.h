@@ -30,12 +30,12 @@ HWY_INLINE CornerPlanes LoadCornerPlanes(const InterpolateInput& input, const Ba
                           hn::Load(d, sums.origin_y.data() + s));
 }
 
-// Channels of a group: three, or what is left of them.
+// Channels of a group: three, or the rest.
 HWY_INLINE int GroupChannels(const InterpolateInput& input, std::size_t group) {
   return HWY_MIN(3, input.attributes.channels - 3 * static_cast<int>(group));
 }
 
-// What one group makes of a vector of faces: N of its channels.
+// Planes of one group for a vector of faces: N of its channels.
 struct GroupPlanes {
   Lane attribute[3][3];  // [corner][channel]
   Plane numerator[3];    // [channel]
@@ -89,7 +89,7 @@ HWY_INLINE Quad PerspectiveAdjoint(Quad d_out, const float* planes, std::size_t 
   return hn::IfThenElse(hn::FirstN(d, 3), h, s);
 }
 
-// Four pixels of a row, all there.
+// Four pixels of a row, all inside the image.
 struct PixelQuad {
   const std::int32_t* faces;
   Quad d_out[4];  // by pixel: (g_0, g_1, g_2, 0)
@@ -119,8 +119,8 @@ HWY_INLINE PixelShare ShareOf(const PixelQuad& pixels, int p, std::size_t group,
   return out;
 }
 
-// Neighbours mostly see the same face. So that the second need not wait for the first to be stored,
-// it adds the first's share again if both have one slot, and is stored last.
+// Neighbours mostly see the same face. So that the second need not wait for the first's store, it
+// adds the first's share as well if both have the same slot, and is stored last.
 HWY_INLINE void AddPair(const PixelShare& a, const PixelShare& b, float* moments,
                         std::size_t stride) {
   const QuadTag d;
@@ -258,7 +258,7 @@ HWY_INLINE void AddGroup(const GroupPlanes& planes, const Plane& q, const GroupS
   }
 }
 
-// One vector of slots from `s` on; `to`: its place in the first array.
+// One vector of slots from `s` on; `to`: its position in the first array.
 HWY_INLINE void FinishLanes(const InterpolateInput& input, const BandSums& sums, std::size_t s,
                             const BackwardRequest& request, float* to) {
   const LaneTag d;

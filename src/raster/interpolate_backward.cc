@@ -15,7 +15,7 @@ namespace {
 HWY_EXPORT(SumMoments);
 HWY_EXPORT(Finish);
 
-// To what the band can need, as ReserveSeenFaces.
+// Reserves the most that the band can need, like ReserveSeenFaces.
 void ReserveSums(const InterpolateInput& input, const BackwardBand& band, BandSums* sums) {
   const std::size_t groups = ChannelGroups(input.attributes.channels);
   const std::size_t slots = SeenFaces::MostSlots(input.mesh->faces(), band.rows.pixels());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The adjoint of interpolate.h, for a band of rows of an image: two passes over its face ids, the
-// first to number the faces that are seen, the second to sum moments per face; then one over those
-// faces. The formulas stand in interpolate.h.
+// The adjoint of interpolate.h, for a band of rows of an image: a first pass over its face ids
+// numbers the visible faces, a second sums moments per face; a third runs over those faces.
+// interpolate.h has the formulas.
 #pragma once
 
 #include <cstddef>
@@ -25,14 +25,14 @@ inline std::size_t ChannelGroups(int channels) {
   return static_cast<std::size_t>(channels + 2) / 3;
 }
 
-// What is summed over a band. Slot 0 takes what belongs to no face.
+// Sums over a band. Slot 0 collects pixels without a face.
 struct BandSums : SeenFaces {
   AlignedVector<float> least_q;  // [slot], and
   AlignedVector<float> planes;   // [group][value, d/dx, d/dy][slot][4] N and Q: if perspective
   AlignedVector<float> moments;  // [group][1, x, y][slot][4]
 };
 
-// Which gradients are wanted.
+// The requested gradients.
 struct BackwardRequest {
   bool geometry;    // d_x, d_y, d_inverse_depth of the corners
   bool attributes;  // d_attribute of the corners
@@ -46,10 +46,10 @@ inline std::size_t FaceGradientArrays(int channels, const BackwardRequest& reque
   return (request.geometry ? 3 : 0) + (request.attributes ? 3 * ChannelGroups(channels) : 0);
 }
 
-// From sums to gradients of the corners: overwrites FaceGradientArrays arrays [stride][4], one
-// after the other, by slot (slot 0 holds nothing of meaning): (d_x, d_y, d_inverse_depth, 0) of
-// corners 0, 1, 2 if geometry is wanted; then, for each group, three channels' d_attribute and 0 of
-// corners 0, 1, 2 if attributes are wanted.
+// Turns sums into gradients of the corners: overwrites FaceGradientArrays arrays [stride][4],
+// concatenated, by slot (slot 0 is meaningless): (d_x, d_y, d_inverse_depth, 0) of corners 0, 1, 2
+// if geometry is requested; then, for each group, three channels' d_attribute and 0 of corners 0,
+// 1, 2 if attributes are requested.
 void FinishBand(const InterpolateInput& input, const BandSums& sums, const BackwardRequest& request,
                 std::span<float> d_faces);
 

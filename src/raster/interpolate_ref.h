@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of interpolate.h: attributes of one pixel and their adjoint (paper, equations 1 to 4).
-// T: float, double, std::complex<double>.
+// Scalar reference of interpolate.h: attributes of one pixel and their adjoint (paper, equations 1
+// to 4). T: float, double, std::complex<double>.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace tilegrad::raster {
 
-// b: barycentric weights on the screen; w: the weights that interpolate. Perspective: w_k is
-// proportional to b_k / depth_k, and q is the sum of those; screen-linear: w = b, q = 1.
+// b: barycentric weights on the screen; w: interpolation weights. Perspective: w_k is proportional
+// to b_k / depth_k, and q is the sum of those; screen-linear: w = b, q = 1.
 template <class T>
 struct PixelWeights {
   T b[3], w[3], q;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cutting faces at the near plane (conventions.h, rule 6): faces of a ScreenMesh, and what follows
-// for attributes, forward and backward. Scalar templates used by the reference and, since cut faces
-// are rare, by the fast path too.
+// Near clipping (conventions.h, rule 6): of the faces of a ScreenMesh and their attributes, forward
+// and backward. Scalar templates, used by the reference and, since cut faces are rare, by the fast
+// path too.
 #pragma once
 
 #include <algorithm>
@@ -34,14 +34,14 @@ CameraPoint<T> ToCamera(const CameraT<T>& camera, const T* p) {
           -(r[6] * p[0] + r[7] * p[1] + r[8] * p[2] + t[2])};
 }
 
-// The geometry that the faces of a screen mesh are assembled from.
+// The geometry from which the faces of a screen mesh are assembled.
 template <class T>
 struct FaceSource {
   std::span<const T> positions;         // [V,3]
   std::span<const std::int32_t> faces;  // [F,3]
   const CameraT<T>* camera;
   bool cull_back = false;
-  const FaceCorners* corners = nullptr;  // of `faces`, where they are already split by corner
+  const FaceCorners* corners = nullptr;  // of `faces`, if already split by corner
 };
 
 template <class T>
@@ -49,7 +49,7 @@ bool IsVisibleDepth(const T& depth, const CameraT<T>& camera) {
   return RealPart(depth) >= RealPart(camera.near_plane);
 }
 
-// The vertex where the edge from a (visible) to b (hidden) meets the near plane; appended.
+// Appends the vertex where the edge from a (visible) to b (hidden) meets the near plane.
 template <class T>
 std::int32_t AppendClipVertex(const FaceSource<T>& source, std::int32_t a, std::int32_t b,
                               ScreenMeshBuffersT<T>* out) {
@@ -71,7 +71,7 @@ template <class T>
 bool HasOverflow(const ScreenMeshBuffersT<T>& mesh, const std::int32_t v[3]) {
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(v[k]);
-    // x - x is NaN for what is not finite.
+    // x - x is NaN if x is not finite.
     const auto zero = (RealPart(mesh.x[i]) - RealPart(mesh.x[i])) +
                       (RealPart(mesh.y[i]) - RealPart(mesh.y[i])) +
                       (RealPart(mesh.depth[i]) - RealPart(mesh.depth[i]));
@@ -95,9 +95,9 @@ void AppendFace(const FaceSource<T>& source, std::int32_t source_face, std::int3
   out->reject.push_back(reject);
 }
 
-// Turns a quadrilateral so that it begins with that of its two corners which the scene has first:
-// by x, then y, then z. Wherever coinciding faces start and however they are wound, they then have
-// the same pieces, and the tie rule decides between them. By given positions, not by those on the
+// Rotates a quadrilateral to start at the one of its two original corners that comes first by x,
+// then y, then z. Whatever the first corners and windings of coinciding faces, they then get the
+// same pieces, and the tie rule decides between them. Compares positions as given, not those on the
 // screen, which float and double round differently.
 template <class T>
 void StartAtFirstCorner(const FaceSource<T>& source, std::int32_t (&polygon)[4]) {
@@ -113,10 +113,10 @@ void StartAtFirstCorner(const FaceSource<T>& source, std::int32_t (&polygon)[4])
   std::rotate(polygon, first, polygon + 4);
 }
 
-// Appends a piece of a cut face. It begins with the face's first corner or, failing that, with one
+// Appends a piece of a cut face, starting at the face's first corner or, failing that, at a vertex
 // made by clipping. Kernels compute the weight of a piece's first corner as 1 minus the others,
-// which loses the digits of a small one: the weight of the face's first corner is not an output,
-// and on the near plane weights are large.
+// which loses the digits of a small weight: that of the face's first corner is not an output, and
+// on the near plane weights are large.
 template <class T>
 void AppendPiece(const FaceSource<T>& source, std::int32_t face,
                  std::array<std::int32_t, 3> corners, ScreenMeshBuffersT<T>* out) {
@@ -153,7 +153,7 @@ void AppendCutFace(const FaceSource<T>& source, std::int32_t face, ScreenMeshBuf
 }
 
 // Fills the face arrays of `out`, whose vertex arrays hold the projected source vertices, and
-// appends the vertices that cutting makes.
+// appends the vertices made by clipping.
 template <class T>
 void AssembleFaces(const FaceSource<T>& source, ScreenMeshBuffersT<T>* out) {
   out->whole = nullptr;
@@ -176,7 +176,7 @@ void AssembleFaces(const FaceSource<T>& source, ScreenMeshBuffersT<T>* out) {
   }
 }
 
-// Which corner of a source face a source vertex is.
+// The corner index of a source vertex in a source face.
 inline std::size_t SourceCorner(std::span<const std::int32_t> faces, std::int32_t face,
                                 std::int32_t vertex) {
   const std::int32_t* v = &faces[3 * static_cast<std::size_t>(face)];
@@ -240,7 +240,7 @@ template <class T>
 void ClipAttributes(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
                     const AttributeViewT<const T>& in, std::span<T> out) {
   const auto channels = static_cast<std::size_t>(in.channels);
-  if (channels == 0) return;  // the spans have no elements to point at
+  if (channels == 0) return;  // the spans are empty
   ForEachAttributeRow(mesh, faces, in.rate,
                       [&](std::size_t row, const SourceRows<T>& from, std::ptrdiff_t) {
                         const T* a = &in.values[from.a * channels];
@@ -275,7 +275,7 @@ void ClipAttributesBackward(const ScreenMeshT<T>& mesh, std::span<const std::int
       });
 }
 
-// Weights of the source face's corners: a cut face mixes them.
+// Weights relative to the source face's corners, which the corners of a cut face mix.
 template <class T>
 void SourceWeights(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
                    std::size_t face, const T w[3], T out[3]) {

@@ -41,7 +41,7 @@ HWY_INLINE CameraLanes ToCameraLanes(ProjectTag d, const Camera& camera, Project
   return {row(0), row(1), hn::Neg(row(2))};
 }
 
-// Where the vertices of a vector go.
+// The destinations of a vector of vertices.
 struct VertexPlaces {
   float *x, *y, *depth, *inverse_depth;
   float* packed;  // [Lanes][4]
@@ -65,7 +65,7 @@ HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* po
   hn::StoreU(p.depth, d, to.depth);
   hn::StoreU(inverse, d, to.inverse_depth);
   hn::StoreInterleaved4(sx, sy, inverse, p.depth, d, to.packed);
-  // v - v is NaN, and not zero, for what is not finite.
+  // v - v is NaN, and not zero, unless v is finite.
   const auto zero = hn::Add(hn::Sub(sx, sx), hn::Add(hn::Sub(sy, sy), hn::Sub(p.depth, p.depth)));
   return hn::AllTrue(d, hn::And(visible, hn::Eq(zero, hn::Zero(d))));
 }
@@ -89,7 +89,7 @@ bool ProjectVertices(const FaceSource<float>& source, std::size_t begin, std::si
   }
   if (i == n) return plain;
   float rest[3 * 16], results[4][16], packed[4 * 16];
-  for (std::size_t k = 0; k < lanes; ++k) {  // the last vertex again where there is none
+  for (std::size_t k = 0; k < lanes; ++k) {  // lanes beyond repeat the last vertex
     std::memcpy(rest + 3 * k, in + 3 * HWY_MIN(i + k, n - 1), 3 * sizeof(float));
   }
   plain &= ProjectLanes(d, *source.camera, rest,
@@ -101,7 +101,7 @@ bool ProjectVertices(const FaceSource<float>& source, std::size_t begin, std::si
   return plain;
 }
 
-// Corners of faces [begin, end), each in an array of its own; the faces' numbers.
+// Splits faces [begin, end) into one array per corner, and their numbers.
 void SplitSomeFaces(std::span<const std::int32_t> faces, std::size_t begin, std::size_t end,
                     FaceCorners* out) {
   const hn::RebindToSigned<ProjectTag> di;
@@ -123,7 +123,7 @@ void SplitSomeFaces(std::span<const std::int32_t> faces, std::size_t begin, std:
   }
 }
 
-// Sums over vertices of the sixteen entries of a camera's gradient, as lanes.
+// Sums over vertices of the sixteen entries of a camera's gradient, per lane.
 struct CameraSums {
   ProjectVec rotation[9], translation[3], fx, fy, cx, cy;
 };
@@ -184,7 +184,7 @@ HWY_INLINE void ProjectLanesBackward(ProjectTag d, const Camera& camera, const f
   sums->cy = hn::Add(sums->cy, d_y);
 }
 
-// The adjoint where nothing was cut and every vertex is visible. d_screen [V][4].
+// The adjoint if no face was cut and every vertex is visible. d_screen [V][4].
 void ProjectVerticesBackward(const FaceSource<float>& source, std::span<const float> d_screen,
                              const ProjectGradients& out) {
   const ProjectTag d;
@@ -199,7 +199,7 @@ void ProjectVerticesBackward(const FaceSource<float>& source, std::span<const fl
   }
   if (i < n) {
     float positions[3 * 16], rest[4 * 16] = {}, d_positions[3 * 16];
-    for (std::size_t k = 0; k < lanes; ++k) {  // the last vertex again, with gradient zero
+    for (std::size_t k = 0; k < lanes; ++k) {  // beyond V the last vertex, with gradient 0
       std::memcpy(positions + 3 * k, &source.positions[3 * HWY_MIN(i + k, n - 1)],
                   3 * sizeof(float));
     }

@@ -35,8 +35,8 @@ bool ProjectSource(const FaceSource<float>& source, ScreenMeshBuffers* out,
   return plain;
 }
 
-// AssembleFaces where every vertex is visible and finite, without its tests. Leaves what follows
-// from shapes to the caller.
+// AssembleFaces for meshes whose vertices are all visible and finite, without its tests. Leaves
+// rejection by shape to the caller.
 void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out,
                         const Workers* workers) {
   if (source.corners == nullptr) SplitFaces(source.faces, out, workers);

@@ -11,26 +11,26 @@
 
 namespace tilegrad::raster {
 
-// Corners of `faces` [F,3], each in an array of its own, and the faces' numbers:
-// FaceSource::corners. Allocates only to grow `out`. `workers` null: the calling thread.
+// Splits `faces` [F,3] into one array per corner, and the faces' numbers: FaceSource::corners.
+// Allocates only to grow `out`. `workers` null: the calling thread.
 void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out,
                 const Workers* workers = nullptr);
 
 // Fills `out` with the screen mesh of a validated, finite source, and sets up its `faces`. `out`
-// then looks at source.corners, if given. Deterministic; allocates only to grow them. Not
-// thread-safe for one `out`. `workers` null: the calling thread.
+// then views source.corners, if given. Deterministic; allocates only to grow them. Not thread-safe
+// for one `out`. `workers` null: the calling thread.
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
              const FaceSetUp& faces = {}, const Workers* workers = nullptr);
 
-// The gradients that are wanted from the adjoint of Project.
+// The requested gradients of the adjoint of Project.
 struct ProjectGradients {
-  std::span<float> d_positions;        // [V,3] overwritten; empty: not wanted
-  CameraT<float>* d_camera = nullptr;  // overwritten; null: not wanted
+  std::span<float> d_positions;        // [V,3] overwritten; empty: not requested
+  CameraT<float>* d_camera = nullptr;  // overwritten; null: not requested
 };
 
-// dL/d(ScreenMesh), one vertex after the other.
+// dL/d(ScreenMesh), vertex by vertex.
 struct VertexGradients {
-  std::span<const float> quads;     // [V][4] d_x, d_y, d_inverse_depth, and one that is not read
+  std::span<const float> quads;     // [V][4] d_x, d_y, d_inverse_depth, unused
   std::span<const float> d_clip_t;  // as in ScreenGradients
 };
 

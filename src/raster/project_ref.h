@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of project.h: world to screen with near clipping, and its adjoint. T: float, double,
-// std::complex<double>.
+// Scalar reference of project.h: world to screen with near clipping, and its adjoint. T: float,
+// double, std::complex<double>.
 #pragma once
 
 #include <cstddef>
@@ -59,11 +59,11 @@ void PerspectiveBackward(const CameraPoint<T>& p, T d_x, T d_y, T d_inverse_dept
 template <class T>
 struct ClipAdjoint {
   T d_x, d_y;  // of the new screen vertex
-  T d_clip_t;  // of its place on the edge, from attributes
+  T d_clip_t;  // of its position on the edge, from attributes
 };
 
-// Clips the edge from clip.a to clip.b: the new vertex has the near plane's depth whatever its ends
-// do. Adds to d_points[clip.a], d_points[clip.b] and d_camera's intrinsics.
+// Adjoint of clipping the edge from clip.a to clip.b: the new vertex has the near plane's depth
+// whatever its ends do. Adds to d_points[clip.a], d_points[clip.b] and d_camera's intrinsics.
 template <class T>
 void ClipVertexBackward(const FaceSource<T>& source, const ClipVertexT<T>& clip,
                         const ClipAdjoint<T>& d_vertex, std::span<CameraPoint<T>> d_points,

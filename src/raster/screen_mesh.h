@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The result of projection: a mesh on the screen of one camera, as structure of arrays; and its
+// The result of projection: a mesh on the screen of one camera, as a structure of arrays, and its
 // gradient.
 #pragma once
 
@@ -26,20 +26,20 @@ struct PackedVertexT {
 };
 
 // Views over scratch that belongs to the renderer; valid for one frame. V and F count the vertices
-// and faces *after* near clipping: clipping appends vertices and replaces a cut face by one or two,
-// which stand in its place in the order and keep the identity of their source. Screen coordinates
-// are pixels: x right from the left edge, y down from the top edge. Source vertices nearer than the
-// near plane have x = y = inverse_depth = 0 and belong to kFaceBehind faces only.
+// and faces *after* near clipping: clipping appends vertices and replaces a cut face in place by
+// one or two, which keep the id of their source. Screen coordinates are pixels: x right from the
+// left edge, y down from the top edge. Source vertices nearer than the near plane have x = y =
+// inverse_depth = 0 and belong to kFaceBehind faces only.
 template <class T>
 struct ScreenMeshT {
   std::span<const T> x, y;                   // [V] pixels
   std::span<const T> depth;                  // [V] -p_cam.z; >= near plane where a face is drawn
   std::span<const T> inverse_depth;          // [V] 1 / depth
-  std::span<const PackedVertexT<T>> packed;  // [V] the same numbers again
+  std::span<const PackedVertexT<T>> packed;  // [V] the same numbers, interleaved
   std::span<const std::int32_t> v0, v1, v2;  // [F] vertex indices
-  // [F] the face of the caller's mesh, ascending; equals the index where nothing was clipped.
+  // [F] the face of the caller's mesh, ascending; equals the index if nothing was clipped.
   std::span<const std::int32_t> source_face;
-  // [V - source_vertices] where the appended vertices come from; empty if nothing was clipped.
+  // [V - source_vertices] origins of the appended vertices; empty if nothing was clipped.
   std::span<const ClipVertexT<T>> clipped;
   std::span<const std::uint8_t> reject;  // [F] bits of FaceReject; 0 is drawn
   std::int32_t source_vertices = 0;
@@ -57,10 +57,10 @@ using ScreenMesh = ScreenMeshT<float>;
 
 enum FaceReject : std::uint8_t {
   kFaceDrawn = 0,
-  kFaceBehind = 1,      // wholly nearer than the near plane: no pixel, no soft mask
-  kFaceDegenerate = 2,  // zero area on the screen: no pixel; still takes part in the soft mask,
-                        // where it is a segment or point
-  kFaceCulled = 4,      // faces away and culling is on: no pixel; still takes part in the soft mask
+  kFaceBehind = 1,      // entirely nearer than the near plane: no pixel, no soft mask
+  kFaceDegenerate = 2,  // zero area on the screen: no pixel; takes part in the soft mask as a
+                        // segment or point
+  kFaceCulled = 4,      // faces away and culling is on: no pixel; takes part in the soft mask
   kFaceOverflow = 8,    // a vertex projects to infinity: no pixel, no soft mask
 };
 inline constexpr std::uint8_t kFaceNotInSoftMask = kFaceBehind | kFaceOverflow;
@@ -70,13 +70,13 @@ struct FaceCorners {
   AlignedVector<std::int32_t> v0, v1, v2, source_face;
 };
 
-// The memory behind a ScreenMesh, except for its faces where none was clipped and they are shared
+// The memory behind a ScreenMesh, except for its faces if none was clipped and they are shared
 // (`whole`). Reused from frame to frame.
 template <class T>
 struct ScreenMeshBuffersT : FaceCorners {
   AlignedVector<T> x, y, depth, inverse_depth;
   AlignedVector<PackedVertexT<T>> packed;
-  const FaceCorners* whole = nullptr;  // shared faces, instead of our own
+  const FaceCorners* whole = nullptr;  // shared faces, replacing our own
   AlignedVector<ClipVertexT<T>> clipped;
   AlignedVector<std::uint8_t> reject;
   std::int32_t source_vertices = 0, source_faces = 0;
@@ -100,7 +100,7 @@ template <class T>
 struct ScreenGradientsT {
   std::span<T> d_x, d_y;         // [V] per pixel
   std::span<T> d_inverse_depth;  // [V]
-  std::span<T> d_clip_t;         // [V - source_vertices] through what was interpolated at the cut
+  std::span<T> d_clip_t;         // [V - source_vertices] through attributes interpolated at the cut
 };
 using ScreenGradients = ScreenGradientsT<float>;
 

@@ -21,7 +21,8 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Gives the face of pixel (x, y) the next slot if it has none. No branch: it is hard to predict.
+// Gives the face of pixel (x, y) the next slot if it has none. Branch-free: a branch is hard to
+// predict.
 HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen) {
   std::int32_t* slot = seen->slot_of_face.data() + 1 + face;
   const std::int32_t found = *slot, fresh = found >> 31;
@@ -63,7 +64,7 @@ HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
     const int first = j;
     std::uint64_t bits = 0;
     while (j < rows.width && j - first <= 64 - lanes) {
-      // The last vector overlaps the one before it: a scalar tail would be a chain of dependent
+      // The last vector overlaps the previous one: a scalar tail would be a chain of dependent
       // steps.
       const int at = HWY_MIN(j, rows.width - lanes);
       const std::uint64_t here = NewFaceBits(row + at, above == nullptr ? nullptr : above + at);
@@ -74,7 +75,7 @@ HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
   }
 }
 
-// The arrays by slot have room for one slot more than there can be.
+// The arrays by slot have room for one slot more than can be in use.
 void NumberAllRows(const FaceRows& rows, SeenFaces* seen) {
   seen->count = 1;
   for (int i = rows.row_begin; i < rows.row_end; ++i) NumberRow(rows, i, seen);

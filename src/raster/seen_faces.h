@@ -26,27 +26,28 @@ struct FaceRows {
   }
 };
 
-// Slots number the faces in order of first appearance; slot 0 is that of background pixels. Scratch
-// of one worker, which grows to the largest part and mesh.
+// Slots number the faces in order of first appearance; slot 0 is for background pixels. Scratch of
+// one worker, which grows to the largest part and mesh.
 struct SeenFaces {
   AlignedVector<std::int32_t> slot_of_face;  // [1 + F], -1 where not seen; [0] is kNoFace, slot 0
-  std::size_t count = 0;                     // slots in use, slot 0 among them
+  std::size_t count = 0;                     // slots in use, including slot 0
   AlignedVector<std::int32_t> face;          // [slot]
-  // [slot] the centre of the first pixel seen: positions relative to it keep the digits of tiny
-  // faces.
+  // [slot] centre of the first pixel that shows the face: positions relative to it keep the digits
+  // of tiny faces.
   AlignedVector<float> origin_x, origin_y;
 
   std::size_t faces() const { return count - 1; }
-  // Slots of arrays for whole vectors: those beyond `count`, and slot 0, are copies of slot 1.
+  // Number of slots in arrays of whole vectors: slots beyond `count`, and slot 0, are copies of
+  // slot 1.
   std::size_t stride() const { return (count + kTileSize - 1) / kTileSize * kTileSize; }
-  // Slots that `pixels` of a mesh can need.
+  // The most slots that `pixels` of a mesh can need.
   static std::size_t MostSlots(std::size_t mesh_faces, std::size_t pixels) {
     return std::min(mesh_faces, pixels) + 2 + kTileSize;
   }
 };
 
-// Grows the arrays to what the part can need at most: which worker gets which part varies between
-// calls, and once every size has been seen nothing may be allocated.
+// Grows the arrays to the most that the part can need: which worker gets which part varies between
+// calls, and once every size has occurred nothing may allocate.
 void ReserveSeenFaces(std::size_t mesh_faces, std::size_t pixels, SeenFaces* out);
 
 // Reserves, then numbers. `out` must be empty: new, or after ForgetFaces.

@@ -22,7 +22,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using VisibilityTag = HWY_CAPPED(float, kTileSize);
 
-// How the pixels of a bin lie in a vector: one row of them, as many as D has lanes.
+// Layout of a bin's pixels in a vector: one row, with as many pixels as D has lanes.
 template <class D>
 struct OneRow {
   using Tag = D;
@@ -74,7 +74,7 @@ using StampLayout = TwoRows;
 using StampLayout = OneRow<hn::FixedTag<float, kStamp>>;
 #endif
 
-// What is drawn of a face: rows [begin, end), one vector of columns from `column` on. Counted from
+// The drawn part of a face: rows [begin, end), one vector of columns from `column` on. Relative to
 // pixel (x0, y0), where the arrays begin.
 struct DrawnRows {
   int column, begin, end;
@@ -84,21 +84,22 @@ struct DrawnRows {
   const float* behind;  // of kPeel
 };
 
-// Which of the faces that cover a pixel count: all, or only those behind a depth per pixel.
+// Which of the faces covering a pixel count: all, or only those behind a per-pixel depth.
 enum class Layer { kFirst, kPeel };
 
-// Where a bin is drawn: the arrays of a VisibilityBin, and of kPeel what the pixels lie behind.
+// The target of drawing a bin: the arrays of a VisibilityBin, and for kPeel the depths to lie
+// behind.
 struct BinTarget {
   std::int32_t* face;
   float* inverse_depth;
   const float* behind;
 };
 
-// Where the edge functions are known: in a record of `Face`, at a pixel (column, row) before.
+// Where the edge functions are known: in a record of `Face`, at an earlier pixel (column, row).
 template <class Face>
 struct EdgesAt {
   const Face& from;
-  int columns, rows;  // from that pixel to the first that is drawn
+  int columns, rows;  // from that pixel to the first drawn one
 };
 
 // 1/depth of a face at the rows of a vector of columns. Mul and Add are kept apart (no fused
@@ -136,7 +137,7 @@ class DepthRows {
   V dx_, py_, y0_, gy_, base_, low_, high_;
 };
 
-// Draws `face` where it is `inside` and nearer than what is there: a vector at row i of `rows`.
+// Draws `face` where it is `inside` and nearer than the current face: a vector at row i of `rows`.
 template <Layer kLayer, class Layout, class Inside>
 HWY_INLINE void DrawNearer(const DrawnRows& rows, int i, Inside inside,
                            hn::Vec<typename Layout::IntTag> face, hn::Vec<typename Layout::Tag> z) {
@@ -182,8 +183,8 @@ HWY_INLINE PixelRect BoxIn(const PixelRect& rect, const DrawnFace& face) {
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
 
-// Pixels of a stamp, moved that many columns to the right and rows down, each less than kStamp;
-// what leaves it is lost.
+// A stamp moved right and down by this many columns and rows, each less than kStamp; pixels that
+// leave it are lost.
 HWY_INLINE std::int32_t MovedStamp(std::int32_t pixels, int columns, int rows) {
   constexpr std::int32_t kRow = (1 << kStamp) - 1, kAll = (1 << kStamp * kStamp) - 1;
   constexpr std::int32_t kEachRow = kAll / kRow;
@@ -192,8 +193,8 @@ HWY_INLINE std::int32_t MovedStamp(std::int32_t pixels, int columns, int rows) {
   return rows >= 0 ? pixels << kStamp * rows & kAll : pixels >> -kStamp * rows;
 }
 
-// A face whose covered pixels are known. No branch on their position: the stamp lies wholly within
-// the bin.
+// A face with known covered pixels. No branch on their position: the stamp lies wholly within the
+// bin.
 template <Layer kLayer>
 HWY_INLINE void DrawStamp(const DrawnFace& face, const PixelRect& rect, const BinTarget& out) {
   using Layout = StampLayout;
@@ -215,7 +216,7 @@ HWY_INLINE void DrawStamp(const DrawnFace& face, const PixelRect& rect, const Bi
   }
 }
 
-// By rows of D's lanes. Where a face fits between two multiples of the lane count, vectors are
+// Draws in rows of D's lanes. If a face fits between two multiples of the lane count, vectors are
 // aligned to it: store forwarding then works, and no vector straddles a cache line.
 template <Layer kLayer, class D>
 HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const PixelRect& rect, const PixelRect& box,
@@ -232,9 +233,9 @@ HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const PixelRect& rect, co
   }
 }
 
-// No overflow in the edge functions: they are below 2^21 in a small face's box, steps are up to
-// 2^15, and vectors begin less than kTileSize columns before it. A narrow face takes few lanes: on
-// Zen 4 a store of 64 bytes takes twice as long as one of 32.
+// Edge functions cannot overflow: they are below 2^21 in a small face's box, steps are up to 2^15,
+// and vectors begin less than kTileSize columns before it. A narrow face takes few lanes: on Zen 4
+// a store of 64 bytes takes twice as long as one of 32.
 template <Layer kLayer>
 HWY_INLINE void DrawSmall(const DrawnFace& face, const PixelRect& rect, const BinTarget& out) {
   constexpr int kNarrow = 8;
@@ -264,7 +265,8 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
   }
 }
 
-// A large face in one tile of a bin, whose arrays `rows` begins. Whether it covers all of it.
+// Draws a large face in one tile of a bin, at which the arrays of `rows` begin. Returns whether it
+// covers the whole tile.
 template <Layer kLayer>
 HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const PixelRect& tile,
                          DrawnRows rows) {
@@ -287,10 +289,10 @@ HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const 
 }
 
 // A depth bound per tile: every pixel is at least this near. A large face that covers the tile
-// raises it; faces behind it are rejected without a look at their pixels.
+// raises it; faces behind it are rejected without visiting pixels.
 struct DepthFloors {
   float tile[kBinSize / kTileSize][kBinSize / kTileSize] = {};
-  float bin = 0;  // the least of its tiles
+  float bin = 0;  // the minimum over its tiles
 
   HWY_INLINE void Update() {
     bin = tile[0][0];
@@ -300,7 +302,7 @@ struct DepthFloors {
   }
 };
 
-// Large faces go tile by tile: their exact edge functions step through a tile in 32 bits.
+// Draws large faces tile by tile: their exact edge functions step through a tile in 32 bits.
 template <Layer kLayer>
 HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const PixelRect& rect,
                           DepthFloors* floors, const BinTarget& out) {
@@ -315,7 +317,7 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
                            HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
       const float* behind = kLayer == Layer::kPeel ? out.behind + first : nullptr;
-      // When peeling, a face that covers a tile may lie in front of the layer that is drawn.
+      // When peeling, a face that covers a tile may lie in front of the drawn layer.
       const bool covered =
           DrawTile<kLayer>(shape, face, tile,
                            {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, behind});
@@ -328,7 +330,7 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
 template <Layer kLayer>
 HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                           const BinTarget& out) {
-  constexpr std::size_t kAhead = 4;  // records lie in the order of the mesh, not of the bin
+  constexpr std::size_t kAhead = 4;  // records are in mesh order, not bin order
   DepthFloors floors;
   for (std::size_t i = 0; i < list.indices.size(); ++i) {
     const auto record = [&](std::size_t at) -> const DrawnFace& {

@@ -60,7 +60,7 @@ void DrawBin(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& r
   std::fill(out->face, out->face + pixels, kNoFace);
   std::fill(out->inverse_depth, out->inverse_depth + pixels, 0.0f);
   if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, behind, out);
-  // Vectors reach beyond the image where the bin is narrower; those columns are cleared.
+  // If the bin is narrower, vectors reach beyond the image; clears those columns.
   for (int i = 0; i < rect.y1 - rect.y0 && rect.x1 - rect.x0 < kBinSize; ++i) {
     const int from = i * kBinSize + rect.x1 - rect.x0, to = (i + 1) * kBinSize;
     std::fill(out->face + from, out->face + to, kNoFace);

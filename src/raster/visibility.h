@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which face is seen in each pixel of a tile (conventions.h, rules 3 and 4). Discrete: no gradient.
+// The visible face at each pixel of a bin (conventions.h, rules 3 and 4). Discrete: no gradient.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace tilegrad::raster {
 
-// Pixel arrays of one bin, rows of kBinSize; columns beyond the image are background, rows beyond
-// hold anything.
+// Pixel arrays of one bin, rows of kBinSize; columns outside the image are background, rows outside
+// are unspecified.
 struct VisibilityBin {
   // Index into the ScreenMesh, kNoFace: background.
   alignas(128) std::int32_t face[kBinSize * kBinSize];
@@ -34,14 +34,14 @@ void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const Pi
 
 // The same for the faces behind `behind` [kBinSize][kBinSize]: a pixel shows the nearest face whose
 // 1/depth is less than its entry. Infinity admits every face, 0 none; the 1/depth of one layer
-// yields the next (depth peeling). Of several faces at one depth only one is ever shown.
+// yields the next (depth peeling). Of several faces at the same depth only one is ever shown.
 void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                     const float* behind, VisibilityBin* out);
 
-// What visibility needs of one large face within one tile. Scalar, exact where coverage is decided.
+// Visibility data of one large face in one tile. Scalar, exact where it decides coverage.
 
-// Pixels are counted from the tile's corner. Edge k at pixel (column, row) is
-// edge[k] + step_x[k] * column + step_y[k] * row, and the pixel is covered if none is negative:
+// Pixels are relative to the tile's corner. Edge k at pixel (column, row) is edge[k] + step_x[k] *
+// column + step_y[k] * row, and the pixel is covered if none is negative:
 // the exact edge functions, divided by kSubpixels and rounded down, which keeps their sign because
 // a step of one pixel is a multiple of kSubpixels.
 struct TileFaceSetup {
@@ -59,7 +59,8 @@ struct TileFaceSetup {
   }
 };
 
-// `shape` wound clockwise. Returns false if the face's box holds no pixel centre of the tile.
+// `shape` must be wound clockwise. Returns false if the face's box contains no pixel centre of the
+// tile.
 bool SetUpTileFace(const SnappedFace& shape, const PixelRect& rect, TileFaceSetup* out);
 
 }  // namespace tilegrad::raster

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of visibility.h: every face for every pixel. T: float, double, std::complex<double>.
+// Scalar reference of visibility.h: tests every face at every pixel. T: float, double,
+// std::complex<double>.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 
 namespace tilegrad::raster {
 
-// Everything about a drawn face that does not depend on the pixel.
+// Pixel-independent data of a drawn face.
 template <class T>
 struct VisibilitySetup {
   std::int32_t face;
@@ -35,7 +36,7 @@ std::vector<VisibilitySetup<T>> SetUpDrawnFaces(const ScreenMeshT<T>& mesh) {
   return out;
 }
 
-// Rows [row_begin, row_end): face[i * width + j] <- index into `mesh` of the face seen in pixel
+// Rows [row_begin, row_end): face[i * width + j] <- index into `mesh` of the face visible at pixel
 // (j, i), or kNoFace.
 template <class T>
 void VisibilityRef(const ScreenMeshT<T>& mesh, int row_begin, int row_end,
@@ -58,8 +59,8 @@ void VisibilityRef(const ScreenMeshT<T>& mesh, int row_begin, int row_end,
   }
 }
 
-// The face of `mesh` that is seen in pixel (column, row), given the face of the caller's mesh: of a
-// cut face, the piece that covers the pixel.
+// The face of `mesh` visible at pixel (column, row), given the face of the caller's mesh: of a cut
+// face, the piece that covers the pixel.
 template <class T>
 std::int32_t PieceAt(const ScreenMeshT<T>& mesh, std::int32_t source_face, int column, int row) {
   if (source_face < 0 || !mesh.was_clipped()) return source_face;

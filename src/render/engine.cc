@@ -68,7 +68,7 @@ Status Engine::Render(std::span<const Scene> scenes, const RenderOptions& option
     stage_.BeginForward(forward_, inputs_.scenes(), options, frame);
     attributes.stage = &stage_;
   } else {
-    std::fill(frame->uv.begin(), frame->uv.end(), 0.0f);  // wanted, but of a scene that has none
+    std::fill(frame->uv.begin(), frame->uv.end(), 0.0f);  // requested, but the scene has none
     if (forward_.colors_only) attributes.image = &frame->color;
     if (forward_.user_only) attributes.image = &frame->attributes;
   }
@@ -108,7 +108,7 @@ Status Engine::Backward(std::span<const Scene> scenes, const RenderOptions& opti
   merge_.Run({backward_, inputs_, staged_ ? &stage_ : nullptr, *targets});
   clock.Lap(&merge_ms_);
   TILEGRAD_TRY(targets->CheckSums());
-  return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody wants
+  return sound ? Status() : InvalidArgument("the gradient overflows");  // one that nobody requested
 }
 
 bool Engine::RunBackward(const RenderOptions& options, const FrameImages& frame,
@@ -119,7 +119,7 @@ bool Engine::RunBackward(const RenderOptions& options, const FrameImages& frame,
   const bool sound = pipeline_.Backward(inputs_.views(), options, frame, d_images, d_views,
                                         staged_ ? &stage_ : nullptr);
   if (staged_) return sound && stage_.sound();
-  // Cotangents that pull nothing have been looked at by nobody.
+  // Nothing has checked cotangents without effect yet.
   const bool seen = backward_.colors_only || backward_.user_only;
   return sound && (seen || ValidateCotangents(d_frame, frame.face_ids).ok());
 }
@@ -135,7 +135,7 @@ FrameD RenderImage(const SceneD& scene, const RenderOptions& options, const Outp
   return frame;
 }
 
-// Images of one scene behind each other.
+// Concatenates the images of single scenes.
 void Gather(const std::vector<FrameD>& frames, FrameD* out) {
   const auto gather = [](auto& all, const auto& one) {
     all.insert(all.end(), one.begin(), one.end());
@@ -150,7 +150,7 @@ void Gather(const std::vector<FrameD>& frames, FrameD* out) {
   }
 }
 
-// The images n of `count` of a cotangent.
+// Image n of `count` of a cotangent.
 FrameGradientsT<double> Share(const FrameGradientsT<double>& d, std::size_t n, std::size_t count) {
   FrameGradientsT<double> out = d;
   ForEachImage(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is behind a Renderer of floats: scenes and images of the public interface, checked, planned
-// (render/shading/plan.h) and handed to the pipeline and its shade stage. What a scene does not
-// have and the caller does not ask for is not computed.
+// The implementation of a Renderer of floats: validates and plans (render/shading/plan.h) calls of
+// the public interface and runs the pipeline with its shade stage. Computes only what the scene has
+// and the caller requests.
 #pragma once
 
 #include <span>
@@ -17,30 +17,30 @@
 
 namespace tilegrad {
 
-// Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
-// at a time. Same bits for any worker count and any run.
+// Owns scratch memory and reuses it: rendering the same sizes again allocates nothing. One call at
+// a time. Same bits for any worker count and any run.
 class Engine {
  public:
   explicit Engine(const Workers& workers);  // keeps a reference
 
-  // As RendererT::Render. After an error `frame` is left unspecified.
+  // Like RendererT::Render. After an error the contents of `frame` are unspecified.
   Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& outputs,
                 FrameImages* frame);
 
-  // `scenes`, `options` and `frame` as they were given to and filled by Render; of the frame, face
-  // ids are read, and alpha where d_frame has it. Overwrites what the targets have listed, arrays
-  // and scenes' own records; after an error that may be done in part.
+  // `scenes`, `options` and `frame` as passed to and filled by Render; reads the frame's face ids,
+  // and alpha if d_frame has it. Overwrites the arrays and per-scene records listed in the targets,
+  // possibly only in part after an error.
   Status Backward(std::span<const Scene> scenes, const RenderOptions& options,
                   const FrameImages& frame, const FrameGradients& d_frame,
                   GradientTargets<float>* targets);
 
-  PlanReport Explain() const;  // the last call
+  PlanReport Explain() const;  // of the last call
 
  private:
-  // Streams for the pipeline: side by side for the stage, or as they are.
+  // Sets the pipeline's streams: packed for the stage, or unpacked.
   Status SetInputs(std::span<const Scene> scenes, const StreamSets& sets, bool colors_only,
                    bool user_only);
-  // The pipeline's backward pass, with the stage if there is one. False: a number is not finite.
+  // The pipeline's backward pass, with the stage if there is one. False if a number is not finite.
   bool RunBackward(const RenderOptions& options, const FrameImages& frame,
                    const FrameGradients& d_frame, std::span<PipelineGradients> d_views);
 
@@ -55,8 +55,8 @@ class Engine {
   double merge_ms_ = 0;
 };
 
-// The same calls in double, of the naive renderer (render/reference.h). Images are its units of
-// work; memory is allocated by every call.
+// The same interface in double, on the naive renderer (render/reference.h). Parallel over images;
+// every call allocates memory.
 class ReferenceRenderer {
  public:
   explicit ReferenceRenderer(const Workers& workers) : workers_(&workers) {}  // keeps a reference

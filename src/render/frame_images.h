@@ -12,7 +12,8 @@
 
 namespace tilegrad {
 
-// The images of a batch, planar: row 0 on top. Reused between calls of one size without allocation.
+// The images of a batch, planar: row 0 on top. Calls of the same size reuse them without
+// allocation.
 template <class T>
 struct FrameImagesT {
   int images = 0, channels = 0, height = 0, width = 0;  // channels: of attributes
@@ -20,17 +21,17 @@ struct FrameImagesT {
   AlignedVector<std::int32_t> face_ids;
   AlignedVector<T> color, alpha, attributes, depth, normals, uv, barycentrics;
   double alpha_error_bound = 0;
-  // [N, H W] 1 - alpha with more digits, where Backward has use for it, in the order of
-  // raster/soft_mask/soft_mask.h, SoftMaskImages; the rest is unspecified.
+  // [N, H W] 1 - alpha to relative precision, where Backward needs it, in the order of
+  // raster/soft_mask/soft_mask.h, SoftMaskImages; elsewhere unspecified.
   AlignedVector<T> transmittance;
-  // [N,H,W], or empty. Before Render: a pixel shows the nearest face whose 1/depth is less than
-  // this (raster/visibility.h: PeelVisibility). After it: 1/depth of that face, 0 where there is
-  // none. Only the engine's forward pass knows it.
+  // [N,H,W], or empty. In: a pixel shows the nearest face whose 1/depth is less than this
+  // (raster/visibility.h: PeelVisibility). Out: 1/depth of that face, 0 if there is none. Only the
+  // engine's forward pass supports it.
   AlignedVector<T> peeled;
 };
 using FrameImages = FrameImagesT<float>;
 
-// Allocates the requested images of so many scenes, and no others.
+// Allocates the requested images of the given number of scenes, and no others.
 template <class T>
 void SizeFrame(std::size_t images, int channels, const RenderOptions& options,
                const Outputs& outputs, FrameImagesT<T>* frame) {
@@ -50,7 +51,7 @@ void SizeFrame(std::size_t images, int channels, const RenderOptions& options,
   frame->alpha_error_bound = 0;
 }
 
-// Views of them.
+// Views of the images.
 template <class T>
 ImagesT<T> ImagesOf(const FrameImagesT<T>& frame) {
   ImagesT<T> out;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the gradients of a call go: arrays and records of the caller, which scenes of a batch may
-// share whole. Everything that lists, checks, adds up or keeps them does so here.
+// The destinations of a call's gradients: arrays and records of the caller, which scenes of a batch
+// may share as a whole. Lists, checks, sums and saves them.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace tilegrad {
 
-// T: float or double. Keeps its memory: the same sizes allocate nothing.
+// T: float or double. Reuses its memory: the same sizes allocate nothing.
 template <class T>
 class GradientTargets {
  public:
@@ -23,37 +23,38 @@ class GradientTargets {
     std::span<T> out;
     const char* name;  // d_scene.<name>
     std::size_t scene;
-    std::optional<Varying> stream;       // the gradient of this stream,
-    std::optional<std::size_t> texture;  // of this texture, or of the coefficients
+    std::optional<Varying> stream;       // gradient of this stream,
+    std::optional<std::size_t> texture;  // of this texture, or (neither) of the sh coefficients
     int width;                           // of the texture
-    std::size_t order;                   // among all
+    std::size_t order;                   // position among all requests
     std::span<T> own = {};               // after SplitArrays
   };
 
-  // Lists the requested arrays, until the next call. Errors: two arrays that overlap without being
-  // the same array for the same gradient, since one would be overrun or hold a partial sum.
+  // Lists the requested arrays; valid until the next call. Errors: two arrays that overlap without
+  // being the same array for the same gradient, since one would be overwritten or hold a partial
+  // sum.
   Status Begin(std::span<const SceneT<T>> scenes, std::span<const SceneGradientsT<T>> wanted);
 
-  // The requests of each scene, with zeroed records of camera, surfaces and lights in place of the
+  // The requests of each scene, with zeroed records of camera, surfaces and lights replacing the
   // caller's.
   std::span<const SceneGradientsT<T>> scenes() const { return scenes_; }
-  // The caller's arrays, each once, with what it holds the sum of: in the order of scenes.
+  // The caller's arrays, each once, with the targets that it sums, in scene order.
   std::span<const std::span<const Target>> arrays() const { return arrays_; }
 
-  // For a renderer that does not accumulate: gives each scene separate, zeroed arrays, and sums
-  // them into the caller's.
+  // For a renderer that does not accumulate: gives each scene separate, zeroed arrays; JoinArrays
+  // sums them into the caller's.
   void SplitArrays();
   void JoinArrays() const;
-  // Adds the scenes' own records to the caller's, which are cleared first unless told.
+  // Adds the per-scene records to the caller's, which it clears first unless `add`.
   void JoinRecords(bool add) const;
 
-  // GradientMode::kAdd over a renderer that overwrites: keeps aside what the arrays hold; puts it
-  // back; adds it. False, and it is put back, if a sum is not finite.
+  // GradientMode::kAdd on top of a renderer that overwrites: Save copies the arrays; Restore copies
+  // them back; AddSaved adds the copy. False, after restoring, if a sum is not finite.
   void Save();
   void Restore() const;
   bool AddSaved() const;
 
-  // Gradients that overflow are an error, not an Inf that spreads.
+  // An error if a gradient overflows, rather than an Inf that spreads.
   Status CheckSums() const;
 
  private:
@@ -69,12 +70,12 @@ class GradientTargets {
   void TakeRecords(const SceneGradientsT<T>& wanted, std::size_t n);
 
   std::span<const SceneGradientsT<T>> wanted_;
-  std::vector<Target> targets_;  // in the order of their memory
+  std::vector<Target> targets_;  // sorted by address
   std::vector<std::span<const Target>> arrays_;
   std::vector<Records> records_;
   std::vector<SceneGradientsT<T>> scenes_;
   AlignedVector<T> values_;  // of SplitArrays
-  AlignedVector<T> saved_;   // array after array
+  AlignedVector<T> saved_;   // the arrays, concatenated
 };
 
 }  // namespace tilegrad

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A mesh on the screen as the naive renderer has it (reference.h): projected, cut at the near
-// plane, with alpha over all faces, and the way back; scalar, made of the reference kernels.
-// Templates over T = float, double, std::complex<double> (complex step) and numbers with error
-// bounds. Inputs are not checked.
+// The screen mesh of the naive renderer (reference.h): projection, near clipping, alpha over all
+// faces, and their adjoints; scalar, from the reference kernels. Templates over T = float, double,
+// std::complex<double> (complex step) and numbers with error bounds. Inputs are not checked.
 #pragma once
 
 #include <cstddef>
@@ -24,17 +23,17 @@ namespace tilegrad {
 template <class T>
 struct PreparedScene {
   const SceneT<T>* scene = nullptr;
-  raster::AttributeViewT<const T> given;  // to interpolate, in the layout of the scene
+  raster::AttributeViewT<const T> given;  // to interpolate, in the scene's layout
   raster::ScreenMeshBuffersT<T> buffers;
   raster::ScreenMeshT<T> mesh;
-  AlignedVector<T> clipped_attributes;  // empty where nothing was clipped
+  AlignedVector<T> clipped_attributes;  // empty if nothing was clipped
   raster::AttributeViewT<const T> attributes;
-  std::vector<std::int32_t> soft_faces;  // that take part in alpha
+  std::vector<std::int32_t> soft_faces;  // the faces that take part in alpha
   raster::SoftScale<T> scale;
-  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, where AlphaRule::kPaper asks for them
+  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, only for AlphaRule::kPaper
 };
 
-// `given` in the layout of the mesh.
+// Converts `given` to the layout of the mesh.
 template <class T>
 void ClipAttributesRef(PreparedScene<T>* out) {
   out->attributes = out->given;
@@ -63,7 +62,7 @@ void PrepareRef(const SceneT<T>& scene, const raster::AttributeViewT<const T>& a
   ClipAttributesRef(out);
 }
 
-// Alpha of a background pixel by the rule that the options ask for.
+// Alpha of a background pixel, by the alpha rule of the options.
 template <class T>
 T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& options, const T& px,
                      const T& py) {
@@ -74,7 +73,7 @@ T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& opti
   return raster::SoftAlphaRef<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale);
 }
 
-// Gradients of a prepared scene, before projection's adjoint.
+// Gradients of a prepared scene, before the adjoint of projection.
 template <class T>
 struct PreparedGradients {
   std::vector<T> storage[4];
@@ -119,14 +118,14 @@ void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOp
   }
 }
 
-// Gradients of what a scene was prepared from.
+// Gradients of the inputs of PrepareRef.
 template <class T>
 struct MeshGradients {
-  std::vector<T> positions, attributes;  // as scene->positions and given.values
+  std::vector<T> positions, attributes;  // shapes of scene->positions and given.values
   CameraT<T> camera;
 };
 
-// From the screen back to the scene.
+// Adjoint of PrepareRef: from the screen to the scene.
 template <class T>
 MeshGradients<T> PrepareRefBackward(const RenderOptions& options, const PreparedScene<T>& prepared,
                                     const PreparedGradients<T>& d) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The naive renderer: every face for every pixel, every stream at every corner, and pixel_ref.h at
-// every pixel; scalar. It is the truth that tests hold the Renderer to, with T = double or
-// std::complex<double> (complex step), what RendererT<double> is made of, and the yardstick of the
-// benchmarks with T = float. One scene at a time; inputs are not checked.
+// every pixel; scalar. It is the ground truth for tests of the Renderer, with T = double or
+// std::complex<double> (complex step), the implementation of RendererT<double>, and with T = float
+// the baseline of benchmarks. One scene at a time; inputs are not checked.
 #pragma once
 
 #include <algorithm>
@@ -23,13 +23,13 @@
 
 namespace tilegrad {
 
-// Rows of an image; those beyond its last are none.
+// Rows of an image; clamped to its height.
 struct RowRange {
   int begin, end;
 };
 inline constexpr RowRange kAllRows{0, std::numeric_limits<int>::max()};
 
-// Ids of the scene's faces [H,W] seen in some rows; -1 elsewhere.
+// Ids of the scene's faces [H,W] visible in some rows; -1 elsewhere.
 template <class T>
 std::vector<std::int32_t> FaceIdsRef(const SceneT<T>& scene, const RenderOptions& options,
                                      RowRange rows = kAllRows) {
@@ -44,21 +44,21 @@ std::vector<std::int32_t> FaceIdsRef(const SceneT<T>& scene, const RenderOptions
   return ids;
 }
 
-// A scene ready for its pixels: its streams side by side at the corners of its faces, normals
-// derived, lights with unit directions.
+// A scene prepared for shading: its streams packed at the corners of its faces, normals derived,
+// lights with unit directions.
 template <class T>
 struct RefScene {
   const SceneT<T>* scene;
   VaryingSet set;                             // of `packed`, at corners
   std::vector<shade::UnitVector<T>> normals;  // derived: [V] or [F]
   std::vector<T> packed;                      // [F,3,C]
-  PreparedScene<T> prepared;                  // with them
+  PreparedScene<T> prepared;                  // with `packed` as attributes
   std::vector<shade::PyramidRef<T>> pyramids;
   ShadeUniforms<T> uniforms;
   std::vector<T> inverse_lengths;  // of the lights' directions
 };
 
-// Rows of a stream that the corner `i` of the faces has: the scene's arrays, or their gradients.
+// The row of corner `i` of the faces in a stream's array or its gradient.
 template <class T>
 std::size_t StreamRow(const SceneT<T>& scene, Rate rate, std::size_t i) {
   return rate == Rate::kCorner ? i : static_cast<std::size_t>(scene.faces[i]);
@@ -140,7 +140,7 @@ void PrepareRefScene(const SceneT<T>& scene, const RenderOptions& options, RefSc
   PrepareRef(scene, {s->packed, s->set.channels(), Rate::kCorner}, options, &s->prepared);
 }
 
-// A foreground pixel: where it is, and what is interpolated there.
+// A foreground pixel: its position, and the interpolated values.
 template <class T>
 struct RefPixel {
   std::size_t face, index;  // face of the prepared mesh; pixel of the image
@@ -196,7 +196,7 @@ ShadePixel<T> ShadePixelOf(const RefScene<T>& s, const RenderOptions& options,
   return p;
 }
 
-// Calls visit(index, column, row, id of the scene's face) for each pixel of some rows.
+// Calls visit(index, column, row, face id) for each pixel of some rows.
 template <class Visit>
 void ForEachRowPixel(const RenderOptions& options, std::span<const std::int32_t> face_ids,
                      RowRange rows, const Visit& visit) {
@@ -243,8 +243,8 @@ void ShadePixelIntoFrame(const RefScene<T>& s, const RenderOptions& options, con
   frame->depth[at.index] = T(1) / raster::MakeDepthPlane(mesh, at.face).At(at.px, at.py);
 }
 
-// All images that `request` asks for, with visibility given as ids of the scene's faces [H,W]; of
-// some rows, while the others are background of alpha 0.
+// All images in `request`, with visibility given as ids of the scene's faces [H,W]; only for some
+// rows, the others are background of alpha 0.
 template <class T>
 void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const Outputs& request,
                      std::span<const std::int32_t> face_ids, FrameImagesT<T>* frame,
@@ -269,7 +269,7 @@ void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const
   });
 }
 
-// Gradients of a scene before they are brought back to its arrays.
+// Gradients of a scene before they are propagated to its arrays.
 template <class T>
 struct RefGradients {
   PreparedGradients<T> prepared;
@@ -332,7 +332,7 @@ void ShadePixelBackward(const RefScene<T>& s, const RenderOptions& options,
                                     d->prepared.attributes);
 }
 
-// From packed attributes to the scene's arrays; d_positions is complete.
+// From packed attributes to the scene's arrays; completes d_positions.
 template <class T>
 void UnpackRef(const RefScene<T>& s, std::span<const T> d_packed, std::span<T> d_positions,
                const SceneGradientsT<T>& d_scene) {
@@ -401,7 +401,7 @@ void UniformsBackRef(const RefScene<T>& s, const RefGradients<T>& d,
   d_camera->translation[2] += d.depth_shift;
 }
 
-// As RendererT::Backward, for one image, or some rows of one.
+// Like RendererT::Backward, for one image or some of its rows.
 template <class T>
 void ReferenceRenderBackward(const SceneT<T>& scene, const RenderOptions& options,
                              std::span<const std::int32_t> face_ids,

@@ -13,7 +13,7 @@
 
 namespace tilegrad {
 
-// What a failed call may have left between two states.
+// State that a failed call may have left inconsistent.
 template <class T>
 struct RendererScratch {
   using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
@@ -49,7 +49,7 @@ struct FrameT<T>::Impl {
     }
   }
 
-  std::vector<SceneT<T>> scenes;  // look at the caller's arrays and at `lists`
+  std::vector<SceneT<T>> scenes;  // views of the caller's arrays and of `lists`
   std::vector<Lists> lists;
   RenderOptions options;
   FrameImagesT<T> images;
@@ -166,7 +166,7 @@ Status RendererT<T>::Backward(const FrameT<T>& frame, const FrameGradientsT<T>& 
   return status;
 }
 
-// An exception may have left scratch memory between two states.
+// An exception may have left scratch memory inconsistent.
 template <class T>
 void RendererT<T>::DropAfter(const Status& status) {
   const StatusCode code = status.code();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Renderer of the public interface, as the project itself uses it: on workers that it shares
-// with others, and with an account of what ran.
+// The Renderer of the public interface for use inside the project: on shared workers, and with a
+// report of what ran.
 #pragma once
 
 #include "base/parallel.h"
@@ -13,7 +13,7 @@ namespace tilegrad {
 template <class T = float>
 RendererT<T> RendererOn(const Workers& workers);
 
-// The last call, but one that failed for want of memory.
+// Reports the last call, except one that ran out of memory.
 PlanReport Explain(const Renderer& renderer);
 
 }  // namespace tilegrad

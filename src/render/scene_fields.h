@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields of a scene and of its images, each named once: code that visits all of them uses
-// these lists and so covers new fields.
+// Lists the fields of a scene and of its images once: code that visits all of them uses these lists
+// and so covers new fields.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +21,12 @@ inline bool UsesLights(const ShadingModel& shading) {
 enum class Varying { kColor, kUv, kNormal, kPosition, kLightDirection, kUser };
 inline constexpr std::size_t kVaryings = static_cast<std::size_t>(Varying::kUser) + 1;
 
-// An array of a scene with a row for each vertex or corner, and its gradient.
+// An array of a scene with one row per vertex or corner, and its gradient.
 template <class T>
 struct SceneStream {
   const char* name;
   Varying what;
-  int width;  // numbers of a row
+  int width;  // numbers per row
   Rate rate;
   std::span<const T> values;
   std::span<T> gradient;
@@ -37,7 +37,7 @@ struct SceneStream {
 };
 
 // The list of streams: calls visit(name, what, width, field of the scene, field of the gradients),
-// the fields by reference. A field is a StreamT, or a span where there is no choice of rates.
+// with fields by reference. A field is a StreamT, or a span if its rate is fixed.
 template <class T, class Scene, class Gradients, class Visit>
 constexpr void ForEachStreamField(Scene& s, Gradients& d, const Visit& visit) {
   visit("positions", Varying::kPosition, 3, s.positions, d.positions);
@@ -57,7 +57,7 @@ StreamT<T> AsStream(std::span<const T> values) {
   return {values};
 }
 
-// Calls visit(SceneStream) for every stream, those that the scene does not have included.
+// Calls visit(SceneStream) for every stream, absent ones included.
 template <class T, class Visit>
 void ForEachStream(const SceneT<T>& s, const SceneGradientsT<T>& d, const Visit& visit) {
   ForEachStreamField<T>(
@@ -68,7 +68,7 @@ void ForEachStream(const SceneT<T>& s, const SceneGradientsT<T>& d, const Visit&
       });
 }
 
-// The one that is interpolated as `what`.
+// The stream interpolated as `what`.
 template <class T>
 SceneStream<T> StreamOf(const SceneT<T>& scene, Varying what,
                         const SceneGradientsT<T>& gradients = {}) {
@@ -79,7 +79,7 @@ SceneStream<T> StreamOf(const SceneT<T>& scene, Varying what,
   return out;
 }
 
-// Calls visit(name, array) for every array of gradients but those of textures, empty ones included;
+// Calls visit(name, array) for every gradient array except textures', empty ones included;
 // gradients may be const.
 template <class Gradients, class Visit>
 void ForEachPlainArray(Gradients& d, const Visit& visit) {
@@ -91,8 +91,8 @@ void ForEachPlainArray(Gradients& d, const Visit& visit) {
   visit("sh", d.sh);
 }
 
-// Calls visit(name, numbers of a record...) for the parts of records that have a gradient. Records
-// of one kind are visited side by side: a gradient and what is added to it, say.
+// Calls visit(name, numbers of a record...) for the parts of records that have a gradient. Visits
+// several records of one kind in parallel, such as a gradient and its increment.
 template <class Visit, class... Cameras>
 void ForEachCameraPart(const Visit& visit, Cameras&... camera) {
   visit("rotation", std::span(camera.rotation)...);
@@ -118,7 +118,7 @@ void ForEachLightPart(const Visit& visit, Lights&... light) {
   visit("intensity", std::span(&light.intensity, 1)...);
 }
 
-// Calls visit(record's parts as above) for all records of some gradients.
+// Calls visit(parts of a record as above) for all records of the gradients.
 template <class T, class Visit>
 void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {
   if (d.camera != nullptr) {
@@ -132,7 +132,7 @@ void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {
   }
 }
 
-// Sets the numbers of all records of some gradients to 0.
+// Sets the numbers of all records of the gradients to 0.
 template <class T>
 void ClearRecords(const SceneGradientsT<T>& d) {
   ForEachRecordPart(d, [](const char*, const char*, std::span<T> part) {
@@ -141,8 +141,8 @@ void ClearRecords(const SceneGradientsT<T>& d) {
   if (d.camera != nullptr) d.camera->near_plane = T(0);
 }
 
-// Calls visit(name, planes, field of a record...) for the images that have a gradient, of records
-// that have them as members: Outputs, ImagesT, FrameImagesT, FrameGradientsT, structs of C.
+// Calls visit(name, planes, field of a record...) for the images that have a gradient, in records
+// with these members: Outputs, ImagesT, FrameImagesT, FrameGradientsT, structs of C.
 template <class Visit, class... Records>
 void ForEachImage(int channels, const Visit& visit, Records&... record) {
   visit("color", 3, record.color...);
@@ -153,7 +153,7 @@ void ForEachImage(int channels, const Visit& visit, Records&... record) {
   visit("uv", 2, record.uv...);
 }
 
-// For all images, of what is not a gradient.
+// For all images, in records other than gradients.
 template <class Visit, class... Records>
 void ForEachOutput(int channels, const Visit& visit, Records&... record) {
   ForEachImage(channels, visit, record...);

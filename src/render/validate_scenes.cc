@@ -118,7 +118,7 @@ Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
   return {};
 }
 
-// No array is so large that its indices, times the few numbers of a row, are not.
+// Limits arrays so that indices, times the few numbers per row, do not overflow.
 template <class T>
 Status CheckMeshSizes(const SceneT<T>& scene) {
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
@@ -138,8 +138,7 @@ Status CheckMeshSizes(const SceneT<T>& scene) {
   return ResourceExhausted("{} channels: the limit is {}", scene.channels, kMost);
 }
 
-// Many views of one mesh share its arrays: what was checked for the scene before is not looked
-// through again.
+// Many views of one mesh share its arrays: skips those checked for the previous scene.
 template <class T>
 Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
   TILEGRAD_TRY(CheckMeshSizes(scene));
@@ -153,11 +152,11 @@ Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
   return CheckNumbers("positions", scene.positions);
 }
 
-// While no number is beyond this, no colour leaves float's range: it is a product of at most five
+// As long as no number exceeds this, no colour overflows float: it is a product of at most five
 // (base colour, texture, vertex colour, coefficient, intensity), summed over the lights.
 constexpr float kMostSafe = 0x1p20f;
 
-// CheckNumbers; sets *large if some number is not safe.
+// CheckNumbers; sets *large if some number exceeds that.
 template <class T>
 Status CheckValues(const char* array, std::span<const T> values, bool* large) {
   if (AllBelow(values, T(kMostSafe))) return {};
@@ -165,7 +164,7 @@ Status CheckValues(const char* array, std::span<const T> values, bool* large) {
   return CheckNumbers(array, values);
 }
 
-// Also of what shading does not use: a number that is none is a mistake wherever it stands.
+// Also checks streams that shading does not use: a number that is not finite is a mistake anywhere.
 template <class T>
 Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   Status status;
@@ -262,7 +261,7 @@ Status CheckLights(const SceneT<T>& scene, bool* large) {
   return CheckDirections(scene);
 }
 
-// `known`: the scene before, or an empty one.
+// `known`: the previous scene, or an empty one.
 template <class T>
 Status CheckScene(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   TILEGRAD_TRY(CheckEnumerators(scene));
@@ -293,7 +292,7 @@ SceneParts PartsOf(const SceneT<T>& s) {
   return out;
 }
 
-// `scene`: whose parts `b` are, for the names of its streams.
+// `scene`: the scene of `b`, for the names of its streams.
 template <class T>
 Status CheckAgreement(const SceneParts& a, const SceneParts& b, const SceneT<T>& scene) {
   const char* what = nullptr;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faces as the rivals of the paper's section 5.1, N3MR and SoftRas, see them: corners on the image
-// plane, each face on its own. Image coordinates are [-1, 1], x right, y up; z is the depth before
-// the camera. Pixel centres of an image of n x n lie at x_j = (2 j + 1 - n) / n and
-// y_i = (n - 1 - 2 i) / n, row 0 on top.
+// Faces as used by the rivals of the paper's section 5.1, N3MR and SoftRas: corners on the image
+// plane, separate for each face. Image coordinates are [-1, 1], x right, y up; z is the depth in
+// front of the camera. Pixel centres of an image of n x n lie at x_j = (2 j + 1 - n) / n and y_i =
+// (n - 1 - 2 i) / n, row 0 on top.
 #pragma once
 
 #include <cmath>
@@ -28,7 +28,7 @@ FaceCorners<T> CornersOf(const T* corners, std::size_t face) {
   return {{c[0], c[3], c[6]}, {c[1], c[4], c[7]}, {c[2], c[5], c[8]}};
 }
 
-// Twice the signed area, positive where the corners turn counter-clockwise.
+// Twice the signed area, positive if the corners are counter-clockwise.
 template <class T>
 T DoubledArea(const FaceCorners<T>& f) {
   return (f.x[1] - f.x[0]) * (f.y[2] - f.y[0]) - (f.y[1] - f.y[0]) * (f.x[2] - f.x[0]);
@@ -43,7 +43,7 @@ void BarycentricWeights(const FaceCorners<T>& f, const T& area2, const T& px, co
   }
 }
 
-// Weights clipped to [0, 1] and scaled to the sum 1: what depth and colours are interpolated by.
+// Weights clipped to [0, 1] and normalised to the sum 1, for interpolating depth and colours.
 template <class T>
 void ClippedWeights(const T b[3], T w[3]) {
   T sum = T(0);
@@ -60,8 +60,8 @@ T DepthAt(const FaceCorners<T>& f, const T w[3]) {
   return T(1) / (w[0] / f.z[0] + w[1] / f.z[1] + w[2] / f.z[2]);
 }
 
-// Adds to d_corners [3,3] of a face what follows from adjoints of its barycentric weights: moving
-// corner m by v changes b_k by -b_m grad b_k . v.
+// Adds to d_corners [3,3] of a face, given adjoints of its barycentric weights: moving corner m by
+// v changes b_k by -b_m grad b_k . v.
 template <class T>
 void AddBarycentricAdjoint(const FaceCorners<T>& f, const T& area2, const T b[3], const T d_b[3],
                            T* d_corners) {
@@ -77,8 +77,8 @@ void AddBarycentricAdjoint(const FaceCorners<T>& f, const T& area2, const T b[3]
   }
 }
 
-// Faces with a number that is not finite, or so far off the image that squares overflow in float,
-// are left out.
+// False for faces with a number that is not finite, or so far off the image that squares overflow
+// in float: they are skipped.
 template <class T>
 bool IsUsable(const FaceCorners<T>& f) {
   constexpr double kFarthest = 1e9;
@@ -99,13 +99,13 @@ T CentreY(int row, int size) {
   return T(size - 1 - 2 * row) / T(size);
 }
 
-// Vertices of the world to the rivals' image coordinates with our camera
+// Projects world vertices to the rivals' image coordinates with our camera
 // (include/tilegrad/camera.h), and the adjoint. Their own cameras mirror the image; ours does not,
-// so a face that turns counter-clockwise for the camera does so on their image, too. As published
-// there is no clipping: a vertex behind the camera lands mirrored.
+// so a face keeps its winding on the image. As published there is no clipping: a vertex behind the
+// camera lands mirrored.
 
 // points: [V,3] x, y in [-1, 1] on an image of size x size, and depth. A vertex in the camera's
-// plane has coordinates that are not finite, and its faces are left out.
+// plane has coordinates that are not finite, and its faces are skipped.
 template <class T>
 void ProjectVertices(const CameraT<T>& camera, int size, std::span<const T> positions,
                      std::span<T> points) {
@@ -127,7 +127,7 @@ void ProjectVerticesAdjoint(const CameraT<T>& camera, int size, std::span<const 
   for (std::size_t v = 0; v + 2 < positions.size(); v += 3) {
     for (std::size_t c = 0; c < 3; ++c) d_positions[v + c] = T(0);
     const T* const d = &d_points[v];
-    if (d[0] == T(0) && d[1] == T(0) && d[2] == T(0)) continue;  // of a left out vertex, too
+    if (d[0] == T(0) && d[1] == T(0) && d[2] == T(0)) continue;  // also for skipped vertices
     const raster::CameraPoint<T> p = raster::ToCamera(camera, &positions[v]);
     raster::CameraPoint<T> d_p{T(0), T(0), d[2]};
     raster::PerspectiveBackward(p, d[0] * per_pixel, -(d[1] * per_pixel), T(0), camera, &d_p,

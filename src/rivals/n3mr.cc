@@ -56,7 +56,7 @@ template <class T>
 void ListPull(const N3mrImageT<T>& image, int line_step, int step, LinePixelsT<T>* out) {
   for (auto* list : {&out->at, &out->gain}) {
     list->clear();
-    list->reserve(image.owner.size());  // the most there can be: nothing grows later
+    list->reserve(image.owner.size());  // the maximum: nothing grows later
   }
   out->first.resize(image.owner.size() + static_cast<std::size_t>(image.inner));
   auto first = out->first.begin();
@@ -73,8 +73,8 @@ void ListPull(const N3mrImageT<T>& image, int line_step, int step, LinePixelsT<T
 }
 
 // The sum over pixels [begin, end) of a list, all on one side of the crossing, of AddSweep's slope
-// for one end of an edge; `eps` has the sign of their distances. In eight sums side by side: the
-// compiler makes vectors of them.
+// for one end of an edge; `eps` has the sign of their distances. Uses eight parallel sums, which
+// the compiler vectorises.
 template <class T>
 T SumSlopes(const LinePixelsT<T>& list, std::size_t begin, std::size_t end, T crossing, T per_pixel,
             T eps) {
@@ -91,8 +91,8 @@ T SumSlopes(const LinePixelsT<T>& list, std::size_t begin, std::size_t end, T cr
   return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
 }
 
-// The sweep of one face where nothing but coverage is asked for: a pixel gains by being covered if
-// it is uncovered and its adjoint negative, by being uncovered in the opposite case.
+// The sweep of one face if only coverage is requested: a pixel gains by being covered if it is
+// uncovered and its adjoint negative, by being uncovered in the opposite case.
 template <class T>
 class CoverageSweep {
  public:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Silhouettes of N3MR (H. Kato et al.: Neural 3D Mesh Renderer, CVPR 2018) as its published code
-// makes them: a z-buffer, and a hand-made gradient in its place, which moves edges along lines of
-// pixels (n3mr_sweep.h). What is published and what is repaired here: docs/training.md.
+// Silhouettes of N3MR (H. Kato et al.: Neural 3D Mesh Renderer, CVPR 2018) as in its published
+// code: a z-buffer with a hand-crafted gradient, which moves edges along lines of pixels
+// (n3mr_sweep.h). What is as published and what is repaired: docs/training.md.
 #pragma once
 
 #include <algorithm>
@@ -16,35 +16,35 @@
 
 namespace tilegrad::rivals {
 
-// What N3MR (H. Kato et al.: Neural 3D Mesh Renderer, CVPR 2018) can be asked for, and the faces
-// that it draws. Inside, images have `inner` pixels a side and row 0 at the *bottom*; pixel units
-// there are p = (c n + n - 1) / 2 of an image coordinate c, so the centre of pixel i is at i.
+// Options of N3MR (H. Kato et al.: Neural 3D Mesh Renderer, CVPR 2018), and the faces that it
+// draws. Internally, images have `inner` pixels a side and row 0 at the *bottom*; an image
+// coordinate c is p = (c n + n - 1) / 2 in their pixel units, so the centre of pixel i is at i.
 
-// How the image is made from a drawing of twice its size.
+// How to reduce a drawing of twice the size to the image.
 enum class N3mrReduction {
-  kNone,      // it is drawn at its own size
+  kNone,      // drawn at its own size
   kMean,      // mean of 2 x 2 pixels: the renderer's anti-aliasing
-  kBilinear,  // samples at k (2 n - 1) / (n - 1) of a drawing that is larger by (2 n - 1) / (2 n -
-              // 2): the silhouettes of N3MR's own training code
+  kBilinear,  // samples at k (2 n - 1) / (n - 1) of a drawing enlarged by (2 n - 1) / (2 n - 2):
+              // the silhouettes of N3MR's own training code
 };
 
 struct N3mrOptions {
   N3mrReduction reduction = N3mrReduction::kMean;
-  bool fill_back = true;                     // faces are drawn from behind, too
-  double near_plane = 0.1, far_plane = 100;  // a pixel shows what lies strictly between
-  double eps = 1e-3;  // > 0; image units added to each distance of the sweep; of texture lookups
-  // Repair, off in the published form, which rounds a line's end toward zero: an edge that ends
+  bool fill_back = true;                     // also draw back faces
+  double near_plane = 0.1, far_plane = 100;  // pixels show depths strictly between
+  double eps = 1e-3;  // > 0; image units, added to the sweep's distances; of texture lookups
+  // A repair, off in the published form, which rounds a line's end toward zero: an edge that ends
   // less than a pixel outside the left or lower border still counts there.
   bool floor_lines = false;
 
   int Inner(int size) const { return reduction == N3mrReduction::kNone ? size : 2 * size; }
-  // The factor on all coordinates. Size at least 2 with kBilinear.
+  // The factor on all coordinates. `size` must be at least 2 with kBilinear.
   double Scale(int size) const {
     return reduction == N3mrReduction::kBilinear ? (2.0 * size - 1) / (2.0 * size - 2) : 1.0;
   }
 };
 
-// A face that is drawn: counter-clockwise on the image, if need be by exchanging corners 0 and 2.
+// A drawn face: counter-clockwise on the image, if necessary after swapping corners 0 and 2.
 template <class T>
 struct N3mrFaceT {
   FaceCorners<T> at;
@@ -55,9 +55,9 @@ struct N3mrFaceT {
   int SourceCorner(int k) const { return reversed ? 2 - k : k; }
 };
 
-// Calls add(face) for the faces in the order of drawing, in which the lower wins a tie: those that
-// are counter-clockwise as given, then the others from behind. Faces without area are left out:
-// they own no pixel.
+// Calls add(face) in drawing order, in which the lower index wins a tie: first the faces that are
+// counter-clockwise as given, then the others from behind. Skips faces without area, which own no
+// pixel.
 template <class T, class Add>
 void ForN3mrFaces(std::span<const T> corners, const N3mrOptions& options, double scale,
                   const Add& add) {
@@ -80,7 +80,7 @@ void ForN3mrFaces(std::span<const T> corners, const N3mrOptions& options, double
   }
 }
 
-// Pixel units of the drawing.
+// Converts to pixel units of the drawing.
 template <class T>
 T ToInnerPixels(const T& coordinate, int inner) {
   return (coordinate * T(inner) + T(inner - 1)) / T(2);
@@ -90,15 +90,15 @@ T ToInnerPixels(const T& coordinate, int inner) {
 template <class T>
 struct LinePixelsT {
   AlignedVector<std::int32_t> first;  // [inner][inner + 1], see Find
-  AlignedVector<T> at, gain;          // position on the line, and how much the loss falls
+  AlignedVector<T> at, gain;          // position on the line, and decrease of the loss
 
-  // Index of the first pixel of `line` at or beyond `at_least`, of 0 .. inner.
+  // Index of the first pixel of `line` at or beyond `at_least`, in 0 .. inner.
   std::size_t Find(int line, int at_least, int inner) const {
     return static_cast<std::size_t>(first[static_cast<std::size_t>(line * (inner + 1) + at_least)]);
   }
 };
 
-// What one image keeps between its forward and its backward pass.
+// State of one image between its forward and its backward pass.
 template <class T>
 struct N3mrImageT {
   int size = 0, inner = 0;  // pixels a side of the image and of its drawing
@@ -116,20 +116,20 @@ struct N3mrImageT {
 template <class T>
 void SetUpN3mr(std::span<const T> corners, int size, const N3mrOptions& options,
                N3mrImageT<T>* image);
-// Draws rows [begin, end) of the drawing, of 0 .. image->inner. Faces count in order, so the bits
-// do not depend on how rows are shared.
+// Draws rows [begin, end) of the drawing, in 0 .. image->inner. Processes faces in order, so the
+// bits do not depend on the division of rows.
 template <class T>
 void DrawN3mr(const N3mrOptions& options, RowRange rows, N3mrImageT<T>* image);
-// After all rows: alpha [size,size].
+// Call after all rows: alpha [size,size].
 template <class T>
 void N3mrAlpha(const N3mrOptions& options, N3mrImageT<T>* image, std::span<T> alpha);
 
-// Then the way back: reads d_alpha [size,size].
+// Starts the backward pass: reads d_alpha [size,size].
 template <class T>
 void N3mrPrepareBackward(const N3mrOptions& options, std::span<const T> d_alpha,
                          N3mrImageT<T>* image);
-// For faces [begin, end) as given: writes their hand-made gradient to d_corners [F,3,3]; that of z
-// is 0.
+// For faces [begin, end) as given: writes their hand-crafted gradient to d_corners [F,3,3]; that of
+// z is 0.
 template <class T>
 void N3mrBackward(const N3mrOptions& options, const N3mrImageT<T>& image, std::size_t begin,
                   std::size_t end, std::span<T> d_corners);

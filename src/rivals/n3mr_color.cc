@@ -15,8 +15,8 @@ struct GainLine {
   T value[4];  // 0 beyond the channels
 };
 
-// Both ends' slopes (AddSweep) of pixels [begin, end), all on one side of the crossing, which gain.
-// Four side by side, for the compiler to make vectors of.
+// Both ends' slopes (AddSweep) of those pixels [begin, end) that gain, all on one side of the
+// crossing. Uses four parallel sums, which the compiler vectorises.
 template <class T>
 SweepEnds<T> SumGains(const GainLine<T>& gains, int begin, int end, const SweepLine<T>& line,
                       const SweepEnds<T>& per_pixel, const SweepEnds<T>& eps) {
@@ -38,7 +38,7 @@ SweepEnds<T> SumGains(const GainLine<T>& gains, int begin, int end, const SweepL
   return {(a[0] + a[2]) + (a[1] + a[3]), (b[0] + b[2]) + (b[1] + b[3])};
 }
 
-// The sweep of one face over the planes that are asked for, colours, or colours and alpha: the gain
+// The sweep of one face over the requested planes, colours, or colours and alpha: computes the gain
 // of each pixel of a line at once.
 template <class T>
 class ColorSweep {
@@ -119,7 +119,7 @@ class ColorSweep {
 
 constexpr std::size_t kCoverage = 3;  // plane, after r, g, b
 
-// An owner at a pixel of the drawing.
+// The owner of a pixel of the drawing.
 template <class T>
 struct OwnPixel {
   T w[3], z;

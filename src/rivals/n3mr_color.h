@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Colours of N3MR. Each face owns a cube of texels [s][s][s], axis k belonging to corner
-// k; a pixel looks it up at u_k = w_k z / z_k (s - 1), perspective-correct weights, and mixes the
-// eight texels around. A cube of one colour is a colour of the face.
+// Colours of N3MR. Each face owns a cube of texels [s][s][s], axis k belonging to corner k; a pixel
+// samples it at u_k = w_k z / z_k (s - 1), with perspective-correct weights, and mixes the eight
+// surrounding texels. A uniform cube gives a face colour.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ struct N3mrColors {
   int resolution = 2;  // s, 2..32
   double background[3] = {0, 0, 0};
 
-  std::size_t texels() const {  // of a face
+  std::size_t texels() const {  // per face
     const auto s = static_cast<std::size_t>(resolution);
     return s * s * s;
   }
@@ -78,9 +78,9 @@ void MixTexelsAdjoint(const N3mrTexels<T>& at, const T g[3], T* d_cube) {
   }
 }
 
-// What is drawn, or, as an adjoint, what was asked for and pushes: an empty span is absent. The
-// sweep looks at all that is there in one sum, so the gradient of colour and alpha together is not
-// the sum of the gradients of each.
+// The drawn images, or, as an adjoint, the cotangents of the requested ones: empty spans are
+// absent. The sweep sums over all present images at once, so the gradient of colour and alpha
+// together is not the sum of their separate gradients.
 template <class T>
 struct N3mrImages {
   std::span<T> color;  // [3,size,size]
@@ -91,12 +91,12 @@ struct N3mrImages {
 template <class T>
 struct N3mrPlanesT {
   AlignedVector<T> values, d_values;  // [4]
-  // Of what the sweep sums over: the sum of values times adjoints by row; that by column, and the
-  // adjoints by column.
+  // Sums for the sweep: of values times adjoints by row; the same by column, and the adjoints by
+  // column.
   AlignedVector<T> row_sums, column_sums, d_columns;  // d_columns: [4]
 };
 
-// How an image is coloured; after SetUpN3mr and DrawN3mr of all rows. T: float or double.
+// Inputs for colouring an image; after SetUpN3mr and DrawN3mr of all rows. T: float or double.
 template <class T>
 struct N3mrColorJob {
   const N3mrOptions& options;
@@ -105,13 +105,13 @@ struct N3mrColorJob {
   std::span<const T> textures;  // [F,s,s,s,3]
 };
 
-// Makes room; on one thread.
+// Allocates the planes; call from one thread.
 template <class T>
 void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes);
 // Fills the planes in rows of the drawing.
 template <class T>
 void N3mrShade(const N3mrColorJob<T>& job, RowRange rows, N3mrPlanesT<T>* planes);
-// After all rows: the requested images.
+// Call after all rows: writes the requested images.
 template <class T>
 void N3mrReducePlanes(const N3mrColorJob<T>& job, const N3mrPlanesT<T>& planes,
                       const N3mrImages<T>& out);
@@ -124,7 +124,7 @@ struct N3mrColorAdjoints {
   std::span<T> d_corners;   // [F,3,3]
   std::span<T> d_textures;  // [F,s,s,s,3]
 };
-// Then, for faces [begin, end) as given, overwrites `out`.
+// Then overwrites `out` for faces [begin, end) as given.
 template <class T>
 void N3mrColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
                        const N3mrPlanesT<T>& planes, std::size_t begin, std::size_t end,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of n3mr.h: every face for every pixel, every pixel of every line. The drawing: T float,
-// double, std::complex<double>; the sweep, which is no derivative: float or double.
+// Scalar reference of n3mr.h: every face at every pixel, every pixel of every line. The drawing: T
+// float, double, std::complex<double>; the sweep, which is no derivative: float or double.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct N3mrDrawingRef {
   int inner;
   std::vector<N3mrFaceT<T>> faces;
   std::vector<std::int32_t> owner;        // [inner,inner] index into faces, -1: none
-  std::vector<T> depth;                   // far where there is none
+  std::vector<T> depth;                   // far_plane if there is no face
   std::vector<std::array<T, 3>> weights;  // of the owner's corners, clipped
 
   N3mrDrawingRef(std::span<const T> corners, int size, const N3mrOptions& options)

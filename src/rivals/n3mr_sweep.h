@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The geometry of N3MR's hand-made gradient. A face's edge is moved along one axis; where it meets
-// a line of pixel centres, the line's pixels outward and inward of the crossing could change owner.
-// The change of their value over the distance that a corner has to move for it is taken for a
-// slope. Scalar, for reference and fast code alike; T: float or double.
+// The geometry of N3MR's hand-crafted gradient. It moves a face's edge along one axis; where the
+// edge crosses a line of pixel centres, pixels of the line outward and inward of the crossing could
+// change owner. The change of their value, divided by the distance that a corner must move for it,
+// serves as a slope. Scalar, for reference and fast code alike; T: float or double.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace tilegrad::rivals {
 
-// Pixel units: l along which lines are counted, m the coordinate that moves.
+// Pixel units: l is the coordinate across lines, m the coordinate that moves.
 template <class T>
 struct SweepPoint {
   T l, m;
@@ -28,7 +28,7 @@ struct SweepEdge {
   int outward;  // +1 or -1: along m, away from the face
 };
 
-enum class SweepAxis { kY, kX };  // that moves
+enum class SweepAxis { kY, kX };  // the axis that moves
 
 template <class T>
 SweepEdge<T> SweepEdgeOf(const FaceCorners<T>& f, int edge, SweepAxis axis, int inner) {
@@ -42,23 +42,23 @@ SweepEdge<T> SweepEdgeOf(const FaceCorners<T>& f, int edge, SweepAxis axis, int 
   return out;
 }
 
-// Where an edge meets line `line`.
+// The crossing of an edge with line `line`.
 template <class T>
 struct SweepLine {
   int line;
-  int in, out;     // pixels before and behind the crossing, outward = out
+  int in, out;     // pixels before and after the crossing, outward = out
   T crossing;      // along m
-  T per_a, per_b;  // how far a (b) moves for a crossing moved by 1; 0: it cannot
+  T per_a, per_b;  // movement of a (b) per unit movement of the crossing; 0: it cannot
 };
 
-// The last line that the published loop or its repair takes.
+// The last line visited by the published loop or its repair.
 template <class T>
 int LastSweepLine(T last, int inner, bool floor_lines) {
   const T bounded = std::clamp(last, T(-2), T(inner - 1));
   return static_cast<int>(floor_lines ? std::floor(bounded) : bounded);  // int(): toward zero
 }
 
-// The whole numbers beside x, whose size an int holds. Quicker than std::floor, which is a call
+// The integers beside x, which must fit into an int. Faster than std::floor, which is a call
 // without SSE 4.
 template <class T>
 int Floor(T x) {
@@ -70,7 +70,7 @@ int Ceil(T x) {
   return -Floor(-x);
 }
 
-// Pixels of the face on a line, both included; may be none.
+// Pixels of the face on a line, both included; may be empty.
 struct InnerPixels {
   int first, last;
 };
@@ -87,8 +87,8 @@ InnerPixels InnerPixelsOf(const SweepEdge<T>& e, const SweepLine<T>& line, int i
   return {std::max(0, std::min(line.in, end)), std::min(inner - 1, std::max(line.in, end))};
 }
 
-// Calls visit(line) for the lines of a drawing of inner x inner that the edge meets. Lines whose
-// pixel `in` or `out` is off the drawing are dropped, as published.
+// Calls visit(line) for the lines of a drawing of inner x inner that the edge crosses. Drops lines
+// whose pixel `in` or `out` is off the drawing, as published.
 template <class T, class Visit>
 void ForSweepLines(const SweepEdge<T>& e, int inner, bool floor_lines, const Visit& visit) {
   if (e.a.l == e.b.l) return;
@@ -117,7 +117,7 @@ struct SweepEnds {
   T a = T(0), b = T(0);
 };
 
-// A pixel at `at` on the line, whose change would lower the loss by `gain` > 0.
+// A pixel at `at` on the line, whose change would reduce the loss by `gain` > 0.
 template <class T>
 void AddSweep(const SweepLine<T>& line, int at, T gain, T per_pixel, T eps, SweepEnds<T>* ends) {
   const T move = (static_cast<T>(at) - line.crossing) * per_pixel;
@@ -138,8 +138,8 @@ void AddSweepEnds(const N3mrFaceT<T>& face, int edge, SweepAxis axis, double sca
   d_corners[3 * face.SourceCorner((edge + 1) % 3) + c] += ends.b * static_cast<T>(scale);
 }
 
-// What the sweep looks at: planes of the drawing that were asked for, background filled in, and
-// their adjoints, [channels][inner,inner].
+// Input of the sweep: the requested planes of the drawing, background filled in, and their
+// adjoints, [channels][inner,inner].
 template <class T>
 struct SweepImages {
   int inner, channels;
@@ -150,8 +150,8 @@ struct SweepImages {
     const int row = axis == SweepAxis::kY ? at : line, column = axis == SweepAxis::kY ? line : at;
     return static_cast<std::size_t>(row * inner + column);
   }
-  // How much the loss falls if pixel `to` takes the value that `from` has. One sum over all
-  // channels: colours and alpha together are not the sum of both alone.
+  // Decrease of the loss if pixel `to` takes the value of pixel `from`. Sums over all channels at
+  // once: colours and alpha together are not the sum of both alone.
   T Gain(std::size_t to, std::size_t from) const {
     T gain = T(0);
     for (int c = 0; c < channels; ++c) {
@@ -171,7 +171,7 @@ struct N3mrSample {
   double share;
 };
 
-// Of pixel k of an image of `size`, bilinear.
+// For pixel k of an image of `size`, bilinear.
 inline N3mrSample N3mrSampleAt(int k, int size) {
   const double at = k * (2.0 * size - 1) / (size - 1);
   const int first = std::min(static_cast<int>(at), 2 * size - 2);

@@ -12,12 +12,12 @@
 
 namespace tilegrad::rivals {
 
-// One image of a batch: what it keeps between its forward and its backward pass, and memory for
-// both. T: float or double.
+// One image of a batch: state between its forward and its backward pass, and memory for both. T:
+// float or double.
 template <class T>
 class ImageStateT {
  public:
-  // `out`: of this image, number n of the batch. Options and batch are checked.
+  // `out`: for this image, number n of the batch. Options and batch must be valid.
   void Render(const BatchT<T>& batch, const Options& options, std::size_t n,
               const Workers::Part& part, const ImagesT<T>& out);
   // Sets d_positions and, if the batch has colours, d_colors.
@@ -54,7 +54,7 @@ namespace {
 
 constexpr std::size_t kRowsAtOnce = 64, kFacesAtOnce = 256;
 
-// Calls task(begin, end) for ranges of [0, n), shared with workers that have no image.
+// Calls task(begin, end) for ranges of [0, n), shared with idle workers.
 template <class Task>
 void ForRanges(const Workers::Part& part, std::size_t n, std::size_t grain, const Task& task) {
   part.For((n + grain - 1) / grain,
@@ -278,7 +278,7 @@ Status CheckResolution(const char* name, int value, int least, int most) {
   return InvalidArgument("{} is {}; must be {} to {}", name, value, least, most);
 }
 
-// sum <- the sum of `part` of the images of mesh b, in their order.
+// sum <- the sum of `part` over the images of mesh b, in order.
 template <class T, class PartOf>
 void SumViews(std::size_t views, std::size_t b, std::span<T> sum, const PartOf& part_of) {
   std::fill(sum.begin(), sum.end(), T(0));

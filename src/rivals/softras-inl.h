@@ -48,7 +48,7 @@ void ForwardAll(const SoftRasOptions& options, RowRange rows, SoftRasImage* imag
   }
 }
 
-// Where the interpolated depth lies between the planes.
+// Where the interpolated depth is between the planes.
 HWY_INLINE SoftMask LanesBetweenPlanes(const SoftRasFace& f, const SoftScale& scale,
                                        const SoftLanes& at) {
   const SoftTag d;
@@ -111,7 +111,7 @@ HWY_INLINE void BackwardFaces(const SoftRasOptions& options, const SoftRasImage&
   }
 }
 
-// Of kEuclidean or kBarycentric.
+// For kEuclidean or kBarycentric.
 void BackwardAll(const SoftRasOptions& options, const SoftRasImage& image, std::size_t begin,
                  std::size_t end, float* d_corners) {
   if (options.distance == SoftDistance::kEuclidean) {

@@ -19,7 +19,7 @@ HWY_EXPORT(BackwardAll);
 
 constexpr std::size_t kPadding = 8;  // floats: the widest vector of the kernel
 
-// Pixels whose centre may lie in [low, high]: pixel p has its centre at (2 p + 1 - n) / n. One
+// Pixels with centres that may lie in [low, high]: pixel p has its centre at (2 p + 1 - n) / n. One
 // more on each side, for rounding; the kernel decides.
 struct PixelRange {
   int begin, end;
@@ -42,8 +42,8 @@ void SetBox(float reach, int size, SoftRasFace* f) {
   f->column_end = columns.end;
   f->row_begin = rows.begin;
   f->row_end = rows.end;
-  // One row too many is harmless in the Euclidean distance, which cuts by itself; the box cuts the
-  // barycentric one.
+  // One row too many is harmless with the Euclidean distance, which has its own cut-off; the
+  // barycentric one is cut by the box.
   while (f->row_begin < f->row_end && CentreY<float>(f->row_begin, size) > high_y) ++f->row_begin;
   while (f->row_begin < f->row_end && CentreY<float>(f->row_end - 1, size) < low_y) --f->row_end;
 }

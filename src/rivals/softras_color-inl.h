@@ -29,10 +29,10 @@ struct ColorScale {
   }
 };
 
-// A face's depth and colour at the pixels of a vector.
+// A face's depth and colour at a vector of pixels.
 struct ColorLanes {
   SoftLanes soft;
-  SoftMask counts;  // the pixels where it may have colour
+  SoftMask counts;  // pixels where the face may contribute colour
   SoftVec w[3], sum, z, nearness;
   SoftVec color[3];
 };
@@ -60,7 +60,7 @@ HWY_INLINE void SetDepth(const SoftRasFace& f, const SoftScale& soft, ColorLanes
   out->nearness = hn::Neg(out->z);
 }
 
-// textures: of the face.
+// textures: of this face.
 HWY_INLINE void SetColor(const float* textures, ColorLanes* out) {
   const SoftTag d;
   for (int c = 0; c < 3; ++c) {
@@ -150,7 +150,7 @@ HWY_INLINE void ClearSums(ColorSums* sums) {
   }
 }
 
-// What the pixels want.
+// Cotangents of the pixels.
 struct ColorPush {
   SoftVec g[3], mean;  // dL/dI, and its product with I
 
@@ -169,7 +169,7 @@ struct ColorFace {
   const float* textures;  // of the face
 };
 
-// To the texels of a face, of the lanes that count.
+// Adds to the texels of a face, in the lanes that count.
 HWY_INLINE void AddTexels(const ColorLanes& at, SoftVec weight, const ColorPush& push,
                           ColorSums* sums) {
   for (int k = 0; k < 3; ++k) {
@@ -179,7 +179,7 @@ HWY_INLINE void AddTexels(const ColorLanes& at, SoftVec weight, const ColorPush&
   }
 }
 
-// The repair: corners move the weights that colour and depth are interpolated by.
+// The repair: corners also move the interpolation weights of colour and depth.
 HWY_INLINE void AddWeightMoves(const SoftRasFace& f, const ColorLanes& at, const SoftVec d_w[3],
                                CornerSums* sums) {
   const SoftTag d;
@@ -200,7 +200,7 @@ HWY_INLINE void AddWeightMoves(const SoftRasFace& f, const ColorLanes& at, const
   }
 }
 
-// Through depth, whose adjoint is d_z; with the repair through the weights, too.
+// Through depth, whose adjoint is d_z; with the repair also through the weights.
 HWY_INLINE void AddDepthMoves(const ColorFace& of, const ColorLanes& at, SoftVec d_z,
                               SoftVec weight, const ColorPush& push, ColorSums* sums) {
   const SoftTag d;

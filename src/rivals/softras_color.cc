@@ -26,7 +26,7 @@ void ForPixels(const SoftRasImage& image, RowRange rows, const Visit& visit) {
   }
 }
 
-// Every pixel shows the background.
+// Initialises every pixel with the background.
 void StartMixing(const SoftRasColorJob& job, RowRange rows, SoftRasColorImage* mixed) {
   const double range = job.options.far_plane - job.options.near_plane;
   const auto background =

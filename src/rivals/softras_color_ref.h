@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of softras_color.h: every face for every pixel. T: float, double, std::complex<double>.
+// Scalar reference of softras_color.h: every face at every pixel. T: float, double,
+// std::complex<double>.
 #pragma once
 
 #include <cmath>
@@ -11,7 +12,7 @@
 
 namespace tilegrad::rivals {
 
-// An image's faces and how they are coloured.
+// An image's faces and their colours.
 template <class T>
 struct SoftRasScene {
   std::span<const T> corners;   // [F,3,3]
@@ -43,7 +44,7 @@ SoftColorFragment<T> ColorFragment(const SoftRasScene<T>& scene, std::size_t fac
   return out;
 }
 
-// Calls visit(face, number, fragment) for the faces that may have colour at a pixel.
+// Calls visit(face, number, fragment) for the faces that may contribute colour at a pixel.
 template <class T, class Visit>
 void ForColorFaces(const SoftRasScene<T>& scene, const T& px, const T& py, const Visit& visit) {
   SoftFragment<T> at;
@@ -103,13 +104,13 @@ void SoftRasColorRef(const SoftRasScene<T>& scene, std::span<T> color) {
   }
 }
 
-// Where gradients of a scene are added.
+// Destinations to which gradients of a scene are added.
 template <class T>
 struct SoftRasAdjoints {
   std::span<T> d_corners, d_textures;
 };
 
-// The repair: corners move the weights w that colour and depth of a pixel are interpolated by.
+// The repair: corners also move the interpolation weights w of a pixel's colour and depth.
 // d_w: their adjoint.
 template <class T>
 void AddWeightAdjoint(const SoftFaceRef<T>& face, const SoftFragment<T>& at, const T d_w[3],
@@ -127,7 +128,7 @@ void AddWeightAdjoint(const SoftFaceRef<T>& face, const SoftFragment<T>& at, con
   AddBarycentricAdjoint(face.at, face.area2, at.b, d_b, d_corners);
 }
 
-// A face's part of the mixture's adjoint.
+// A face's contribution to the adjoint of the mixture.
 template <class T>
 void AddMixtureAdjoint(const SoftRasScene<T>& scene, const SoftColorPixel<T>& pixel, const T g[3],
                        const SoftFaceRef<T>& face, std::size_t f, const SoftFragment<T>& at,

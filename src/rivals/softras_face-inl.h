@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A SoftRas face at the pixels of a vector, for silhouettes and colours: lanes are pixels of a row.
-// A face visits the pixels of its widened box.
+// A SoftRas face at a vector of pixels, for silhouettes and colours: lanes are pixels of a row. A
+// face visits the pixels of its grown box.
 #if defined(TILEGRAD_RIVALS_SOFTRAS_FACE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RIVALS_SOFTRAS_FACE_INL_H_
 #undef TILEGRAD_RIVALS_SOFTRAS_FACE_INL_H_
@@ -23,7 +23,7 @@ using SoftTag = hn::CappedTag<float, 8>;
 using SoftVec = hn::Vec<SoftTag>;
 using SoftMask = hn::Mask<SoftTag>;
 
-// Numbers of the options as the kernel uses them.
+// Constants derived from the options.
 struct SoftScale {
   float cutoff, bits_per_d;  // d * bits_per_d is the exponent to base 2
   float inverse_sigma, near_plane, far_plane;
@@ -38,12 +38,12 @@ struct SoftScale {
         floor_factor(static_cast<float>(1 / kSoftFloor)) {}
 };
 
-// A face at the pixels of a vector.
+// A face at a vector of pixels.
 struct SoftLanes {
   SoftVec b[3];           // barycentric weights
   SoftMask inside, live;  // live: the face reaches the pixel
   SoftVec d;              // unsigned
-  SoftVec t[3], rx, ry;   // the nearest point's weights, and the way to it (Euclidean)
+  SoftVec t[3], rx, ry;   // the nearest point's weights, and the vector to it (Euclidean)
   SoftVec probability, miss;
 };
 
@@ -109,7 +109,7 @@ HWY_INLINE SoftLanes SoftFaceAt(const SoftRasFace& f, const SoftScale& scale, So
     out.d = hn::Mul(least, least);
   }
   out.live = hn::Or(out.inside, hn::Lt(out.d, hn::Set(d, scale.cutoff)));
-  if constexpr (kDistance == SoftDistance::kBarycentric) {  // the box cuts there, too
+  if constexpr (kDistance == SoftDistance::kBarycentric) {  // the box clips there, too
     out.live = hn::And(out.live,
                        hn::And(hn::Ge(px, hn::Set(d, f.low_x)), hn::Le(px, hn::Set(d, f.high_x))));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of softras.h: every face for every pixel. T: float, double, std::complex<double>.
+// Scalar reference of softras.h: every face at every pixel. T: float, double, std::complex<double>.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace tilegrad::rivals {
 
-// A face without what depends on the pixel.
+// The pixel-independent part of a face.
 template <class T>
 struct SoftFaceRef {
   FaceCorners<T> at;
@@ -38,7 +38,7 @@ struct SoftFragment {
   T w[3], z;                          // clipped weights, depth
 };
 
-// Outside of the face's box by more than the cut-off's root.
+// Whether the pixel is outside of the face's box by more than the root of the cut-off.
 template <class T>
 bool BeyondBox(const FaceCorners<T>& f, const T& px, const T& py, double reach) {
   const auto beyond = [&](const T v[3], const T& p) {
@@ -69,7 +69,7 @@ void SetNearest(const FaceCorners<T>& f, const T& px, const T& py, SoftFragment<
   }
 }
 
-// sigmoid(x) and 1 - sigmoid(x), each to its own relative accuracy.
+// sigmoid(x) and 1 - sigmoid(x), both to full relative accuracy.
 template <class T>
 void Sigmoid(const T& x, T* value, T* rest) {
   using std::exp;
@@ -79,7 +79,7 @@ void Sigmoid(const T& x, T* value, T* rest) {
   *rest = positive ? small : large;
 }
 
-// False where the face does not reach the pixel. `depth` sets w and z.
+// False if the face does not reach the pixel. `depth` sets w and z.
 template <class T>
 bool MakeSoftFragment(const SoftFaceRef<T>& face, const T& px, const T& py,
                       const SoftRasOptions& options, SoftFragment<T>* out) {
@@ -112,7 +112,7 @@ bool BetweenPlanes(const T& z, const SoftRasOptions& options) {
   return RealPart(z) >= options.near_plane && RealPart(z) <= options.far_plane;
 }
 
-// Adds to d_corners [3,3] of the face what follows from dL/dd.
+// Adds to d_corners [3,3] of the face, given dL/dd.
 template <class T>
 void AddDistanceAdjoint(const SoftFaceRef<T>& face, const SoftFragment<T>& at,
                         const SoftRasOptions& options, const T& d_d, T* d_corners) {
@@ -131,7 +131,7 @@ void AddDistanceAdjoint(const SoftFaceRef<T>& face, const SoftFragment<T>& at,
   }
 }
 
-// What alpha of a pixel is made from: the product of 1 - D, the sum of D, or 1 where a face counts.
+// The per-pixel state for alpha: the product of 1 - D, the sum of D, or 1 if a face counts.
 template <class T>
 T KeptOf(std::span<const T> corners, const T& px, const T& py, const SoftRasOptions& options) {
   T product = T(1), sum = T(0), any = T(0);
@@ -163,7 +163,7 @@ T AlphaToDistance(const SoftFragment<T>& at, const T& kept, std::size_t faces,
   if (options.alpha == SoftAlpha::kSum) {
     return d_alpha * per_d * at.miss / static_cast<double>(faces);
   }
-  // prod(1 - D) / (1 - D) times 1 - D; published with a floor below the fraction.
+  // prod(1 - D) / (1 - D) times 1 - D; published with a floor on the denominator.
   if (options.exact_product || RealPart(at.miss) >= kSoftFloor) return d_alpha * kept * per_d;
   return d_alpha * kept * per_d * at.miss / kSoftFloor;
 }

@@ -28,7 +28,7 @@ Camera64 FromAxes(const Lens& lens, glm::dvec3 x, glm::dvec3 y, glm::dvec3 z, gl
   return camera;
 }
 
-// Times a power of two, so that squares of its numbers neither vanish nor overflow.
+// Scaled by a power of two, so that squares of its numbers neither underflow nor overflow.
 glm::dvec3 Scaled(glm::dvec3 v) {
   const double most = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (!(most > 0) || !std::isfinite(most)) return v;
@@ -42,7 +42,7 @@ Camera64 LookAlong(const Lens& lens, glm::dvec3 eye, glm::dvec3 backward, glm::d
   const double length = glm::length(backward);
   const glm::dvec3 z = length > 0 ? backward / length : glm::dvec3(0, 0, 1);
   glm::dvec3 x = glm::cross(up, z);
-  // `up` along the view: take the world axis that is most across it.
+  // `up` is parallel to the view: take the world axis most perpendicular to it.
   if (glm::length(x) <= 1e-12 * glm::length(up) || glm::length(x) == 0) {
     x = glm::cross(std::abs(z.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0), z);
   }

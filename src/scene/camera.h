@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras of the public interface, made and converted.
+// Makes and converts cameras of the public interface.
 #pragma once
 
 #include <span>
@@ -9,19 +9,19 @@
 
 namespace tilegrad {
 
-using Camera64 = CameraT<double>;  // what converters and camera files speak (camera_conventions.h)
+using Camera64 = CameraT<double>;  // of converters and camera files (camera_conventions.h)
 
 struct ImageSize {
   int width = 0, height = 0;  // pixels
 };
 
-// As MakeCamera, for numbers that are finite and in range. Elevations of exactly +-90 take the
-// limit from below (up is then the horizontal direction), so every finite input gives a rotation.
+// Like MakeCamera, for numbers that are finite and in range. At elevations of exactly +-90 takes
+// the limit from below (up is then horizontal), so every finite input gives a rotation.
 template <class T = float>  // or double
 CameraT<T> OrbitCamera(const Lens& lens, double azimuth, double elevation, double distance);
 
-// A camera at `eye` that looks at `target`. `up` need only be independent of the viewing direction;
-// if it is not, another axis is taken. T: float or double.
+// A camera at `eye` looking at `target`. `up` need not be perpendicular to the viewing direction;
+// if it is parallel, another axis replaces it. T: float or double.
 template <class T>
 CameraT<T> LookAtCamera(const Lens& lens, const T eye[3], const T target[3], const T up[3]);
 

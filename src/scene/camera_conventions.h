@@ -3,11 +3,11 @@
 // docs/rendering.md has a picture and a number for each.
 //
 // All matrices are row-major and act on column vectors unless said otherwise; all lengths are world
-// units. From... fails on what is not a pinhole camera: a number that is not finite, a matrix that
-// is not a rotation (rows off by more than kRotationTolerance, or a mirror), a focal length that is
-// not positive, skew. To... fails where the other convention cannot express the camera. A round
-// trip keeps the numbers up to a few roundings; the near plane survives only in conventions that
-// have one, and is the default of camera.h otherwise.
+// units. From... fails for input that is not a pinhole camera: a number that is not finite, a
+// matrix that is not a rotation (rows off by more than kRotationTolerance, or a mirror), a focal
+// length that is not positive, skew. To... fails where the other convention cannot express the
+// camera. A round trip preserves the numbers up to a few roundings; conventions without a near
+// plane get the default of camera.h.
 #pragma once
 
 #include <array>
@@ -22,10 +22,10 @@ using Vec3Array = std::array<double, 3>;
 using Mat3Array = std::array<double, 9>;
 using Mat4Array = std::array<double, 16>;
 
-// Largest entry of |R R^T - 1| that still counts as a rotation printed with few digits.
+// Largest entry of |R R^T - 1| for which R still counts as a rotation, printed with few digits.
 inline constexpr double kRotationTolerance = 1e-3;
 
-// Where the centre of the first pixel is.
+// The coordinates of the first pixel's centre.
 enum class PixelCentre {
   kInteger,  // (0, 0): OpenCV's calibration and projectPoints
   kHalf      // (0.5, 0.5): COLMAP, OpenGL, and this project
@@ -60,12 +60,12 @@ struct OpenGlCamera {
   Mat4Array model_view = {};
 };
 Result<Camera64> FromOpenGl(const OpenGlCamera& from, ImageSize size);
-// far_plane > camera.near_plane; rendering here has no far plane.
+// far_plane > camera.near_plane; this renderer has no far plane.
 Result<OpenGlCamera> ToOpenGl(const Camera64& camera, ImageSize size, double far_plane);
 
 // Kaolin's and DIB-R's: p = rotation * (world - position), OpenGL's axes; image in [-1, 1] =
 // (projection.x * p.x, projection.y * p.y) / (projection.z * p.z), projection.z = -1. The principal
-// point is the middle of the image.
+// point is the centre of the image.
 struct KaolinCamera {
   Mat3Array rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   Vec3Array position = {};
@@ -92,16 +92,16 @@ struct NerfCamera {
 Result<Camera64> FromNerf(const NerfCamera& from);
 NerfCamera ToNerf(const Camera64& camera);
 
-// glTF's perspective camera at a node: OpenGL's axes. The scale of the node is ignored.
+// glTF's perspective camera at a node: OpenGL's axes. Ignores the node's scale.
 struct GltfCamera {
   Mat4Array node_to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  double yfov = 0.8;        // radians, the whole vertical field of view, (0, pi)
+  double yfov = 0.8;        // radians, the full vertical field of view, (0, pi)
   double aspect_ratio = 0;  // of the field of view; 0: that of the image, so that pixels are square
   double znear = 1e-2;
 };
 Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size);
 
-// The same view on an image of another size: everything scales, the field of view stays.
+// The same view on an image of another size: scales all pixel units, keeps the field of view.
 inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {
   Camera64 out = camera;
   const double x = static_cast<double>(to.width) / from.width;
@@ -113,7 +113,7 @@ inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize t
   return out;
 }
 
-// The camera of the same image with `scale` times as many pixels along each side.
+// The camera of the same image with `scale` times as many pixels on each side.
 inline Camera ScaledCamera(Camera camera, float scale) {
   camera.fx *= scale;
   camera.fy *= scale;
@@ -122,8 +122,8 @@ inline Camera ScaledCamera(Camera camera, float scale) {
   return camera;
 }
 
-// Fails unless the camera is finite, its rotation is one, and its focal lengths and near plane are
-// positive. Every From... ends with it.
+// Fails unless the camera is finite, its rotation is a rotation, and its focal lengths and near
+// plane are positive. Every From... calls it last.
 Status Validate(const Camera64& camera);
 
 }  // namespace tilegrad

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera from free parameters, for gradient descent, and the adjoint. T: float, double,
+// A camera from free parameters, for gradient descent, and its adjoint. T: float, double,
 // std::complex<double>.
 //
 // The rotation comes from six numbers by Gram and Schmidt (Y. Zhou et al., On the continuity of
@@ -87,7 +87,7 @@ CameraT<T> CameraFromParametersRef(const CameraParametersT<T>& p, T near_plane) 
   return camera;
 }
 
-// d_camera: entry by entry, as the renderer gives it. Overwrites *d_p.
+// d_camera: per entry, as the renderer gives it. Overwrites *d_p.
 template <class T>
 void CameraFromParametersAdjointRef(const CameraParametersT<T>& p, const CameraT<T>& d_camera,
                                     CameraParametersT<T>* d_p) {

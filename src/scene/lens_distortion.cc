@@ -26,7 +26,7 @@ Vec2Array BentByFisheye(const std::array<double, 8>& k, const Vec2Array& at) {
   return {at[0] * shown / radius, at[1] * shown / radius};
 }
 
-// Along the x axis, without what is tangential.
+// Along the x axis, without tangential distortion.
 double RadiusShown(LensDistortion lens, double radius) {
   if (lens.model == LensDistortion::Model::kBrown) lens.k[2] = lens.k[3] = 0;
   return Bent(lens, {radius, 0})[0];
@@ -65,7 +65,7 @@ double LargestRadius(const LensDistortion& lens) {
   return kWidest;
 }
 
-// Newton's method, with differences for derivatives.
+// Newton's method with difference quotients.
 std::optional<Vec2Array> Unbent(const LensDistortion& lens, const Vec2Array& bent, double largest) {
   constexpr int kMostSteps = 30;
   constexpr double kStep = 1e-6, kClose = 1e-9;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lenses that bend rays, as OpenCV and COLMAP describe them. The cameras of this project have
-// straight ones: pictures of others are undistorted first (fit/undistort.h).
+// Lens distortion models of OpenCV and COLMAP. The cameras of this project have no distortion:
+// fit/undistort.h undistorts images first.
 #pragma once
 
 #include <array>
@@ -22,21 +22,22 @@ struct LensDistortion {
   bool straight() const { return model == Model::kStraight; }
 };
 
-// kBrown with these coefficients, kStraight where all of them are 0.
+// kBrown with these coefficients; kStraight if all of them are 0.
 LensDistortion BrownLens(const std::array<double, 8>& k);
 LensDistortion FisheyeLens(const std::array<double, 4>& k);
 
-// Places on an image below: from the principal point, in units of the focal length, y down.
+// Points below are normalised image coordinates: relative to the principal point, in focal lengths,
+// y down.
 
-// Where the lens shows what a straight one shows at `place`.
+// Distorts a point.
 Vec2Array Bent(const LensDistortion& lens, const Vec2Array& place);
 
-// From the middle to here Bent goes outwards; beyond, a polynomial turns back or a lens sees
-// nothing. At most tan(85 degrees).
+// The largest radius up to which Bent increases monotonically; beyond, a polynomial turns back or
+// the lens sees nothing. At most tan(85 degrees).
 double LargestRadius(const LensDistortion& lens);
 
-// The place within `largest`, LargestRadius of the lens, that Bent takes to `bent`; none where
-// there is none.
+// Undistorts: the point within radius `largest` (LargestRadius of the lens) that Bent maps to
+// `bent`; nullopt if there is none.
 std::optional<Vec2Array> Unbent(const LensDistortion& lens, const Vec2Array& bent, double largest);
 
 }  // namespace tilegrad

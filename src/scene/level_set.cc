@@ -12,7 +12,7 @@ constexpr float kNearest = 0.05f;  // of an edge, from its ends
 
 using Corner = std::array<int, 3>;
 
-// The orders in which a tetrahedron's path goes along the axes from a cell's low corner to its high
+// The orders in which a tetrahedron's path follows the axes from a cell's low corner to its high
 // one; the first three are even permutations.
 constexpr std::array<std::array<std::size_t, 3>, 6> kPaths = {
     {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0, 2}, {2, 1, 0}}};
@@ -52,12 +52,12 @@ class Extraction {
       corners.fill(low);
       for (std::size_t step = 0; step < 3; ++step)
         for (std::size_t c = step + 1; c < 4; ++c) ++corners[c][kPaths[p][step]];
-      if (p >= 3) std::swap(corners[2], corners[3]);  // so that all turn the same way
+      if (p >= 3) std::swap(corners[2], corners[3]);  // so that all have the same orientation
       AddTetrahedron(corners);
     }
   }
 
-  // Corners turn right-handed. Those inside come first after an even permutation.
+  // Corners are right-handed. An even permutation puts those inside first.
   void AddTetrahedron(std::array<Corner, 4> c) {
     std::array<bool, 4> inside;
     for (std::size_t i = 0; i < 4; ++i) inside[i] = IsInside(c[i]);
@@ -83,7 +83,7 @@ class Extraction {
 
   void AddFace(std::int32_t a, std::int32_t b, std::int32_t c) { mesh_.faces.push_back({a, b, c}); }
 
-  // The vertex on an edge, made once: by the lower end and the direction.
+  // The vertex on an edge, created once: keyed by the lower end and the direction.
   std::int32_t Between(const Corner& in, const Corner& out) {
     std::uint64_t direction = 0;
     Corner low;
@@ -100,7 +100,7 @@ class Extraction {
 
   glm::vec3 Crossing(const Corner& in, const Corner& out) const {
     const float a = grid_.values[grid_.At(in[0], in[1], in[2])];
-    // On the border, where inside is not possible, values may say so.
+    // Values on the border may be inside, which is not allowed.
     const float b = std::min(0.0f, grid_.values[grid_.At(out[0], out[1], out[2])]);
     const float t = std::clamp(a / (a - b), kNearest, 1 - kNearest);
     const glm::vec3 from(in[0], in[1], in[2]), to(out[0], out[1], out[2]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surface where a function on a grid is 0.
+// The zero level set of a function on a grid.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace tilegrad {
 
-// Numbers at the points low + cell * (i, j, k); greater than 0 is inside.
+// Values at the points low + cell * (i, j, k); positive is inside.
 struct ScalarGrid {
   std::array<int, 3> size = {0, 0, 0};  // points along x, y, z; 2 or more
   glm::vec3 low = {0, 0, 0};
@@ -25,11 +25,11 @@ struct ScalarGrid {
   }
 };
 
-// Marching tetrahedra (Doi, Koide 1991) on Kuhn's six tetrahedra of each cell, which fit together
-// from cell to cell. The function is linear in each and 0 at no point of the grid (0 counts as
-// outside), so its level set is a closed manifold, of any genus and any number of parts. Points on
-// the border count as outside. Vertices keep a twentieth of an edge away from its ends. Positions
-// and faces only, in an order that depends on the values alone; empty if nothing is inside.
+// Marching tetrahedra (Doi, Koide 1991) on Kuhn's six tetrahedra per cell, which match across
+// cells. The function is linear in each and nonzero at every grid point (0 counts as outside), so
+// its level set is a closed manifold, of any genus and any number of components. Points on the
+// border count as outside. Vertices stay a twentieth of an edge away from its ends. Positions and
+// faces only, in an order that depends on the values alone; empty if nothing is inside.
 Mesh LevelSet(const ScalarGrid& grid);
 
 }  // namespace tilegrad

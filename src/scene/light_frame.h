@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The spherical harmonics of light, and light in the axes of a camera turned to those of the world,
-// as the renderer takes it.
+// The spherical harmonics of lighting; rotates light from camera axes to the world axes that the
+// renderer takes.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace tilegrad {
 
-// The real, orthonormal spherical harmonics of degree 0 to 2 that SceneT::sh has the coefficients
-// of, at one direction. Renders use the polynomials of src/shade/spherical_harmonics_ref.h.
+// The real, orthonormal spherical harmonics of degree 0 to 2, for the coefficients in SceneT::sh,
+// in one direction. The renderer uses the polynomials of src/shade/spherical_harmonics_ref.h.
 inline constexpr double kHarmonic0 = 0.28209479177387814;  // sqrt(1 / 4 pi)
 inline constexpr double kHarmonic1 = 0.48860251190291992;  // sqrt(3 / 4 pi)
 
@@ -24,8 +24,8 @@ inline std::array<double, 9> HarmonicBasis(const std::array<double, 3>& d) {
 
 // R^T d with the camera's rotation R.
 std::array<float, 3> DirectionToWorld(const std::array<float, 3>& direction, const Camera& camera);
-// Coefficients of SceneT::sh: at any world direction n the light that the given ones have at R n.
-// Exact: degree 2 is closed under rotation.
+// Rotates SceneT::sh: the result gives in world direction n the light that `sh` gives in direction
+// R n. Exact: degree 2 is closed under rotation.
 std::array<double, 9> HarmonicsToWorld(const std::array<double, 9>& sh, const Camera& camera);
 std::array<float, 9> HarmonicsToWorld(const std::array<float, 9>& sh, const Camera& camera);
 

@@ -205,7 +205,7 @@ glm::dvec3 PolygonNormal(std::span<const glm::vec3> corners) {
   return sum;
 }
 
-// Seen along the normal's largest component, from the side where the polygon is counter-clockwise.
+// Projects along the normal's largest component, so that the polygon is counter-clockwise.
 std::vector<glm::dvec2> Flatten(std::span<const glm::vec3> corners) {
   const glm::dvec3 n = PolygonNormal(corners), a = glm::abs(n);
   const int drop = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
@@ -272,13 +272,13 @@ void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& t
 
 namespace {
 
-// The distance that the eye needs along one view, and how far the mesh reaches towards it.
+// The distance that the eye needs along one view, and how far the mesh extends towards it.
 struct Reach {
   double distance = 0, towards_eye = -1e300;
 };
 
-// A vertex at (x, y, z) of the camera's axes, from the middle, is seen from distance d at
-// fx |x| / (d - z) pixels from the centre.
+// A vertex at (x, y, z) in the camera's axes, relative to the centre, seen from distance d, is fx
+// |x| / (d - z) pixels from the image centre.
 Reach ReachOf(const Mesh& mesh, const Camera& camera, glm::dvec3 middle, const Framing& framing) {
   const double half_x = 0.5 * framing.lens.width * (1 - framing.margin) / camera.fx;
   const double half_y = 0.5 * framing.lens.height * (1 - framing.margin) / camera.fy;

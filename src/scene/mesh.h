@@ -29,13 +29,13 @@ enum class AlphaMode { kOpaque, kMask, kBlend };
 // Colours are sRGB-encoded, like the pixels of images.
 struct Material {
   std::string name;
-  glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies the texture; alpha < 1 is glass
+  glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies texture; alpha < 1: transparent
   int base_color_texture = -1;                      // index into Mesh::textures, -1 for none
   std::array<TextureWrap, 2> wrap = {TextureWrap::kRepeat, TextureWrap::kRepeat};  // along u, v
   bool nearest = false;                       // texels as squares, not filtered
-  AlphaMode alpha_mode = AlphaMode::kOpaque;  // as requested by the file
-  float alpha_cutoff = 0.5f;                  // of kMask: what has less alpha is not there
-  bool double_sided = true;                   // false: viewers do not draw its back faces
+  AlphaMode alpha_mode = AlphaMode::kOpaque;  // as in the file
+  float alpha_cutoff = 0.5f;                  // for kMask: texels with less alpha are discarded
+  bool double_sided = true;                   // false: viewers cull its back faces
   bool unlit = false;                         // shown without lighting
 
   bool operator==(const Material&) const = default;
@@ -57,7 +57,7 @@ struct Mesh {
   // doubled vertices.
   std::vector<glm::vec2> corner_uvs;  // u right, v up; (0, 0): the texture's lower left corner
   std::vector<glm::vec3> corner_normals;
-  std::vector<glm::vec4> corner_colors;  // [0, 1]; instead of `colors`, of which there is none then
+  std::vector<glm::vec4> corner_colors;  // [0, 1]; replaces `colors`, which is then empty
 
   std::vector<std::int32_t> face_materials;  // empty (all 0) or [F], indices into materials
   std::vector<Material> materials;
@@ -71,67 +71,66 @@ Status Validate(const Mesh& mesh);
 struct Bounds {
   glm::vec3 low, high;
 };
-// Over vertices that faces use. The mesh must be valid and have a face.
+// Over vertices used by faces. The mesh must be valid and have a face.
 Bounds MeshBounds(const Mesh& mesh);
 
-// Moves the centre of the bounding box to the origin and scales so that the largest half-extent is
+// Moves the centre of the bounding box to the origin and scales the largest half-extent to
 // `half_extent` (datasets: 0.45). An error for an empty mesh or one without extent.
 Status NormalizeToBox(Mesh& mesh, float half_extent);
 
-// Leaves the faces whose entry of `keep` (one for each face) is not 0, with what their corners
-// have. Vertices, materials and textures stay. Returns false and changes nothing if none is to be
-// kept.
+// Keeps the faces whose entry in `keep` (one per face) is not 0, with their corner arrays.
+// Vertices, materials and textures stay. Returns false and changes nothing if no face would remain.
 bool KeepFaces(const std::vector<char>& keep, Mesh* mesh);
 
-// The colours hold their light already, as those that were learned from images do: materials become
-// unlit, so that no viewer shades them again. A mesh without materials gets a white one, `name`.
+// For colours with baked lighting, such as those learned from images: makes materials unlit, so
+// that no viewer shades them again. A mesh without materials gets a white one, `name`.
 void SetUnlit(Mesh& mesh, const std::string& name);
 
-// Meshes whose up is not +y: programs for building and printing have z up, some have x. The mesh is
-// turned so that this axis is +y, as glTF has it: (x, y, z) becomes (x, z, -y) for z, so that what
-// faces -y, the front in such programs, faces +z, where default cameras stand; (-y, x, z) for x.
+// Meshes whose up axis is not +y: CAD and 3D printing have z up, some programs x. Rotates the mesh
+// so that up is +y, as in glTF: for z, (x, y, z) becomes (x, z, -y), so that the front in such
+// programs, -y, faces +z, where default cameras are; for x, (-y, x, z).
 
 enum class UpAxis { kY, kZ, kX };
 
-// "y", "z", "x", in upper case, too; nothing for other words.
+// "y", "z", "x", in either case; nullopt for other words.
 std::optional<UpAxis> UpAxisNamed(std::string_view name);
 
-// A place or a direction; exact, as all of these.
+// Rotates a point or a direction; exact, as all functions here.
 glm::vec3 Upright(UpAxis up, glm::vec3 v);
 
-// Positions and normals.
+// Rotates positions and normals.
 void TurnUpright(UpAxis up, Mesh* mesh);
 
-// The camera that sees of a mesh turned upright what `camera` sees of the one as its file has it.
+// For a camera relative to the mesh as in its file, the one with the same view of the mesh turned
+// upright.
 Camera UprightCamera(UpAxis up, Camera camera);
 
-// And back: the camera that sees of a mesh as its file has it what `camera` sees of the one turned
-// upright.
+// The inverse of UprightCamera.
 Camera CameraOfFile(UpAxis up, Camera camera);
 
-// Splits a simple polygon, convex or not, planar or nearly so, into n - 2 triangles with the
-// polygon's orientation, by clipping ears. Sets `triangles` to indices into `corners`; fewer than
-// three corners give none. A convex polygon becomes the fan about its corner 0, and so does what
-// has no ear left (a polygon that crosses itself or has no area) and one of more than 256 corners,
-// since the search for ears takes cubic time at worst.
+// Triangulates a simple polygon, convex or not, planar or nearly so, by ear clipping: n - 2
+// triangles with the polygon's orientation. Sets `triangles` to indices into `corners`; fewer than
+// three corners give none. A convex polygon becomes the fan around its corner 0, and so does a
+// remainder without ears (the polygon crosses itself or has no area) and a polygon of more than 256
+// corners, since the search for ears takes cubic time at worst.
 void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& triangles);
 
-// Default cameras that see a whole mesh.
+// Default cameras that frame a whole mesh.
 
-// Degrees; as OrbitCamera's: azimuth 90 stands on +z, elevation 90 above.
+// Degrees, as for OrbitCamera: azimuth 90 is on +z, elevation 90 above.
 struct ViewAngle {
   double azimuth = 60, elevation = 20;
 };
 
 struct Framing {
   Lens lens;
-  double margin = 0.05;  // share of the half image left free on each side, [0, 1)
-  double distance = 0;   // of the eye from the middle, world units; 0: as near as all views allow
+  double margin = 0.05;  // fraction of the half image left free on each side, [0, 1)
+  double distance = 0;   // of the eye from the centre, world units; 0: as near as all views allow
 };
 
-// Cameras that look at the middle of the mesh's bounding box, all from one distance. With the
-// default distance every used vertex is inside of every image. `mesh` is valid and has a face. An
-// error if it has no extent, or for a lens or margin out of range.
+// Cameras that look at the centre of the mesh's bounding box, all from one distance. With the
+// default distance every used vertex is inside every image. `mesh` must be valid and have a face.
+// An error if it has no extent, or for a lens or margin out of range.
 Result<std::vector<Camera>> FrameMesh(const Mesh& mesh, const Framing& framing,
                                       std::span<const ViewAngle> views);
 

@@ -241,7 +241,7 @@ void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 off
   for (glm::vec3& n : mesh.normals) turn(n);
   for (glm::vec3& n : mesh.corner_normals) turn(n);
   if (!mirrored) return;
-  // A mirror turns faces inside out: restore counter-clockwise order, corners' attributes with it.
+  // A mirror turns faces inside out: restore counter-clockwise order, with the corners' attributes.
   for (Face& face : mesh.faces) std::swap(face[1], face[2]);
   const auto turn_corners = [](auto& values) {
     for (std::size_t i = 0; i < values.size(); i += 3) std::swap(values[i + 1], values[i + 2]);
@@ -370,8 +370,8 @@ FaceCone ConeOf(const Mesh& sphere, const Face& face) {
   return {{glm::cross(b, c), glm::cross(c, a), glm::cross(a, b)}};
 }
 
-// Of the face that the ray runs through; on an edge rounding may leave every face outside by a
-// hair.
+// The point on the face that the ray hits; on an edge rounding may put the ray slightly outside of
+// every face.
 SurfacePoint PointAt(const Mesh& sphere, const std::vector<FaceCone>& cones, const glm::dvec3& d) {
   std::size_t best = 0;
   double inside = -std::numeric_limits<double>::infinity();

@@ -14,8 +14,8 @@
 namespace tilegrad {
 namespace {
 
-constexpr std::size_t kTold = 1000;        // candidates between two questions
-constexpr float kMostCollapseTurn = 0.5f;  // cosine: faces turn by less than 60 degrees a collapse
+constexpr std::size_t kTold = 1000;        // candidates between two calls of `told`
+constexpr float kMostCollapseTurn = 0.5f;  // cosine: faces turn by less than 60 degrees each time
 constexpr double kTowardsMiddle =
     1e-3;                        // of a quadric's weight: holds vertices in planes and lines
 constexpr double kShape = 1e-6;  // of an edge's squared length, as error: short ones first
@@ -43,7 +43,7 @@ struct Quadric {
   double At(const glm::dvec3& p) const {
     return std::max(0.0, glm::dot(p, a * p) - 2 * glm::dot(b, p) + c);
   }
-  // The least, held near `middle` where planes do not say.
+  // The minimum, regularised towards `middle` where planes leave it undetermined.
   glm::dvec3 Best(const glm::dvec3& middle) const {
     const double w = kTowardsMiddle * weight;
     return glm::inverse(a + glm::dmat3(w)) * (b + w * middle);
@@ -179,8 +179,8 @@ namespace {
 
 glm::vec3 Normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) { return glm::cross(b - a, c - a); }
 
-// Whether two vectors, which need not be unit, are farther apart than the angle of this cosine.
-// One without length is.
+// Whether two vectors, of any length, are farther apart than the angle of this cosine.
+// True for a zero vector.
 bool Apart(glm::vec3 a, glm::vec3 b, float cosine) {
   return !(glm::dot(a, b) > cosine * glm::length(a) * glm::length(b));
 }
@@ -210,7 +210,7 @@ Result<EditMesh> EditMesh::Make(std::vector<glm::vec3> positions, std::vector<Fa
   for (std::int32_t v = 0; Index(v) < mesh.around_.size(); ++v) {
     const auto& fan = mesh.around_[Index(v)];
     if (fan.empty()) continue;
-    // Round the vertex from face to face: the way must come back after all of them.
+    // Around the vertex from face to face: the walk must return after all of them.
     std::int32_t face = fan[0];
     std::size_t seen = 0;
     do {
@@ -230,7 +230,7 @@ std::int32_t EditMesh::FaceRunning(std::int32_t a, std::int32_t b) const {
   for (const std::int32_t f : around_[Index(a)]) {
     const Face& face = faces_[Index(f)];
     if (face[(CornerOf(face, a) + 1) % 3] != b) continue;
-    if (found >= 0) return -1;  // two: no manifold
+    if (found >= 0) return -1;  // two: not a manifold
     found = f;
   }
   return found;

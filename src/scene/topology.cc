@@ -76,7 +76,7 @@ namespace {
 
 using Index = std::size_t;
 
-// Vertices by their place: the first one that stands there.
+// For each vertex the first one at the same position.
 std::vector<Index> FirstAtPlace(const std::vector<glm::vec3>& positions) {
   std::map<std::tuple<float, float, float>, Index> first;
   std::vector<Index> out;
@@ -87,7 +87,7 @@ std::vector<Index> FirstAtPlace(const std::vector<glm::vec3>& positions) {
   return out;
 }
 
-// Unit; 0 of a face without area.
+// Unit; 0 for a face without area.
 std::vector<glm::dvec3> FaceNormals(const Mesh& mesh) {
   std::vector<glm::dvec3> out;
   for (const Face& face : mesh.faces) {
@@ -99,7 +99,7 @@ std::vector<glm::dvec3> FaceNormals(const Mesh& mesh) {
   return out;
 }
 
-// Corners that are joined, by union-find: the least of each group stands for it.
+// Joined corners, by union-find: the least of each group represents it.
 class CornerGroups {
  public:
   explicit CornerGroups(Index count) : parent_(count) {
@@ -121,7 +121,7 @@ class CornerGroups {
   std::vector<Index> parent_;
 };
 
-// A face's side, by its ends in the order of their places' numbers.
+// A face's side, by its ends, ordered by the indices of their positions.
 struct FaceSide {
   std::array<Index, 2> places, corners;
   bool operator<(const FaceSide& o) const {
@@ -152,7 +152,7 @@ std::vector<FaceSide> SortedSides(const Mesh& mesh) {
   return out;
 }
 
-// Of all pairs of faces at an edge, at both of its ends.
+// Tests all pairs of faces at an edge, and joins at both of its ends.
 CornerGroups JoinSmoothSides(const Mesh& mesh, double degrees) {
   const double least = std::cos(degrees * std::numbers::pi / 180);
   const std::vector<glm::dvec3> normals = FaceNormals(mesh);
@@ -184,7 +184,7 @@ void SplitAtCreases(double degrees, Mesh* mesh) {
   ColorsToCorners(mesh);
   mesh->normals.clear();
   std::vector<glm::vec3> positions;
-  std::vector<std::int32_t> vertex_of(3 * mesh->faces.size());  // of the corner that leads a group
+  std::vector<std::int32_t> vertex_of(3 * mesh->faces.size());  // of each group's first corner
   for (Index c = 0; c < vertex_of.size(); ++c) {
     std::int32_t& vertex = mesh->faces[c / 3][c % 3];
     const Index leader = groups.Of(c);

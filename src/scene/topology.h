@@ -13,7 +13,7 @@ namespace tilegrad {
 
 struct Edge {
   std::int32_t a, b;          // vertices, a < b
-  std::int32_t face0, face1;  // faces on it; face1 = -1 at a boundary
+  std::int32_t face0, face1;  // adjacent faces; face1 = -1 at a boundary
 };
 
 struct Topology {
@@ -27,16 +27,15 @@ struct Topology {
   std::vector<std::int32_t> neighbors;
 };
 
-// Indices must be in [0, vertices). Sides that join a vertex to itself are not edges.
+// Indices must be in [0, vertices). Ignores sides that join a vertex to itself.
 Topology BuildTopology(std::span<const Face> faces, std::size_t vertices);
 
-// Which edges of a mesh look sharp.
+// Marks sharp edges for smooth normals.
 
-// Makes smooth normals (of vertices, from positions) break at edges where faces meet at an angle of
-// `degrees` or more: what stands at one place becomes one vertex for each group of faces that are
-// joined by smoother edges, however many vertices the file had there. Faces keep their order and
-// their corners; colours of vertices become those of corners, normals of vertices go. The mesh is
-// valid.
+// Makes smooth normals (per vertex, from positions) break at edges where faces meet at an angle of
+// `degrees` or more: merges vertices at the same position into one per group of faces joined by
+// smoother edges, however many the file had there. Faces and their corners keep their order; vertex
+// colours become corner colours, vertex normals are dropped. The mesh must be valid.
 void SplitAtCreases(double degrees, Mesh* mesh);
 
 }  // namespace tilegrad

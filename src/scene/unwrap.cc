@@ -18,7 +18,7 @@ namespace tilegrad {
 namespace {
 
 constexpr int kSmoothings = 4;       // of normals before, and of labels after they are chosen
-constexpr double kFirstFill = 0.85;  // of the texture, that is tried first
+constexpr double kFirstFill = 0.85;  // fraction of the texture tried first
 constexpr double kShrink = 0.94;     // of the scale, until charts fit
 constexpr int kMostTries = 60;
 
@@ -29,7 +29,7 @@ struct Plane {
 Plane PlaneOf(int label) {
   glm::dvec3 e[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const int a = label / 2;
-  // Up is y where that is possible, so that textures can be looked at.
+  // Up is y if possible, so that people can read the texture.
   static constexpr int kRight[3] = {2, 0, 0}, kUp[3] = {1, 2, 1};
   Plane plane{e[kRight[a]], e[kUp[a]], label % 2 == 0 ? e[a] : -e[a]};
   if (glm::dot(glm::cross(plane.right, plane.up), plane.axis) < 0) plane.right = -plane.right;
@@ -43,7 +43,7 @@ struct Chart {
   int x = 0, y = 0, width = 0, height = 0;    // texels, with the gutter
 };
 
-// Faces around a face, over its edges: -1 where there is none.
+// Neighbours of a face across its edges: -1 if there is none.
 std::vector<std::array<std::int32_t, 3>> NeighborsOf(const Mesh& mesh) {
   std::vector<std::array<std::int32_t, 3>> out(mesh.faces.size(), {-1, -1, -1});
   const auto add = [&](std::int32_t face, std::int32_t other) {
@@ -81,7 +81,7 @@ class Unwrapping {
     scale_ = std::min(std::sqrt(kFirstFill * options_.width * options_.height / area),
                       2 * std::max(options_.width, options_.height) / longest_);
     for (int i = 0; i < kMostTries; ++i, scale_ *= kShrink) {
-      // How faces lie over each other depends on the scale little, so charts are made but twice.
+      // Overlaps of faces depend little on the scale, so charts are made only twice.
       if (i % 10 == 0) MakeCharts();
       if (!Place()) continue;
       Write(uvs);
@@ -103,7 +103,7 @@ class Unwrapping {
     return 2 * best + (n[best] < 0);
   }
 
-  // By smoothed normals; then what most of the neighbours have.
+  // By smoothed normals; then by the majority of the neighbours.
   void ChooseLabels() {
     std::vector<glm::dvec3> smooth(normals_);
     for (std::size_t f = 0; f < smooth.size(); ++f) smooth[f] *= areas_[f];
@@ -147,7 +147,7 @@ class Unwrapping {
     return out;
   }
 
-  // Breadth first over faces of the seed's label that lie over no other of the chart.
+  // Breadth first over faces of the seed's label that overlap no other of the chart.
   void Grow(std::int32_t seed) {
     Chart chart;
     chart.label = labels_[static_cast<std::size_t>(seed)];
@@ -179,7 +179,8 @@ class Unwrapping {
     charts_.push_back(std::move(chart));
   }
 
-  // Takes the texels whose centres are inside of the face; false, and none, if one is taken.
+  // Claims the texels whose centres are inside of the face; false, and claims none, if one is
+  // taken.
   bool Claim(const std::array<glm::dvec2, 3>& corners, std::int32_t face,
              std::unordered_map<std::uint64_t, std::int32_t>* texels) {
     claimed_.clear();
@@ -205,7 +206,7 @@ class Unwrapping {
     return true;
   }
 
-  // Shelves from the highest chart to the lowest; each chart on the first that has room.
+  // Fills shelves from the highest chart to the lowest; each chart goes on the first with room.
   bool Place() {
     struct Shelf {
       int y, height, x = 0;
@@ -266,7 +267,7 @@ class Unwrapping {
   std::vector<Chart> charts_;
   std::vector<std::int32_t> chart_of_;
   std::vector<std::uint64_t> claimed_;
-  double longest_ = 0;  // edge: slivers have no area, and Claim looks at all texels around a face
+  double longest_ = 0;  // edge: slivers have no area, and Claim visits all texels around a face
   double scale_ = 1;
 };
 

@@ -9,7 +9,8 @@
 
 namespace tilegrad {
 
-// Shepperd's: of w, x, y, z the largest is taken from the diagonal, the others follow without loss.
+// Shepperd's method: takes the largest of w, x, y, z from the diagonal; the others follow without
+// loss.
 std::array<double, 4> QuaternionOf(const Mat3Array& r) {
   const double diagonal[4] = {1 + r[0] + r[4] + r[8], 1 + r[0] - r[4] - r[8],
                               1 - r[0] + r[4] - r[8], 1 - r[0] - r[4] + r[8]};

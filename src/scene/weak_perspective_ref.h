@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cameras of weak_perspective.h do, as templates over the number type: float, double,
+// The cameras of weak_perspective.h as templates over the number type: float, double,
 // std::complex<double>.
 #pragma once
 
@@ -19,8 +19,8 @@ std::array<T, 4> UnitQuaternion(const std::array<T, 4>& q) {
   return {q[0] * inverse, q[1] * inverse, q[2] * inverse, q[3] * inverse};
 }
 
-// Adjoint of RotationOf: d_rotation -> what to add to d_quaternion. First by the unit quaternion,
-// whose rotation has the entries 2 (..), then by its normalisation.
+// Adjoint of RotationOf: adds to *d_q. First the gradient by the unit quaternion, whose rotation
+// has the entries 2 (..), then through its normalisation.
 template <class T>
 void AddRotationAdjoint(const std::array<T, 4>& q, const std::array<T, 9>& d,
                         std::array<T, 4>* d_q) {
@@ -37,14 +37,14 @@ void AddRotationAdjoint(const std::array<T, 4>& q, const std::array<T, 9>& d,
   for (std::size_t i = 0; i < 4; ++i) (*d_q)[i] += inverse * (d_unit[i] - along * unit[i]);
 }
 
-// Rows 0 and 1 of a product with the rotation, on the way back: d_rotation[r] += d[r] point.
+// r p, with r row-major.
 template <class T>
 std::array<T, 3> Rotate(const std::array<T, 9>& r, const std::array<T, 3>& p) {
   return {r[0] * p[0] + r[1] * p[1] + r[2] * p[2], r[3] * p[0] + r[4] * p[1] + r[5] * p[2],
           r[6] * p[0] + r[7] * p[1] + r[8] * p[2]};
 }
 
-// Of the pinhole's axes (y up, z towards the camera) in ours.
+// Signs of the pinhole's axes (y up, z towards the camera) in ours.
 inline constexpr int kAxisSigns[3] = {1, -1, -1};
 
 }  // namespace weak_ref
@@ -59,7 +59,7 @@ std::array<T, 9> RotationOf(const std::array<T, 4>& quaternion) {
           two * (x * z - w * y),       two * (y * z + w * x),       one - two * (x * x + y * y)};
 }
 
-// x, y and depth of a point.
+// x, y and depth of a point, in image and world units.
 template <class T>
 std::array<T, 3> ProjectWeakly(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point) {
   const std::array<T, 3> p = weak_ref::Rotate(RotationOf(camera.quaternion), point);
@@ -67,7 +67,7 @@ std::array<T, 3> ProjectWeakly(const WeakPerspectiveT<T>& camera, const std::arr
           p[2]};
 }
 
-// Its adjoint: adds to *d_camera and *d_point what d_image [2] (x and y) is by them.
+// Its adjoint for d_image [2] (x and y): adds to *d_camera and *d_point.
 template <class T>
 void ProjectWeaklyAdjoint(const WeakPerspectiveT<T>& camera, const std::array<T, 3>& point,
                           const std::array<T, 2>& d_image, WeakPerspectiveT<T>* d_camera,
@@ -86,9 +86,9 @@ void ProjectWeaklyAdjoint(const WeakPerspectiveT<T>& camera, const std::array<T,
   weak_ref::AddRotationAdjoint(camera.quaternion, d_rotation, &d_camera->quaternion);
 }
 
-// The pinhole camera at `distance` (world units, > 0) that sees the plane through the origin in the
-// same way; image units are pixels. A point at depth z of an object is seen at 1 / (1 + z /
-// distance) of its offset from `translation`.
+// The pinhole camera at `distance` (world units, > 0) with the same image of the plane through the
+// origin; image units are pixels. A point at depth z scales its offset from `translation` by 1 / (1
+// + z / distance).
 template <class T>
 CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance) {
   const std::array<T, 9> r = RotationOf(camera.quaternion);
@@ -101,7 +101,7 @@ CameraT<T> PinholeOf(const WeakPerspectiveT<T>& camera, T distance) {
   return out;
 }
 
-// Its adjoint: d_pinhole entry by entry, as the renderer gives it. Overwrites *d_camera.
+// Its adjoint: d_pinhole per entry, as the renderer gives it. Overwrites *d_camera.
 template <class T>
 void PinholeOfAdjoint(const WeakPerspectiveT<T>& camera, T distance, const CameraT<T>& d_pinhole,
                       WeakPerspectiveT<T>* d_camera) {

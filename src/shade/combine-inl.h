@@ -73,7 +73,7 @@ struct FactorSums {
   }
 };
 
-// Channel 0 sets the gradient that all channels share, the others add to it.
+// Channel 0 sets the gradient shared by all channels, the others add to it.
 HWY_INLINE void PullAll(RunVec v, std::size_t c, RunPlane* to, std::size_t i) {
   StoreRun(c == 0 ? v : hn::Add(LoadRun(*to, i), v), to, i);
 }

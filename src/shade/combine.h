@@ -3,7 +3,7 @@
 //
 //   I_c = base * texture * vertex colour                 (an absent factor is 1)
 //   I_l = ambient + diffuse * light                      (1 without light)
-//   I_s = specular * highlight                           (0 where there is none)
+//   I_s = specular * highlight                           (0 without highlight)
 #pragma once
 
 #include <array>
@@ -21,14 +21,14 @@ using ColorFactors = ColorFactorsT<float>;
 
 struct CombineInput {
   ColorFactors factors;
-  const RunPlane* texture = nullptr;       // [3]; null: not there
+  const RunPlane* texture = nullptr;       // [3]; null: absent
   const RunPlane* vertex_color = nullptr;  // [3]
   const RunPlane* light = nullptr;
   const RunPlane* highlight = nullptr;
   bool clamp = false;  // to [0, 1]
 };
 
-// Null: not wanted. Planes are overwritten, sums are added to.
+// Null: not requested. Overwrites planes, adds to sums.
 struct CombineAdjoint {
   RunPlane* d_texture = nullptr;       // [3]
   RunPlane* d_vertex_color = nullptr;  // [3]
@@ -39,7 +39,7 @@ struct CombineAdjoint {
 
 void Combine(std::size_t count, const CombineInput& input, RunPlane* color);
 
-// A colour outside its clamp has no gradient.
+// A clamped colour has no gradient.
 void CombineAdjointOf(std::size_t count, const CombineInput& input, const RunPlane* d_color,
                       const CombineAdjoint& out);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of combine.h. T: float, double, std::complex<double>.
+// Scalar reference of combine.h. T: float, double, std::complex<double>.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ bool InUnitRange(const T& x) {
   return RealPart(x) >= 0 && RealPart(x) <= 1;
 }
 
-// Where nothing is lit, p.highlight is 0.
+// p.highlight must be 0 if nothing is lit.
 template <class T>
 Vec3<T> CombineRef(const ColorFactorsT<T>& f, const ColorParts<T>& p, bool lit, bool clamp) {
   Vec3<T> out;

@@ -11,7 +11,7 @@
 
 namespace tilegrad::shade {
 
-// A gradient of a light, to be added to.
+// The zero gradient of a light, to add to.
 template <class T>
 constexpr LightT<T> kNoLight = {{T(0), T(0), T(0)}, T(0)};
 
@@ -21,20 +21,20 @@ struct LambertLightT {
   std::span<const LightT<T>> lights;  // unit directions
 };
 
-// The lights of a run of pixels: the same for all, or one direction for each pixel, of intensity 1.
+// The lights of a run of pixels: shared by all, or one direction per pixel, of intensity 1.
 struct RunLights {
   std::span<const Light> uniform;       // unit directions
   const RunPlane* per_pixel = nullptr;  // [3] unit; then `uniform` is empty
 };
 
-// Where gradients of lights and normals go. Null or empty: not wanted.
+// Destinations of gradients of lights and normals. Null or empty: not requested.
 struct RunLightAdjoint {
   RunPlane* d_normal = nullptr;       // [3] adds
   std::span<LightT<double>> uniform;  // adds; as RunLights::uniform, or empty
   RunPlane* per_pixel = nullptr;      // [3] adds
 };
 
-// *light <- the sum above, for the unit normals [3] of a run. A normal of 0 gets no light.
+// *light <- the sum above, for the unit normals [3] of a run. A zero normal gets no light.
 void Lambert(std::size_t count, const RunPlane* normal, const RunLights& lights, RunPlane* light);
 
 // d_light: cotangent of the sum. A light behind the surface gets no gradient; one exactly at the

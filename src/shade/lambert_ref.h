@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of lambert.h. T: float, double, std::complex<double>.
+// Scalar reference of lambert.h. T: float, double, std::complex<double>.
 #pragma once
 
 #include <cstddef>

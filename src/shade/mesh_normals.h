@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Normals derived from positions, with their gradient.
 //
-//   face:    n_f = (b - a) x (c - a), of the length of twice the area
+//   face:    n_f = (b - a) x (c - a), with length twice the area
 //   flat:    n_f / |n_f|, for each face
-//   smooth:  sum of n_f over the faces of a vertex, over its length: weighted by area
+//   smooth:  sum of n_f over the faces of a vertex, normalised: area-weighted
 //
-// A face without area and a vertex without faces have no normal: it is 0 and has no gradient. The
-// same holds where the faces' normals cancel up to rounding, as on a sheet that has each face
-// twice, once per side.
+// The normal of a face without area or a vertex without faces is 0 and has no gradient. The same
+// holds where the faces' normals cancel up to rounding, as on a sheet that has each face twice,
+// once per side.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of mesh_normals.h. T: float, double, std::complex<double>. Sums over faces are a
-// scatter, so the float version is this code too.
+// Scalar reference of mesh_normals.h. T: float, double, std::complex<double>. Sums over faces are a
+// scatter, so the float version uses this code too.
 #pragma once
 
 #include <cstddef>
@@ -41,7 +41,7 @@ void FaceNormalAdjointRef(const TriangleMeshT<T>& mesh, std::size_t face, const 
   }
 }
 
-// How large the products are whose differences are a face's normal: the sum of its roundings is a
+// The magnitude of the products whose differences form a face's normal: the normal's rounding is a
 // few units in the last place of this, however thin the face is.
 template <class T>
 T NormalScaleRef(const TriangleMeshT<T>& mesh, std::size_t face) {
@@ -50,8 +50,9 @@ T NormalScaleRef(const TriangleMeshT<T>& mesh, std::size_t face) {
            LargestRef(Minus(PositionRef(mesh, face, 2), a)));
 }
 
-// Of a sum of normals whose scales add up to `scale`. What cancels leaves 7 half units of rounding
-// from each face, and one for each addition; normals that do not cancel are as large as the scale.
+// The direction of a sum of normals whose scales add up to `scale`. Cancellation leaves 7 half
+// units of rounding per face, and one per addition; normals that do not cancel are as large as the
+// scale.
 template <class T>
 UnitVector<T> DirectionOfSumRef(const Vec3<T>& sum, const T& scale) {
   using Real = decltype(RealPart(T()));
@@ -69,7 +70,7 @@ void SmoothNormalsRef(const TriangleMeshT<T>& mesh, std::span<UnitVector<T>> uni
     for (std::size_t k = 0; k < 3; ++k) {
       auto& sum = units[static_cast<std::size_t>(mesh.faces[3 * f + k])];
       AddScaled(T(1), n, sum.unit);
-      sum.inverse_length += scale;  // borrowed until the sum is there
+      sum.inverse_length += scale;  // used as temporary until the sum is complete
     }
   }
   for (auto& u : units) u = DirectionOfSumRef(u.unit, u.inverse_length);
@@ -83,7 +84,7 @@ void FlatNormalsRef(const TriangleMeshT<T>& mesh, std::span<UnitVector<T>> units
   }
 }
 
-// d_units of normals, to those of what was normalised.
+// Turns d_units into gradients of the vectors before normalisation.
 template <class T>
 void UnitsAdjointRef(std::span<const UnitVector<T>> units, std::span<Vec3<T>> d_units) {
   for (std::size_t i = 0; i < units.size(); ++i) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Directions of pixels: x / |x|, and its adjoint.
+// Normalises a vector per pixel: x / |x|, and its adjoint.
 //
-// A vector whose squared length is at or below `least` has no direction: it becomes 0 without a
-// gradient, so that a normal cancelled by interpolation yields no NaN.
+// A vector whose squared length is at most `least` becomes 0 without gradient, so that a normal
+// cancelled by interpolation gives no NaN.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 
 namespace tilegrad::shade {
 
-// Of interpolated unit vectors; rounding alone leaves about 1e-14.
+// For interpolated unit vectors; rounding alone leaves about 1e-14.
 inline constexpr float kLeastUnitSquare = 1e-12f;
-// Of vectors in units of the world.
+// For vectors in world units.
 inline constexpr float kLeastWorldSquare = 1e-30f;
-// Of the largest component, where vectors may have any scale: normals of tiny faces, lights.
+// For the largest component of vectors of any scale: normals of tiny faces, lights.
 inline constexpr float kLeastComponent = 1e-30f;
 
 // unit[3], *inverse_length <- x[3]. `unit` may be `x`.

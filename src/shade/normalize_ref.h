@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of normalize.h. T: float, double, std::complex<double>.
+// Scalar reference of normalize.h. T: float, double, std::complex<double>.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,8 @@ auto LargestRef(const Vec3<T>& x) {
   return std::max({std::abs(RealPart(x[0])), std::abs(RealPart(x[1])), std::abs(RealPart(x[2]))});
 }
 
-// The same for vectors of any scale: only a vector whose components are all at or below
-// kLeastComponent has no direction.
+// The same for vectors of any scale: only a vector whose components are all at most kLeastComponent
+// has no direction.
 template <class T>
 UnitVector<T> NormalizeScaledRef(const Vec3<T>& x) {
   const auto scale = LargestRef(x);

@@ -5,8 +5,8 @@
 //   c = clamp(N . L, 0, 1)      R = -L + 2 c N      r = clamp(R . V, 1e-5, 1)
 //
 // with V the unit direction to the eye. As in the paper's implementations, R is -L where the
-// surface faces away from the light, which keeps the highlight continuous there; and r has a floor,
-// which keeps the derivative of the power finite.
+// surface faces away from the light, which keeps the highlight continuous there, and the floor on r
+// keeps the derivative of the power finite.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ struct PhongAdjoint {
 
 void Phong(std::size_t count, const PhongInput& input, RunPlane* highlight);
 
-// Outside its clamps a value has no gradient; at their ends it does.
+// A clamped value has no gradient, except exactly at the ends of its range.
 void PhongAdjointOf(std::size_t count, const PhongInput& input, const RunPlane& d_highlight,
                     const PhongAdjoint& out);
 

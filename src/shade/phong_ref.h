@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of phong.h, for one light. T: float, double, std::complex<double>.
+// Scalar reference of phong.h, for one light. T: float, double, std::complex<double>.
 #pragma once
 
 #include <cmath>

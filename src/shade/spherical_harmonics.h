@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light as spherical harmonics up to degree 2 (equation 11): I_l = sum_i w_i Y_i(N), nine
+// Spherical-harmonics lighting up to degree 2 (equation 11): I_l = sum_i w_i Y_i(N), nine
 // coefficients. The Y_i are the orthonormal real basis with the Condon-Shortley sign: 1, -y, z, -x,
 // xy, -yz, 3z^2-1, -xz, x^2-y^2 times constants. (R. Ramamoorthi, P. Hanrahan: An efficient
 // representation for irradiance environment maps, 2001.)
@@ -22,7 +22,7 @@ using ShPolynomial = ShPolynomialT<float>;
 void ShLight(std::size_t count, const RunPlane* normal, const ShPolynomial& polynomial,
              RunPlane* light);
 
-// Adds to d_normal[3] and d_polynomial; null: not wanted.
+// Adds to d_normal[3] and d_polynomial; null: not requested.
 void ShLightAdjoint(std::size_t count, const RunPlane* normal, const ShPolynomial& polynomial,
                     const RunPlane& d_light, RunPlane* d_normal,
                     ShPolynomialT<double>* d_polynomial);

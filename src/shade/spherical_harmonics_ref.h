@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of spherical_harmonics.h, and the basis. T: float, double, std::complex<double>.
+// Scalar reference of spherical_harmonics.h, and the basis. T: float, double, std::complex<double>.
 #pragma once
 
 #include <cstddef>

@@ -9,7 +9,7 @@
 namespace tilegrad::shade {
 namespace {
 
-// Halves the size by averaging 2 x 2 texels; an odd last row or column is dropped.
+// Halves the size by averaging 2 x 2 texels; drops an odd last row or column.
 ImageU8 Halve(const ImageU8& image) {
   const int w = std::max(1, image.width / 2), h = std::max(1, image.height / 2);
   ImageU8 out(w, h, image.channels);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The colour of a mesh's surface: material, texture and vertex colours in one place.
+// The surface colour of a mesh: combines material, texture and vertex colours.
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@ namespace tilegrad::shade {
 
 inline constexpr int kMaxTextureSide = 512;  // texels; larger textures are halved until they fit
 
-// How the material's texture extends outside [0, 1].
+// The wrap mode of the material's texture.
 Wrap WrapOf(const Material& material);
 
 // Keeps a reference to the mesh.
@@ -19,7 +19,7 @@ class SurfaceColor {
  public:
   explicit SurfaceColor(const Mesh& mesh);
 
-  // Unlit RGB in [0, 1] of a point of a face: factor x texture (bilinear) x `vertex_color`.
+  // Unlit RGB in [0, 1] at a point of a face: factor x texture (bilinear) x `vertex_color`.
   glm::vec3 At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_color) const;
   // At corner k of a face.
   glm::vec3 AtCorner(std::size_t face, int k) const;

@@ -26,7 +26,7 @@ using TexelTag = hn::FixedTag<float, 4>;
 using Texel = hn::Vec<TexelTag>;
 
 // One axis of the filter for the pixels of a run: texels `low` and `high`, the weight of `high`,
-// and its derivative. texture_ref.h says the same in scalars.
+// and its derivative. texture_ref.h has the scalar version.
 struct alignas(128) AxisRun {
   std::int32_t low[kRunPixels], high[kRunPixels];
   float weight[kRunPixels], slope[kRunPixels];
@@ -68,7 +68,7 @@ HWY_INLINE RunInt WrapLaneIndex(RunInt i, RunInt most, Wrap wrap) {
   return hn::IfThenElse(hn::Lt(i, zero), most, hn::IfThenElse(hn::Gt(i, most), zero, i));
 }
 
-// `u`: wrapped by `way`; `n`: texels of the axis, at the level of each pixel.
+// `u`: wrapped with mode `way`; `n`: texels of the axis, at the level of each pixel.
 HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const TextureInput& input,
                         std::size_t i, AxisRun* out) {
   const RunTag d;
@@ -95,13 +95,13 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const Texture
   hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
 }
 
-// The footprint of a run at one level, which differs from pixel to pixel.
+// The footprint of a run at one level per pixel.
 struct FootprintRun {
   AxisRun column, row;
 };
 
-// Texels of a side of the finest level that has `n`, at the levels of a vector of pixels: halved
-// and rounded down, at least 1.
+// Texels along an axis that has `n` at the finest level, at the levels of a vector of pixels:
+// halved and rounded down, at least 1.
 HWY_INLINE RunInt SizeAt(int n, RunInt level) {
   const RunIntTag di;
   return hn::Max(hn::Shr(hn::Set(di, n), level), hn::Set(di, 1));
@@ -214,7 +214,7 @@ void SampleRun(std::size_t count, const TextureInput& input, RunPlane* color) {
   StorePlanes(quads, count, color);
 }
 
-// Gradients of the footprints' weights of a run, [pixel][4] each.
+// Gradients by the weights of a run's footprints, [pixel][4] each.
 struct alignas(128) WeightPull {
   float a[4 * kRunPixels], b[4 * kRunPixels];
 };

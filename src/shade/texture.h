@@ -3,11 +3,10 @@
 //
 // Texel (column j, row i) of a W x H texture has its centre at u = (j + 0.5) / W, v = 1 - (i + 0.5)
 // / H: row 0 is the top, v goes up (docs/conventions.md). The bilinear filter interpolates the four
-// nearest centres; its derivative is the one of the cell that holds the point, and at the border of
-// two cells that of the right (lower) one. The nearest texel is the one whose square holds the
-// point; it has no gradient to the coordinates. The trilinear filter interpolates between two
-// levels of a pyramid (texture_levels.h); the level is held constant in derivatives, as the choice
-// of texels is.
+// nearest centres; its derivative is that of the cell containing the point, at the border of two
+// cells that of the right (lower) one. The nearest texel is the one whose square contains the
+// point; it has no gradient by the coordinates. The trilinear filter interpolates between two mip
+// levels (texture_levels.h); derivatives hold the level constant, like the choice of texels.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +18,7 @@
 
 namespace tilegrad::shade {
 
-// What kernels see of a texture: [height][width][channels], width and height >= 1.
+// A texture for kernels: [height][width][channels], width and height >= 1.
 template <class T>
 struct TextureViewT {
   std::span<const T> texels;
@@ -34,13 +33,13 @@ TextureViewT<T> ViewOf(const TextureT<T>& t) {
   return {t.texels, t.width, t.height, 3, t.wrap, t.filter};
 }
 
-// The ways of a Wrap along u and v: kRepeat, kClamp or kMirror.
+// The wrap modes along u and v: kRepeat, kClamp or kMirror.
 constexpr Wrap WrapAlongU(Wrap wrap) { return static_cast<Wrap>(static_cast<int>(wrap) % 3); }
 constexpr Wrap WrapAlongV(Wrap wrap) {
   const int way = static_cast<int>(wrap);
   return static_cast<Wrap>((way + way / 3) % 3);
 }
-// The Wrap of two such ways.
+// The Wrap that combines two such modes.
 constexpr Wrap WrapOf(Wrap along_u, Wrap along_v) {
   const int u = static_cast<int>(along_u), v = static_cast<int>(along_v);
   return static_cast<Wrap>(u + 3 * ((v - u + 3) % 3));
@@ -48,18 +47,18 @@ constexpr Wrap WrapOf(Wrap along_u, Wrap along_v) {
 
 inline constexpr int kMaxTextureSize = 16384;  // texels, each axis
 
-// Of a pyramid, ready for lookups: texels [height][width][4], the fourth unused.
+// A mip level, prepared for lookups: texels [height][width][4], the fourth unused.
 struct TextureLevel {
   const float* texels;
   int width, height;
 };
 
 struct TextureInput {
-  std::span<const TextureLevel> levels;  // at least one; the finest first
+  std::span<const TextureLevel> levels;  // at least one; finest first
   Wrap wrap;
   Filter filter;
   const RunPlane* uv;     // [2]
-  const RunPlane* level;  // if trilinear: log2 of texels for a pixel, 0 is the finest; any number
+  const RunPlane* level;  // if trilinear: log2 of texels per pixel, 0 is the finest; any number
 };
 
 // A pixel's gradient to up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color
@@ -77,8 +76,7 @@ inline std::size_t SharesPerLookup(Filter filter) { return filter == Filter::kTr
 // color[3] <- the texture at the coordinates of a run.
 void SampleTexture(std::size_t count, const TextureInput& input, RunPlane* color);
 
-// Overwrites d_uv[2] and shares [count * SharesPerLookup], in the order of pixels; null: not
-// wanted.
+// Overwrites d_uv[2] and shares [count * SharesPerLookup], in pixel order; null: not requested.
 void SampleTextureAdjoint(std::size_t count, const TextureInput& input, const RunPlane* d_color,
                           RunPlane* d_uv, TexelShare* shares);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pyramid of a texture. Each level halves the one before (rounded down, at least 1) and is its
-// mean over areas: of an odd side, a texel covers a little more than two.
+// The mip pyramid of a texture. Each level halves the previous one (rounded down, at least 1) by
+// area averaging: along an odd side, a texel covers slightly more than two.
 //
 // A level along one axis: texel j of n' covers [j n / n', (j + 1) n / n') of n.
 #pragma once
@@ -15,7 +15,7 @@
 
 namespace tilegrad::shade {
 
-// Where the levels of a pyramid lie in one array, finest first.
+// Position of a mip level in one array of all levels, finest first.
 struct LevelSize {
   int width, height;
   std::size_t first;  // texel
@@ -28,7 +28,7 @@ inline LevelSize NextLevel(const LevelSize& l) {
   return {std::max(1, l.width / 2), std::max(1, l.height / 2), l.first + l.texels()};
 }
 
-// Levels that a filter needs: one, or all down to one texel.
+// Number of levels that a filter needs: one, or all down to one texel.
 inline int LevelCount(int width, int height, Filter filter) {
   int count = 1;
   if (filter != Filter::kTrilinear) return count;
@@ -50,7 +50,7 @@ struct Coverage {
 template <class Real>
 Coverage<Real> CoverageOf(int j, int coarse, int fine) {
   if (fine % coarse == 0) {
-    const int ratio = fine / coarse;  // 1, 2, or 3 texels that become one
+    const int ratio = fine / coarse;  // merges 1, 2, or 3 texels
     const Real weight = Real(1) / static_cast<Real>(ratio);
     return {j * ratio, ratio, {weight, weight, weight}};
   }
@@ -59,8 +59,8 @@ Coverage<Real> CoverageOf(int j, int coarse, int fine) {
   return {2 * j, 3, {(1 - x / m) / all, 1 / all, (x + 1) / m / all}};
 }
 
-// Texels of all levels in one array, [texel][kChannels]; level 0 is given. One loop for forward and
-// adjoint: calls visit(coarse texel, fine texel, weight).
+// Texels of all levels in one array, [texel][kChannels]; level 0 is given. The same loop serves
+// forward and adjoint: calls visit(coarse texel, fine texel, weight).
 template <class Real, class Visit>
 void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit& visit) {
   for (int y = 0; y < coarse.height; ++y) {
@@ -80,7 +80,7 @@ void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit&
   }
 }
 
-// A texture made ready for SampleTexture. Scratch that is reused.
+// A texture prepared for SampleTexture. Reuses its memory.
 class TexturePyramid {
  public:
   // Copies the texels and builds the levels that the filter needs.
@@ -101,13 +101,13 @@ struct RowShare {
   int index, count;
 };
 
-// The gradient that a texture gets. Scratch that is reused.
+// The gradient of a texture. Reuses its memory.
 class TextureGradient {
  public:
   void Clear(const TexturePyramid& pyramid);
-  // Adds shares to the texels of some rows: different parts may run side by side.
+  // Adds shares to the texels of some rows: different parts may run in parallel.
   void Scatter(std::span<const TexelShare> shares, const RowShare& rows);
-  // out [height][width][3] <- the gradient of all levels, brought to the finest.
+  // out [height][width][3] <- the gradient of all levels, propagated to the finest.
   void Finish(std::span<float> out);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of texture_levels.h: pyramids and lookups between two levels. T: float, double,
+// Scalar reference of texture_levels.h: pyramids and lookups between two levels. T: float, double,
 // std::complex<double>.
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace tilegrad::shade {
 
-// The levels of a texture, [texel][channels] one after the other.
+// The levels of a texture, [texel][channels], concatenated.
 template <class T>
 struct PyramidRef {
   using Real = decltype(RealPart(T()));
@@ -42,7 +42,7 @@ struct PyramidRef {
     }
   }
 
-  // A level as a texture over `all`, which is `texels` or an array of their gradients.
+  // A level as a texture view into `all`, which is `texels` or an array of their gradients.
   TextureViewT<T> Level(std::size_t l) const {
     TextureViewT<T> out = texture;
     out.width = sizes[l].width;
@@ -57,7 +57,7 @@ struct PyramidRef {
     return sizes[l].texels() * static_cast<std::size_t>(texture.channels);
   }
 
-  // Brings the gradient of all levels to the finest.
+  // Propagates the gradient of all levels to the finest.
   void Fold(std::span<T> d_texels) const {
     const auto channels = static_cast<std::size_t>(texture.channels);
     for (std::size_t l = sizes.size(); l-- > 1;) {
@@ -86,7 +86,7 @@ LevelMix<Real> MixLevels(Real level, std::size_t levels) {
   return {fine, std::min(fine + 1, levels - 1), kept - static_cast<Real>(fine)};
 }
 
-// `level` as TextureInput::level; not read unless the filter is trilinear.
+// `level` as in TextureInput::level; ignored unless the filter is trilinear.
 template <class T>
 std::array<T, 3> SampleRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
                            typename PyramidRef<T>::Real level) {
@@ -99,7 +99,7 @@ std::array<T, 3> SampleRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
   return fine;
 }
 
-// Adds to d_uv[2] and to d_texels of all levels; Fold brings those to the finest.
+// Adds to d_uv[2] and to d_texels of all levels; Fold propagates those to the finest.
 template <class T>
 void SampleAdjointRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
                       typename PyramidRef<T>::Real level, const std::array<T, 3>& d_color,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of texture.h. T: float, double, std::complex<double> (coordinates and texels carry a
-// complex step; the choice of texels follows the real part).
+// Scalar reference of texture.h. T: float, double, std::complex<double> (coordinates and texels
+// carry a complex step; the choice of texels follows the real part).
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,7 @@ struct Axis {
   float slope;
 };
 
-// A coordinate wrapped to the texture, and the derivative of that: [0, 1], or [-1, 2] if
-// clamped.
+// A coordinate wrapped to the texture, and its derivative: [0, 1], or [-1, 2] if clamped.
 template <class T>
 struct Wrapped {
   T at;
@@ -50,7 +49,7 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
   return i < 0 ? n - 1 : i < n ? i : 0;  // wrapped coordinates are at most one texel outside
 }
 
-// Along u, which is wrapped by `way`; for v, call it with 1 - v.
+// Along u, wrapped with mode `way`; for v, call it with 1 - v.
 template <class T>
 Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap way, const TextureViewT<T>& texture) {
   const bool nearest = texture.filter == Filter::kNearest;
@@ -102,7 +101,8 @@ void SampleLevelRef(const TextureViewT<T>& texture, const T& u, const T& v, std:
   }
 }
 
-// Adds to d_uv[2] and d_texels (as texture.texels; may be empty) what d_color[channels] pulls back.
+// Adds the gradients due to d_color[channels] to d_uv[2] and d_texels (shaped as texture.texels;
+// may be empty).
 template <class T>
 void SampleLevelAdjointRef(const TextureViewT<T>& texture, const T& u, const T& v,
                            std::span<const T> d_color, std::span<T> d_uv, std::span<T> d_texels) {

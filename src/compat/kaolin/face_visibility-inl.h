@@ -23,13 +23,13 @@ namespace tilegrad::compat::kaolin {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Pixels [column, column_end) x [row, row_end) of the image: the centres in a face's box.
+// Pixels [column, column_end) x [row, row_end) of the image, whose centres are in a face's box.
 struct FacePixels {
   std::size_t column, column_end, row, row_end;
   bool empty() const { return column >= column_end || row >= row_end; }
 };
 
-// The first of n indices for which `holds`, which stays true once it is. `guess` is near it.
+// The first of n indices for which the monotonic `holds` is true. `guess` is near it.
 template <class Holds>
 HWY_INLINE std::size_t FirstWhere(const Holds& holds, std::size_t n, double guess) {
   auto i = static_cast<std::size_t>(std::clamp(guess, 0.0, static_cast<double>(n)));
@@ -129,7 +129,7 @@ HWY_INLINE FaceInLanes<D> SpreadFace(D d, const ProjectedFacesT<T>& faces, std::
   return out;
 }
 
-// `scratch` holds rows [row_begin, row_end), with -infinity and raster::kNoFace to begin with.
+// `scratch` holds rows [row_begin, row_end), initialised with -infinity and raster::kNoFace.
 template <class T>
 HWY_INLINE void DrawProjectedFaces(const ProjectedFacesT<T>& faces, const PixelCentresT<T>& pixels,
                                    T eps, std::size_t row_begin, std::size_t row_end,

@@ -16,7 +16,7 @@ namespace {
 HWY_EXPORT(DrawProjectedFloat);
 HWY_EXPORT(DrawProjectedDouble);
 
-// Draws rows by `draw` and copies what is seen.
+// Draws rows with `draw` and copies the visible faces.
 template <class T, class Draw>
 void DrawRows(const PixelCentresT<T>& pixels, std::size_t rows, FaceVisibilityScratchT<T>* scratch,
               const Draw& draw, std::int32_t* face_ids) {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which of an image's projected faces is seen in each pixel (projected_batch.h has the rule).
+// The visible one of an image's projected faces at each pixel (projected_batch.h has the rule).
 // Discrete: no gradient.
 //
-// A face covers the pixel centres p with low <= p < high along both axes of its box where no W_k
-// has another sign than S, and S is finite and not 0. Of the faces that cover a pixel, the one with
-// the largest z is seen; of several, the first. z = sum w_k z_k, kept between the z_k and summed
-// over the corners in an order of its own (OrderedFace), has the same bits
+// A face covers the pixel centres p with low <= p < high along both axes of its box where every
+// nonzero W_k has the sign of S, and S is finite and not 0. Of the faces that cover a pixel, the
+// one with the largest z is visible; at equal z, the first. z = sum w_k z_k, clamped to the range
+// of the z_k and summed over the corners in a canonical order (OrderedFace), has the same bits
 //
-//   * for the same three corners, wherever a face starts and however it is wound;
+//   * for the same three corners, whatever their order and winding;
 //   * for all faces whose corners have one z: it is that z.
 //
-// Other faces of one plane are equal only up to rounding, which then decides.
+// Other coplanar faces are equal only up to rounding, which then decides.
 #pragma once
 
 #include <algorithm>
@@ -32,12 +32,12 @@ struct PixelCentresT {
   static constexpr std::size_t kPadding = 16;  // columns for whole vectors
   std::size_t width = 0, height = 0;
   AlignedVector<T> x;  // [W + kPadding]
-  AlignedVector<T> y;  // [H], falling
+  AlignedVector<T> y;  // [H], descending
 
   PixelCentresT(int w, int h);
 };
 
-// The corners of a face by x, then y, then z, and the range of z.
+// The corners of a face sorted by x, then y, then z, and the range of z.
 template <class T>
 struct OrderedFace {
   T xy[6], z[3], low, high;
@@ -66,7 +66,7 @@ struct FaceVisibilityScratchT {
   AlignedVector<Id> face;
 };
 
-// Rows [row_begin, row_end) of the image: face_ids [rows][W] <- index of the face that is seen, or
+// Rows [row_begin, row_end) of the image: face_ids [rows][W] <- index of the visible face, or
 // raster::kNoFace. `eps` >= 0, NDC^2. The same bits as FaceVisibilityRef on every instruction set.
 void FaceVisibility(const ProjectedFacesT<float>& faces, const PixelCentresT<float>& pixels,
                     float eps, std::size_t row_begin, std::size_t row_end,

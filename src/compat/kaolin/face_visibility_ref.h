@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of face_visibility.h: every face for every pixel.
+// Scalar reference of face_visibility.h: tests every face at every pixel.
 #pragma once
 
 #include <algorithm>

@@ -41,7 +41,7 @@ void InterpolateRows(const ProjectedFacesT<T>& faces, const PixelCentresT<T>& pi
   }
 }
 
-// The pixels of an image by the face that they show, in their order.
+// The pixels of an image grouped by visible face, in pixel order.
 struct PixelsOfFaces {
   std::vector<std::size_t> begin;  // [F + 1]
   std::vector<std::uint32_t> pixels;
@@ -63,7 +63,7 @@ struct PixelsOfFaces {
   }
 };
 
-// One face of one image on the way back.
+// The backward pass of one face of one image.
 template <class T>
 struct FaceAdjoint {
   const T* corners;   // [3,2]

@@ -31,7 +31,7 @@ struct Bins {
 
 // ---- Vector code: float, all faces.
 
-// One image's faces as a mesh whose corners are vertices of their own, and its tree.
+// One image's faces as a mesh without shared vertices, and its tree.
 struct SoftImage {
   raster::ScreenMeshBuffers buffers;
   raster::SoftTree tree;
@@ -135,8 +135,8 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
   });
 }
 
-// ---- Scalar code: the paper's rule, and double. All faces are the paper's rule with boxes grown
-// so far that what is outside of them adds up to no more than max_alpha_error, and without its eps.
+// ---- Scalar code: the paper's rule, and double. All faces in double use the paper's rule with
+// boxes grown so far that all faces outside sum to at most max_alpha_error, and without its eps.
 
 raster::PaperSoftMask ScalarRule(const ProjectedMaskOptions& options, std::size_t faces) {
   if (options.rule == AlphaRule::kPaper) {

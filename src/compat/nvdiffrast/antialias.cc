@@ -12,15 +12,16 @@
 namespace tilegrad::compat::nvdiffrast {
 namespace {
 
-// Where an edge crosses the way from one pixel's centre to the next one's, and the adjoint.
+// The crossing of an edge with the segment between the centres of adjacent pixels, and its adjoint.
 // S: double, std::complex<double>.
 //
-// In homogeneous pixel coordinates relative to the first centre, with q along the way, r across it:
-// the edge from i to j meets r = 0 at
+// In homogeneous pixel coordinates relative to the first centre, with q along the segment, r across
+// it: the edge from i to j meets r = 0 at
 //
 //     t = q / w = (q_i r_j - q_j r_i) / (w_i r_j - w_j r_i)
 
-// The way: from the centre of a pixel, one pixel along axis 0 (x) or 1 (y), forwards or back.
+// The segment: from the centre of a pixel, one pixel along axis 0 (x) or 1 (y), in either
+// direction.
 struct PixelStep {
   PixelCentre from;
   int axis;
@@ -28,7 +29,7 @@ struct PixelStep {
   double scale[2];  // pixels per unit of normalised device coordinates, along x and y
 };
 
-// A vertex seen from the way.
+// A vertex in the coordinates of the segment.
 template <class S>
 struct WayPoint {
   S q, r, w;
@@ -42,8 +43,8 @@ WayPoint<S> PointOnWay(const PixelStep& step, const S* p) {
           p[3]};
 }
 
-// Whether the edge crosses the way before its end, in front of the eye, at an angle that makes it
-// this axis's affair (exactly 45 degrees belong to x).
+// Whether the edge crosses the segment before its end, in front of the eye, at an angle that this
+// axis handles (exactly 45 degrees belong to x).
 template <class S>
 bool CrossesWay(const PixelStep& step, const WayPoint<S>& i, const WayPoint<S>& j, S* t) {
   if ((RealPart(i.r) < 0) == (RealPart(j.r) < 0)) return false;
@@ -56,7 +57,7 @@ bool CrossesWay(const PixelStep& step, const WayPoint<S>& i, const WayPoint<S>& 
   return RealPart(*t) >= 0 && RealPart(*t) <= 1;
 }
 
-// d_p[4] += what d_way pulls.
+// d_p[4] += gradient from d_way.
 template <class S>
 void PointOnWayAdjoint(const PixelStep& step, const WayPoint<S>& d_way, S* d_p) {
   S d_from[2];
@@ -67,7 +68,7 @@ void PointOnWayAdjoint(const PixelStep& step, const WayPoint<S>& d_way, S* d_p) 
   d_p[3] += d_way.w - step.from.x * d_from[0] - step.from.y * d_from[1];
 }
 
-// d_i[4], d_j[4] += what d_t pulls on the ends of an edge that crosses at t.
+// d_i[4], d_j[4] += gradient from d_t, by the ends of an edge that crosses at t.
 template <class S>
 void CrossingAdjoint(const PixelStep& step, const WayPoint<S>& i, const WayPoint<S>& j, S t, S d_t,
                      S* d_i, S* d_j) {
@@ -76,7 +77,8 @@ void CrossingAdjoint(const PixelStep& step, const WayPoint<S>& i, const WayPoint
   PointOnWayAdjoint(step, {-(d_n * i.r), d_n * i.q + d_m * i.w, -(d_m * i.r)}, d_j);
 }
 
-// Pixel `to` takes `weight` of what `from` shows beyond itself. The pixels are those of the batch.
+// Pixel `to` takes `weight` of the difference of `from` to its own colour. Pixel indices are in the
+// batch.
 struct Blend {
   std::size_t to, from;
   double weight, t;
@@ -89,14 +91,14 @@ struct PixelAt {
   int x, y;
 };
 
-// Two pixels next to each other along an axis, the one that shows the nearer face first.
+// Two adjacent pixels along an axis, the one with the nearer face first.
 struct PixelPair {
   std::size_t front, back;
   PixelAt at;  // of `front`
   int axis, direction;
 };
 
-// The pair of a pixel and the next one along an axis, which show different faces.
+// The pair of a pixel and the next one along an axis, with different faces.
 template <class T>
 PixelPair PairAt(const AntialiasInput<T>& input, std::size_t pixel, const PixelAt& at, int axis) {
   const std::size_t next = pixel + (axis == 0 ? 1 : input.grid.row());
@@ -123,11 +125,11 @@ WayPoint<double> VertexOnWay(const AntialiasInput<T>& input, std::size_t image, 
   return PointOnWay(step, point);
 }
 
-// Which edges of an image's faces are silhouettes, worked out for a face when it is first met.
-// Scratch of one worker.
+// The silhouette edges of an image's faces, computed when a face is first met. Scratch of one
+// worker.
 class Silhouettes {
  public:
-  // Bit k: no face of the ring of the edge from corner k on goes on beyond it.
+  // Bit k: no face in the ring of the edge from corner k continues beyond it.
   template <class T>
   std::uint8_t Of(const AntialiasInput<T>& input, std::size_t image, std::int32_t face) {
     if (image_ != image) {
@@ -146,8 +148,8 @@ class Silhouettes {
   static constexpr std::uint8_t kUnknown = 8;
   static constexpr std::size_t kNoImage = std::numeric_limits<std::size_t>::max();
 
-  // On which side of the line through the ends of an edge its face lies: the sign. In homogeneous
-  // coordinates, so that it holds for corners behind the eye.
+  // The side of the line through the ends of an edge on which its face lies, as a sign. In
+  // homogeneous coordinates, so that it holds for corners behind the eye.
   template <class T>
   static double SideOf(const T* a, const T* b, const T* c) {
     const double ax = a[0], ay = a[1], aw = a[3], bx = b[0], by = b[1], bw = b[3];
@@ -166,7 +168,7 @@ class Silhouettes {
     const double own = SideOf(a, b, input.positions.at(image, vertex(side, 2)));
     for (std::int32_t other = next(side); other != side; other = next(other)) {
       const std::int32_t third = vertex(other, 2);
-      // Of a face without area rounding would choose the side.
+      // For a face without area rounding would choose the side.
       if (third == ends[0] || third == ends[1]) continue;
       if (own * SideOf(a, b, input.positions.at(image, third)) < 0) return false;
     }
@@ -177,7 +179,7 @@ class Silhouettes {
   std::vector<std::uint8_t> edges_;
 };
 
-// What the edge that the nearer face of a pair ends at does to the two pixels.
+// The blend of two pixels due to the edge at which the nearer face of the pair ends.
 template <class T>
 std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
                              const PixelPair& pair, Silhouettes* silhouettes) {

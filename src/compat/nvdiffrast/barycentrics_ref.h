@@ -24,13 +24,13 @@ struct ClipCorners {
   S x[3], y[3], z[3], w[3];
 };
 
-// What rasterize says of a pixel. X and Y in pixels.
+// Outputs of rasterize for a pixel. X and Y in pixels.
 template <class S>
 struct Barycentrics {
   S u, v;                        // weights of corners 0 and 1
   S depth;                       // z/w
   S du_dx, du_dy, dv_dx, dv_dy;  // per pixel
-  bool solid;                    // else the face is seen edge-on: weights are 1/3, derivatives 0
+  bool solid;                    // else the face is edge-on: weights are 1/3, derivatives 0
 };
 
 // Normalised device coordinates per pixel.
@@ -39,8 +39,8 @@ struct PixelSize {
 };
 inline PixelSize SizeOf(const PixelGrid& grid) { return {2.0 / grid.width, 2.0 / grid.height}; }
 
-// A weight that changes by more than this from one pixel to the next is that of a face thinner than
-// 1/64 pixel. Its derivative grows without bound, so it is taken to be constant
+// A weight that changes by more than this between adjacent pixels belongs to a face thinner than
+// 1/64 pixel. Its derivative grows without bound, so weights are taken as constant
 // (raster/conventions.h, rule 8).
 inline constexpr double kSteepest = 64;
 
@@ -73,7 +73,7 @@ Products<S> MakeProducts(const ClipCorners<S>& c, const PixelCentre& at) {
   return out;
 }
 
-// Whether weights with these derivatives are those of a face that is wide enough to be followed.
+// Whether weights with these derivatives belong to a face wide enough to have gradients.
 template <class S>
 bool IsSolid(const Barycentrics<S>& b) {
   const auto square = [](const S& x, const S& y) {
@@ -81,14 +81,14 @@ bool IsSolid(const Barycentrics<S>& b) {
   };
   const double steepest = std::max({square(b.du_dx, b.du_dy), square(b.dv_dx, b.dv_dy),
                                     square(b.du_dx + b.dv_dx, b.du_dy + b.dv_dy)});
-  return steepest <= kSteepest * kSteepest;  // and not NaN
+  return steepest <= kSteepest * kSteepest;  // false for NaN
 }
 
 }  // namespace barycentrics_ref
 
 namespace barycentrics_ref {
 
-// Weights of corners 0 and 1 and their derivatives, whatever the face.
+// Weights of corners 0 and 1 and their derivatives, for any face.
 template <class S>
 Barycentrics<S> Quotients(const Products<S>& p, const PixelSize& size) {
   const S inverse = S(1) / p.sum;
@@ -105,7 +105,7 @@ Barycentrics<S> Quotients(const Products<S>& p, const PixelSize& size) {
 
 }  // namespace barycentrics_ref
 
-// Not yet kept within [0, 1]: coverage is decided at 1/1024 pixel, so a centre may lie a hair
+// Not yet clamped to [0, 1]: coverage is decided at 1/1024 pixel, so a centre may lie slightly
 // outside of its face.
 template <class S>
 Barycentrics<S> BarycentricsAt(const ClipCorners<S>& c, const PixelCentre& at,
@@ -127,8 +127,8 @@ struct BarycentricsCotangent {
   S d_u, d_v, d_slopes[4];
 };
 
-// d_corners.x, y, w += ...; z/w is held constant, as is the choice of the face. Nothing comes from
-// a face that is not solid.
+// d_corners.x, y, w += ...; z/w is held constant, as is the choice of the face. A face that is not
+// solid contributes nothing.
 template <class S>
 void BarycentricsAdjoint(const ClipCorners<S>& c, const PixelCentre& at, const PixelSize& size,
                          const BarycentricsCotangent<S>& d, ClipCorners<S>* d_corners) {

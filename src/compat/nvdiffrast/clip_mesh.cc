@@ -62,7 +62,7 @@ void BandSums::Adder::MeetRow(std::size_t row) {
 
 namespace {
 
-// a += b, kept finite: gradients of positions grow with 1/w.
+// a += b, clamped to finite values: gradients of positions grow with 1/w.
 template <class T>
 void AddNumbers(const double* b, std::size_t n, T* a) {
   constexpr double kMost = std::numeric_limits<T>::max();
@@ -88,7 +88,7 @@ void BandSums::AddRows(std::span<T> out, std::size_t begin, std::size_t end,
 
 template <class T>
 void BandSums::AddTo(std::span<T> out, const Workers& workers, std::size_t first) const {
-  // How rows are shared among workers does not matter: each has its own sum.
+  // The division of rows among workers does not matter: each row has its own sum.
   const std::size_t rows = out.size() / channels_;
   const auto count = static_cast<std::size_t>(workers.count());
   workers.ForRanges(

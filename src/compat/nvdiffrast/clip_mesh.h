@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What nvdiffrast's operations are given: faces over vertices, and an image that names a face for
-// every pixel.
+// Inputs of nvdiffrast's operations: faces over vertices, and an image with a face id at every
+// pixel.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct VertexRows {
   std::size_t vertices = 0, channels = 0;
   bool shared = false;
 
-  // Where a vertex stands among all rows.
+  // Row index of a vertex.
   std::size_t row(std::size_t image, std::int32_t vertex) const {
     return (shared ? 0 : image * vertices) + static_cast<std::size_t>(vertex);
   }
@@ -35,24 +35,24 @@ struct VertexRows {
 
 using FaceList = std::span<const std::int32_t>;  // [F,3]
 
-// Channel 3 of an image of rasterize: face + 1, 0 where there is none. CheckFaceIds has seen it.
+// Channel 3 of an image of rasterize: face + 1, 0 for none. Must have passed CheckFaceIds.
 template <class T>
 std::int32_t FaceOf(const T* pixel) {
   return static_cast<std::int32_t>(pixel[3]) - 1;
 }
 
-// Names the first vertex index outside of [0, vertices).
+// An error that names the first vertex index outside of [0, vertices).
 Status CheckFaces(FaceList faces, std::size_t vertices);
 inline constexpr std::size_t kNoPixel = std::numeric_limits<std::size_t>::max();
-// Whether channel 3 of a pixel is a whole number in [0, faces].
+// Whether channel 3 of a pixel is an integer in [0, faces].
 template <class T>
 bool IsFaceId(T id, std::size_t faces) {
   return id >= T(0) && id <= static_cast<T>(faces) &&
          id == static_cast<T>(static_cast<std::int64_t>(id));
 }
-// The error of a pixel of `rast` whose channel 3 is no such number.
+// The error for a pixel of `rast` with an invalid channel 3.
 Status NoSuchFace(std::size_t pixel, double id, std::size_t faces);
-// Names the first such pixel of `rast` [pixels,4].
+// An error that names the first such pixel of `rast` [pixels,4].
 template <class T>
 Status CheckFaceIds(std::span<const T> rast, std::size_t faces);
 
@@ -63,8 +63,8 @@ Status CheckFaceIds(std::span<const T> rast, std::size_t faces);
 
 inline constexpr int kBandRows = 64;
 
-// Rows [row_begin, row_end) of an image: the unit of work. Sums are made by bands and then merged
-// in their order.
+// Rows [row_begin, row_end) of an image: the unit of work. Sums are formed per band and then merged
+// in band order.
 struct Band {
   std::size_t index, image;
   int row_begin, row_end;
@@ -86,7 +86,7 @@ struct PixelGrid {
     return {index, index / bands_of_image(), part * kBandRows,
             std::min(height, (part + 1) * kBandRows)};
   }
-  // The first pixel of a row, counted over the batch.
+  // Index in the batch of a row's first pixel.
   std::size_t first(std::size_t image_index, int y) const {
     return image_index * image() + static_cast<std::size_t>(y) * row();
   }
@@ -100,23 +100,23 @@ inline PixelCentre CentreOf(const PixelGrid& grid, int column, int row) {
   return {(2.0 * column + 1.0) / grid.width - 1.0, (2.0 * row + 1.0) / grid.height - 1.0};
 }
 
-// Calls visit(pixel of the batch) for each pixel of a band, in order.
+// Calls visit(pixel index in the batch) for each pixel of a band, in order.
 template <class Visit>
 void ForEachPixel(const PixelGrid& grid, const Band& band, const Visit& visit) {
   const std::size_t end = grid.first(band.image, band.row_end);
   for (std::size_t p = grid.first(band.image, band.row_begin); p < end; ++p) visit(p);
 }
 
-// Sums of what pixels pull on rows (of vertices, of texels): the same bits for any number of
-// workers. Every band sums the rows that it meets on its own, in double and in the order of its
-// pixels; the sums of bands are then added in the order of bands.
+// Sums pixels' gradient contributions to rows (of vertices, of texels), with the same bits for any
+// number of workers. Every band sums the rows that it touches separately, in double and in pixel
+// order; the sums of bands are then added in band order.
 
 class BandSums {
  public:
-  // Rows [0, rows) of `channels` numbers; at most 2^31 - 1 rows of a band are met.
+  // Rows [0, rows) of `channels` numbers; a band may touch at most 2^31 - 1 rows.
   BandSums(std::size_t rows, std::size_t channels, std::size_t bands, const Workers& workers);
 
-  // What one band adds. While it lives, no other of the same worker does.
+  // Accumulates one band. Only one Adder per worker at a time.
   class Adder {
    public:
     Adder(BandSums* sums, std::size_t band, std::size_t worker);
@@ -124,7 +124,7 @@ class BandSums {
     Adder(const Adder&) = delete;
     Adder& operator=(const Adder&) = delete;
 
-    // Forgets what was added.
+    // Discards what was added.
     void Clear();
 
     // The sum of a row so far; valid until the next call.
@@ -132,7 +132,7 @@ class BandSums {
       if (slots_[row] == 0) MeetRow(row);
       return sums_.data() + static_cast<std::size_t>(slots_[row] - 1) * channels_;
     }
-    // The rows that were met, in the order they were, and their sums, one after the other.
+    // The rows touched, in order of first use, and their sums, concatenated.
     std::span<const std::size_t> rows() const { return rows_; }
     const double* sums() const { return sums_.data(); }
 
@@ -151,7 +151,7 @@ class BandSums {
 
  private:
   struct OfBand {
-    std::vector<std::size_t> rows;  // in the order they were met
+    std::vector<std::size_t> rows;  // in order of first use
     std::vector<double> sums;       // [rows][channels]
   };
   template <class T>
@@ -159,7 +159,7 @@ class BandSums {
 
   std::size_t rows_, channels_;
   std::vector<OfBand> bands_;
-  // Of each worker: 1 + where a row stands in the band at work; 0 if it was not met.
+  // Per worker: 1 + position of a row in the current band; 0 if not touched.
   std::vector<AlignedVector<std::int32_t>> slots_;
 };
 

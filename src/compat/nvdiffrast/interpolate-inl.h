@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of interpolate.h. Lanes are the channels of a pixel (quads-inl.h). Nothing but sums
-// depends on how many pixels in a row show one face: faces are small, and a branch that ends with
-// each of them is guessed wrongly each time.
+// Vector body of interpolate.h. Lanes are the channels of a pixel (quads-inl.h). Only sums depend
+// on how many adjacent pixels show the same face: faces are small, and a branch at the end of each
+// would be mispredicted every time.
 #if defined(TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_
 #undef TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_
@@ -24,15 +24,15 @@ namespace tilegrad::compat::nvdiffrast {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// What the pixels of a band interpolate: their faces, weights and the attributes at corners, lanes
-// are channels (quads-inl.h).
+// Inputs of a band's pixels: their faces, weights and corner attributes; lanes are channels
+// (quads-inl.h).
 
-// The corners of a face from some channel on; beyond the last one whatever stands there.
+// The corners of a face, four channels from some channel on; unspecified beyond the last one.
 struct CornerQuads {
   Quad a, b, c;
 };
 
-// How corners 0 and 1 differ from corner 2.
+// Differences of corners 0 and 1 from corner 2.
 struct EdgeQuads {
   Quad u, v;
 
@@ -47,11 +47,11 @@ struct EdgeQuads {
   }
 };
 
-// Rows of attributes of an image, of which `n` numbers count.
+// Rows of attributes of an image, of `n` numbers each.
 struct AttributeRows {
   const float *base, *end;
   std::size_t stride, n;
-  std::int32_t whole;  // vertices below have four numbers from each of theirs on
+  std::int32_t whole;  // vertices below this index can load four numbers from any of theirs
 
   HWY_INLINE AttributeRows(const VertexRows<float>& rows, std::size_t image, std::size_t count)
       : base(rows.at(image, 0)),
@@ -75,8 +75,8 @@ struct AttributeRows {
   }
 };
 
-// How many quads a row has: known when compiled, or not. Known: attributes with derivatives are the
-// first ones of those that are interpolated, and in the same quad.
+// Whether the number of quads per row is known at compile time. Known: attributes with derivatives
+// are the first ones of those interpolated, and in the same quad.
 template <bool kIsKnown, std::size_t kSlopes>
 struct Known {
   static constexpr bool kKnown = kIsKnown;
@@ -85,7 +85,7 @@ struct Known {
   static HWY_INLINE std::size_t Slopes(std::size_t n) { return kIsKnown ? 4 * kSlopes : n; }
 };
 
-// The pixels of a band and what is interpolated over them.
+// The pixels of a band and their inputs.
 struct BandAtHand {
   const float *rast, *rast_db;
   const std::int32_t* faces;
@@ -105,15 +105,15 @@ struct BandAtHand {
         sloped(task.sloped, task.band.image, task.input.diff_attrs.size()),
         slopes(2 * sloped.n) {}
 
-  // Where the last pixels begin, whose quads may reach beyond arrays.
+  // Start of the last pixels, whose quads may reach beyond arrays.
   HWY_INLINE std::size_t whole() const { return end - HWY_MIN(end - begin, std::size_t{3}); }
   HWY_INLINE const std::int32_t* Vertices(std::int32_t face) const {
     return faces + 3 * static_cast<std::ptrdiff_t>(face) - 3;
   }
 };
 
-// Which faces pixels show, counted from 1, 0 where there is none, and the first pixel that names
-// one that does not exist.
+// The faces at pixels, counted from 1, 0 for none, and the first pixel with a face that does not
+// exist.
 class FaceNumbers {
  public:
   HWY_INLINE explicit FaceNumbers(const BandAtHand& band)
@@ -121,7 +121,7 @@ class FaceNumbers {
 
   HWY_INLINE std::int32_t At(std::size_t pixel) {
     const float id = rast_[4 * pixel + 3];
-    // Numbers from 0 on are in the order of their bits.
+    // For floats >= 0 the bits have the order of the values.
     if (HWY_LIKELY(std::bit_cast<std::uint32_t>(id) <= most_)) {
       const auto face = static_cast<std::int32_t>(id);
       if (HWY_LIKELY(static_cast<float>(face) == id)) return face;
@@ -129,7 +129,7 @@ class FaceNumbers {
     if (id != 0) bad_ = HWY_MIN(bad_, pixel);
     return 0;
   }
-  // The end of the pixels from `pixel` on that show nothing.
+  // End of the background pixels that start at `pixel`.
   HWY_INLINE std::size_t EmptyUntil(std::size_t pixel, std::size_t end) const {
     while (pixel < end && rast_[4 * pixel + 3] == 0) ++pixel;
     return pixel;
@@ -166,14 +166,15 @@ struct SlopeQuads {
   }
 };
 
-// From which numbers i to i + 3 of out_da follow; `q`: corners from the first attribute on.
+// The edge differences from which numbers i to i + 3 of out_da follow; `q`: corners from the first
+// attribute on.
 template <class K>
 HWY_INLINE EdgeQuads SlopeEdges(const AttributeRows& sloped, const std::int32_t* v, std::size_t i,
                                 const CornerQuads& q) {
   return EdgeQuads(K::kKnown ? q : sloped.At(v, i / 8 * 4)).Twice(i % 8 / 4);
 }
 
-// [begin, end) of the band, whose quads are all there if kWhole.
+// Pixels [begin, end) of the band; with kWhole, all their quads are inside the arrays.
 template <class K, bool kWhole>
 HWY_INLINE void InterpolatePixels(const BandAtHand& band, std::size_t begin, std::size_t end,
                                   FaceNumbers* at, const InterpolateOutput<float>& out) {
@@ -210,8 +211,8 @@ HWY_INLINE void InterpolatePixels(const BandAtHand& band, std::size_t begin, std
   *at = numbers;
 }
 
-// What is summed over the pixels of a face in a row, by quads: InterpolateSums of interpolate.h. In
-// registers where their number is known.
+// Sums over the pixels of a face in a row, by quads: InterpolateSums of interpolate.h. In registers
+// if their number is known.
 template <class K>
 class RunSums {
  public:
@@ -234,7 +235,7 @@ class RunSums {
     Add(first + i, w.u, g);
     Add(first + row + i, w.v, g);
   }
-  // The next pixel shows a face, counted from 1; 0 at the end.
+  // Call before each pixel with its face, counted from 1; 0 at the end.
   HWY_INLINE void Begin(std::int32_t face) {
     if ((face == face_ && ++pixels_ < kMostRun) || faces_ == nullptr) return;
     if (face_ != 0) Flush();
@@ -277,7 +278,7 @@ class RunSums {
 
   float* memory_;
   std::size_t values_, slopes_;  // quads
-  BandSums::Adder* faces_;       // null: not wanted
+  BandSums::Adder* faces_;       // null: not requested
   std::int32_t face_ = 0;
   int pixels_ = 0;  // since the last flush, after the first one
   Quad kept_[K::kSums];
@@ -291,13 +292,13 @@ HWY_INLINE Quad SumsOfTwo(Quad u, Quad v) {
   return hn::ConcatLowerLower(d, hn::Zero(d), sums);
 }
 
-// sum += g times e in the lanes that count.
+// sum += g times e in the lanes of `counts`.
 HWY_INLINE void AddProducts(QuadMask counts, Quad g, const EdgeQuads& e, EdgeQuads* sum) {
   sum->u = hn::Add(sum->u, hn::IfThenElseZero(counts, hn::Mul(g, e.u)));
   sum->v = hn::Add(sum->v, hn::IfThenElseZero(counts, hn::Mul(g, e.v)));
 }
 
-// Where cotangents begin and end, and where those of rast go; null: not wanted.
+// Begin and end of cotangents, and destinations of those of rast; null: not requested.
 struct PixelCotangents {
   const float *out, *da, *out_end, *da_end;
   float *rast, *rast_db;
@@ -362,7 +363,7 @@ HWY_INLINE void WithKnown(const BandAtHand& band, const Work& work) {
   return work.template operator()<Known<true, 2>>();
 }
 
-// Both return the first pixel of the band that names a face that does not exist, or kNoPixel.
+// Both return the first pixel of the band with a face that does not exist, or kNoPixel.
 std::size_t InterpolateBand(const InterpolateTask& task, const InterpolateOutput<float>& out) {
   const BandAtHand band(task);
   FaceNumbers numbers(band);
@@ -373,8 +374,8 @@ std::size_t InterpolateBand(const InterpolateTask& task, const InterpolateOutput
   return numbers.bad();
 }
 
-// faces: sums of faces [InterpolateSums]; null where attributes have no gradient. `scratch`: as
-// much.
+// faces: sums per face [InterpolateSums]; null if attributes have no gradient. `scratch` has the
+// same size.
 std::size_t InterpolateBandBackward(const InterpolateTask& task,
                                     const InterpolateCotangents<float>& d, float* scratch,
                                     BandSums::Adder* faces,

@@ -32,7 +32,7 @@ Status CheckInput(const InterpolateInput<T>& input) {
   return CheckFaces(input.faces, input.attributes.vertices);
 }
 
-// The attributes of diff_attrs as an array of their own, where they are not the first ones anyway.
+// The attributes of diff_attrs as a separate array, unless they are the first ones anyway.
 struct SlopedRows {
   AlignedVector<float> values;
   VertexRows<float> rows;
@@ -66,7 +66,7 @@ Status ForBands(const InterpolateInput<float>& input, const Workers& workers, co
   return {};
 }
 
-// From the sums of a band's faces to the rows of their corners.
+// Distributes the sums of a band's faces to the rows of their corners.
 void SpreadFaces(const InterpolateTask& task, const BandSums::Adder& faces,
                  BandSums::Adder* vertices) {
   const InterpolateInput<float>& input = task.input;
@@ -105,7 +105,7 @@ Status RunBackward(InterpolateInput<float> input, const InterpolateCotangents<fl
   if (d.d_out_da.empty()) input.diff_attrs = {};
   const bool wanted = !out.d_attributes.empty();
   const std::size_t bands = wanted ? input.grid.bands() : 0, sums = InterpolateSums(input);
-  // Of the band that a worker is at.
+  // For the band that each worker is processing.
   BandSums faces(input.faces.size() / 3, sums, static_cast<std::size_t>(workers.count()), workers);
   BandSums vertices(input.attributes.rows(), input.attributes.channels, bands, workers);
   std::vector<AlignedVector<float>> scratch(static_cast<std::size_t>(workers.count()));

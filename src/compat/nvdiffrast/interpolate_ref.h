@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of interpolate.h, for checked input: pixel by pixel, in double. T: float, double.
+// Scalar reference of interpolate.h, for validated input: pixel by pixel, in double. T: float,
+// double.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 namespace tilegrad::compat::nvdiffrast {
 namespace interpolate_ref {
 
-// The rows of the corners of the face that a pixel shows; weights, and their derivatives if known.
+// The attribute rows of a pixel's face; weights, and their derivatives if known.
 template <class T>
 struct PixelFace {
   std::size_t rows[3];
@@ -64,7 +65,7 @@ void WritePixel(const InterpolateInput<T>& input, const PixelFace<T>& face, T* o
   }
 }
 
-// What the cotangents of a pixel pull.
+// Gradients from the cotangents of a pixel.
 struct PixelPull {
   double d_weight[3] = {}, d_slope[3][2] = {};
 };

@@ -5,7 +5,7 @@
 namespace tilegrad::compat::nvdiffrast {
 namespace {
 
-// How a level follows from the finer one: steps of 2, or 1 where a side is one texel.
+// Geometry of halving: steps of 2, or 1 along a side of one texel.
 struct Halving {
   std::size_t fine_row, fine_rows, coarse_row;  // numbers of a row; rows of a texture
   std::size_t step_x, step_y, channels;
@@ -23,7 +23,7 @@ struct Halving {
   // that it is made of. Both fine numbers are the same where there is no neighbour.
   template <class Visit>
   void ForRow(std::size_t row, std::size_t fine, const Visit& visit) const {
-    switch (channels) {  // a number that is known is a loop that is not
+    switch (channels) {  // a constant makes the loop unroll
       case 1:
         return ForRowOf<1>(row, fine, visit);
       case 3:

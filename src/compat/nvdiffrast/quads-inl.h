@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four numbers of a pixel, a vertex or a texel as lanes: images and textures keep the channels of a
-// place side by side, so rows of any number of them go by quads, the last one of which reaches into
-// the next row. What it reads there is ignored, and what it writes there is written again, as rows
-// are written in order; only the end of an array needs care.
+// Four numbers of a pixel, a vertex or a texel as lanes: images and textures interleave channels,
+// so kernels process rows of any length by quads, the last of which reaches into the next row. What
+// it reads there is ignored, and what it writes there is overwritten, since rows are written in
+// order; only the end of an array needs care.
 #if defined(TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_
 #undef TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_
@@ -24,8 +24,8 @@ using QuadTag = hn::FixedTag<float, 4>;
 using Quad = hn::Vec<QuadTag>;
 using QuadMask = hn::Mask<QuadTag>;
 
-// Pixels in a row whose pulls are summed on their own before they join a longer sum, so that the
-// rounding of many equal ones does not add up.
+// Adjacent pixels whose contributions are summed separately before they join a longer sum, so that
+// the rounding of many equal ones does not accumulate.
 inline constexpr int kMostRun = 64;
 
 inline HWY_NOINLINE Quad LoadShortQuad(const float* from, const float* end) {
@@ -39,7 +39,7 @@ inline HWY_NOINLINE void StoreShortQuad(Quad v, float* to, const float* end) {
   std::memcpy(to, some, static_cast<std::size_t>(end - to) * sizeof(float));
 }
 
-// Up to four numbers, those before `end`. kWhole: all of them are.
+// Up to four numbers, those before `end`. kWhole: all four are.
 template <bool kWhole = false>
 HWY_INLINE Quad LoadQuad(const float* from, const float* end) {
   if (kWhole || HWY_LIKELY(end - from >= 4)) return hn::LoadU(QuadTag(), from);
@@ -51,7 +51,7 @@ HWY_INLINE void StoreQuad(Quad v, float* to, const float* end) {
   StoreShortQuad(v, to, end);
 }
 
-// Faster than std::fill, which asks the processor for help even with a few kilobytes.
+// Faster than std::fill, which uses rep stos even for a few kilobytes.
 HWY_INLINE void WriteZeros(float* to, float* end) {
   const hn::ScalableTag<float> d;
   const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));

@@ -21,14 +21,14 @@
 namespace tilegrad::compat::nvdiffrast {
 namespace {
 
-// Faces in clip space to the screen of the engine's rasterizer (raster/screen_mesh.h), which finds
-// what is seen.
+// Converts faces in clip space to a screen mesh of the engine's rasterizer (raster/screen_mesh.h),
+// which computes visibility.
 //
-// Faces are cut by the planes -w <= z <= w, and at a guard far outside of the image on each side,
-// so that what remains has w > 0 and coordinates of at most raster::kGuardBand. Where an edge is
-// cut depends on its two ends only: faces that share it stay together. Row 0 of the screen is row 0
-// of the image, the bottom. In the place of 1/depth stands 1 - z/w: linear on the screen too, and
-// larger where it is nearer.
+// Clips faces to the planes -w <= z <= w, and to a guard band far outside of the image on each
+// side, so that the rest has w > 0 and coordinates of at most raster::kGuardBand. The cut of an
+// edge depends on its two ends only, so faces that share it stay together. Row 0 of the screen is
+// row 0 of the image, the bottom. 1 - z/w replaces 1/depth: also linear on the screen, and larger
+// where it is nearer.
 
 // Faces [first, first + count).
 struct FaceRange {
@@ -43,7 +43,7 @@ struct ClipScreen {
 
 constexpr int kPlanes = 6;  // near, far, left, right, below, above
 constexpr std::size_t kMostCorners = 3 + kPlanes;
-// 1 - z/w of what lies on the far plane: seen, but behind everything else.
+// 1 - z/w on the far plane: visible, but behind everything else.
 constexpr double kFarthest = 1e-30;
 
 struct ClipPoint {
@@ -85,8 +85,8 @@ struct Frustum {
 
 using Polygon = InlineVector<ClipPoint, kMostCorners>;
 
-// Where the edge from `a`, inside, to `b`, outside, meets a plane: in this order whatever way the
-// face goes, so that both faces of an edge get the same point.
+// The intersection of the edge from `a`, inside, to `b`, outside, with a plane: in this order
+// whatever the face's winding, so that both faces of an edge get the same point.
 ClipPoint Cut(const ClipPoint& a, const ClipPoint& b, double da, double db) {
   const double t = da / (da - db);
   return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z),
@@ -139,9 +139,9 @@ class ScreenWriter {
     out_.source_face.push_back(static_cast<std::int32_t>(source));
     out_.reject.push_back(raster::kFaceDrawn);
   }
-  // A cut face, as a fan from its least corner: of coinciding faces, whatever corner they start
-  // with and however they are wound, the same pieces. Nothing where it has no area in front of the
-  // eye.
+  // Appends a clipped face as a fan from its least corner, so that coinciding faces get the same
+  // pieces, whatever their first corner and winding. Appends nothing if it has no area in front of
+  // the eye.
   void AppendPolygon(const Polygon& polygon, std::size_t source) {
     for (const ClipPoint& p : polygon) {
       if (!(p.w > 0)) return;
@@ -190,7 +190,7 @@ void Clear(const PixelGrid& grid, ClipScreen* out) {
   mesh.height = grid.height;
 }
 
-// The planes that all corners, or any, lie beyond.
+// The planes beyond which all corners, or any, lie.
 struct Beyond {
   std::uint8_t all = 0xff, any = 0;
 };
@@ -265,7 +265,7 @@ void WritePixel(const Barycentrics<double>& b, std::int32_t face, T* rast, T* ra
   for (int i = 0; i < 4; ++i) rast_db[i] = static_cast<T>(slopes[i]);
 }
 
-// An image made ready for its bins.
+// An image prepared for its bins.
 struct PreparedImage {
   ClipScreen screen;
   raster::DrawnFaces drawn;
@@ -288,7 +288,7 @@ void Prepare(const RasterizeInput<T>& input, std::size_t image, const Workers* w
                         &out->lists, workers);
 }
 
-// A bin of an image: what is seen in it, and where it stands.
+// A bin of an image: its visible faces and position.
 struct DrawnBin {
   std::size_t image;
   raster::PixelRect rect;
@@ -320,13 +320,13 @@ void WriteBin(const RasterizeInput<T>& input, const DrawnBin& bin, const Rasteri
   }
 }
 
-// What a worker needs to draw a bin.
+// Scratch of a worker for drawing a bin.
 struct BinScratch {
   raster::VisibilityBin seen;
   alignas(128) float behind[raster::kBinSize * raster::kBinSize];
 };
 
-// From the rows of an image to those of a bin; the rest of the bin is never looked at.
+// From the rows of an image to those of a bin; the rest of the bin is never read.
 void LoadPeeled(const float* peeled, std::size_t row, const raster::PixelRect& rect,
                 float* behind) {
   std::fill(behind, behind + raster::kBinSize * raster::kBinSize, 0.0f);

@@ -21,7 +21,7 @@ BarycentricsCotangent<double> CotangentAt(const RasterizeCotangents<T>& all, std
   return out;
 }
 
-// Sums what pixels pull on the face at hand, before it goes on to the face's vertices.
+// Sums gradients on the current face before adding them to the face's vertices.
 template <class T>
 class FacePull {
  public:
@@ -45,7 +45,7 @@ class FacePull {
       double* to = adder_->Row(input_.positions.row(image_, v[k]));
       to[0] += sum_.x[k];
       to[1] += sum_.y[k];
-      to[3] += sum_.w[k];  // z pulls nothing
+      to[3] += sum_.w[k];  // z has no gradient
     }
     sum_ = {};
   }

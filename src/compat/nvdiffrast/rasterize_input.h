@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the two passes of rasterize.h have in common.
+// Shared by the two passes of rasterize.h.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ ClipCorners<double> CornersOf(const RasterizeInput<T>& input, std::size_t image,
   return out;
 }
 
-// The corners of the face at hand; pixels of a row mostly show one after the other.
+// Caches the corners of the last face; adjacent pixels mostly show the same one.
 template <class T>
 class LastFace {
  public:

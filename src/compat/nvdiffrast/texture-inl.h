@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of texture.h: where pixels read is found for runs of them, lanes are pixels
-// (texture_taps-inl.h); what they read are quads, lanes are channels.
+// Vector body of texture.h. Computes texel addresses for runs of pixels, with pixels as lanes
+// (texture_taps-inl.h); reads texels as quads, with channels as lanes.
 #if defined(TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_
 #undef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_INL_H_
@@ -26,12 +26,12 @@ namespace tilegrad::compat::nvdiffrast {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// What a run of pixels reads and what it pulls: lanes are channels (quads-inl.h).
+// Texel reads and gradients of a run of pixels: lanes are channels (quads-inl.h).
 
 inline constexpr std::size_t kMostLevels = 33;
 
-// The levels of the texture that an image has, and the last numbers of each with zeros after them:
-// quads of the last texels are read there.
+// The levels of an image's texture, and the last numbers of each padded with zeros, from which
+// quads of the last texels are loaded.
 struct ImageLevels {
   static constexpr std::size_t kTail = 4;
 
@@ -50,7 +50,7 @@ struct ImageLevels {
                 0.0f);
     }
   }
-  // From `from` on, which is before the end.
+  // Loads four numbers from `from` on, which is before the end.
   HWY_INLINE Quad Load(std::size_t level, const float* from) const {
     const auto left = static_cast<std::size_t>(end[level] - from);
     return hn::LoadU(QuadTag(), left < kTail ? tails[level] + kTail - left : from);
@@ -92,8 +92,8 @@ struct TapQuads {
   }
 };
 
-// Fetches what the pixel kAhead pixels after p reads: textures are larger than caches, and where
-// their texels are is known by then. levels: as ImageLevels::at; count: pixels of the run.
+// Prefetches the texels of the pixel kAhead pixels after p: textures are larger than caches, and
+// the addresses are known by then. levels: as ImageLevels::at; count: pixels of the run.
 inline constexpr std::size_t kAhead = 16;
 template <class Number>
 HWY_INLINE void FetchAhead(Number* const* levels, std::size_t channels, const LookupRun& run,
@@ -118,8 +118,8 @@ HWY_INLINE void ForRuns(const TextureInput<float>& input, const Band& band, cons
   }
 }
 
-// Whether a pixel's cotangent has a number other than 0. Mostly the background has none, which
-// shows whatever stands at (0, 0) and is masked afterwards.
+// Whether a pixel's cotangent has a nonzero number. Mostly the background has none: it samples the
+// texel at (0, 0) and is masked afterwards.
 HWY_INLINE bool HasCotangent(const float* d_out, std::size_t n, const float* end) {
   for (std::size_t c = 0; c < n; c += 4) {
     const auto some = hn::Ne(LoadQuad(d_out + c, end), hn::Zero(QuadTag()));
@@ -130,9 +130,8 @@ HWY_INLINE bool HasCotangent(const float* d_out, std::size_t n, const float* end
 
 // The gradient of texels.
 
-// Sums into the texels of an image's texture, of which a part belongs to this call: every parts-th
-// block of kBlock texels of a level. Quads that would reach beyond a block are added number by
-// number.
+// Sums into the texels of an image's texture, of which this call owns a part: every parts-th block
+// of kBlock texels of a level. Quads that would reach beyond a block are added number by number.
 class TexelSums {
  public:
   static constexpr std::uint32_t kBlock = 64;
@@ -145,7 +144,7 @@ class TexelSums {
     }
   }
   std::size_t channels() const { return channels_; }
-  // v on channels from `first` on; it is 0 beyond the last one.
+  // Adds v to channels from `first` on; v is 0 beyond the last channel.
   HWY_INLINE void Add(std::size_t level, std::int32_t texel, std::size_t first, Quad v) const {
     const QuadTag d;
     const std::uint32_t block = static_cast<std::uint32_t>(texel) / kBlock;
@@ -159,7 +158,7 @@ class TexelSums {
   }
 
  private:
-  // Sums are kept finite; NaN stays.
+  // Clamps sums to finite values; NaN stays.
   static HWY_INLINE Quad Finite(Quad sum) {
     const QuadTag d;
     const Quad most = hn::Set(d, std::numeric_limits<float>::max());
@@ -180,7 +179,7 @@ class TexelSums {
   TexelPart part_;
 };
 
-// What the pixels at hand, which read the same texels, pull on four channels or fewer of each.
+// Contributions of consecutive pixels that read the same texels, on up to four channels of each.
 class CellSums {
  public:
   HWY_INLINE explicit CellSums(const TexelSums& to) : to_(to) {
@@ -245,7 +244,7 @@ HWY_INLINE void AddManyChannels(const TapRun& taps, std::size_t p, const float* 
   }
 }
 
-// Adds what the pixels of a band pull on the texels of `part`, in their order. d_levels: those of
+// Adds the gradients of a band's pixels to the texels of `part`, in pixel order. d_levels: those of
 // the image's texture.
 void PullTexelsOfBand(const TextureInput<float>& input, const Band& band,
                       std::span<const float> d_out, const TexelPart& part, float* const* d_levels) {
@@ -313,7 +312,7 @@ void SampleBand(const TextureInput<float>& input, const Band& band, std::span<fl
   });
 }
 
-// What pixels pull, before sums over channels: on a and b of the levels, and on the mixture.
+// Gradients of pixels before sums over channels: by a and b of the levels, and by the mix.
 struct alignas(128) PullRun {
   float a[2][kRun][4], b[2][kRun][4], mix[kRun][4];
 
@@ -329,7 +328,7 @@ HWY_INLINE void AddQuad(QuadMask counts, Quad g, Quad v, float* to) {
   hn::Store(hn::Add(hn::Load(d, to), hn::IfThenElseZero(counts, hn::Mul(g, v))), d, to);
 }
 
-// Channels c to c + 3 of pixel p at its i-th level: the value of which is returned.
+// Channels c to c + 3 of pixel p at its i-th level: returns the sampled value.
 HWY_INLINE Quad PullLevel(const ImageLevels& levels, const TapRun& taps, std::size_t p,
                           std::size_t c, Quad g, float* to_a, float* to_b) {
   const QuadTag d;
@@ -421,7 +420,7 @@ HWY_INLINE void WriteNumbers(const RunVec* v, std::size_t n, std::size_t count, 
   }
 }
 
-// The gradients of coordinates; those of levels are left alone.
+// The gradients of coordinates; leaves those of levels alone.
 void PullCoordinatesOfBand(const TextureInput<float>& input, const Band& band,
                            std::span<const float> d_out, const TextureGradients<float>& out) {
   const ImageLevels levels(input, band.image);

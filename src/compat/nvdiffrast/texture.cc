@@ -24,8 +24,8 @@ HWY_EXPORT(PullTexelsOfBand);
 
 constexpr std::size_t kFillGrain = std::size_t{1} << 16;
 
-// Every task goes through all pixels and sums the texels of its part: each texel in the order of
-// pixels, whatever the number of tasks.
+// Every task visits all pixels and sums the texels of its part: each texel in pixel order, whatever
+// the number of tasks.
 void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
                 const Workers& workers, std::span<const std::span<float>> d_levels) {
   for (const std::span<float> level : d_levels) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cube maps: from a direction to a point on a face and back, and who is next to whom over an edge.
+// Cube maps: from a direction to a point on a face and back, and neighbours across edges.
 //
 // Point (s, t) of a face, in [0, 1]^2: s = (p + 1) / 2, t = (q + 1) / 2, p and q the components of
 // the direction along the face's axes, divided by the largest component (OpenGL 4.6, table 8.19).
@@ -26,7 +26,7 @@ inline constexpr CubeFace kCubeFaces[6] = {
 
 using Direction = std::array<double, 3>;
 
-// The face that a direction meets, -1 for none: the zero vector, or one that is not finite.
+// The face that a direction hits, -1 for none: the zero vector, or one that is not finite.
 inline int CubeFaceOf(const Direction& r) {
   int axis = 0;
   for (int i = 1; i < 3; ++i) {
@@ -40,12 +40,12 @@ inline int CubeFaceOf(const Direction& r) {
 
 inline double Along(const CubeAxis& axis, const double* r) { return axis.sign * r[axis.index]; }
 
-// A texel of a cube map of `size` texels a side, one step outside of face `face` at most.
+// A texel of a cube map of `size` texels a side, at most one step outside of face `face`.
 struct CubeTexel {
   int face, x, y;
 };
 
-// The texel that lies there: on the face, or across its edge; not at a corner.
+// The texel at this position: on the face, or across its edge; not at a corner.
 inline CubeTexel AcrossEdge(const CubeTexel& texel, int size) {
   if (texel.x >= 0 && texel.x < size && texel.y >= 0 && texel.y < size) return texel;
   const CubeFace& from = kCubeFaces[texel.face];
@@ -56,7 +56,8 @@ inline CubeTexel AcrossEdge(const CubeTexel& texel, int size) {
   r[static_cast<std::size_t>(from.t.index)] = from.t.sign * centre(texel.y);
   const int face = CubeFaceOf(r);
   const CubeFace& to = kCubeFaces[face];
-  // Along the edge this moves by less than half a texel, towards the middle: it stays the same one.
+  // This moves it along the edge by less than half a texel towards the middle, so the texel stays
+  // the same.
   const auto cell = [&](const CubeAxis& axis) {
     const double p = Along(axis, r.data()) / Along(to.major, r.data());
     const int i = static_cast<int>(std::floor((p + 1) * 0.5 * size));

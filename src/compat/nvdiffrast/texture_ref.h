@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of texture.h: pixel by pixel, in double. T: float, double.
+// Scalar reference of texture.h: pixel by pixel, in double. T: float, double.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +38,7 @@ bool UsesLevels(const TextureInput<T>& input) {
          input.filter == TextureFilter::kLinearMipmapLinear;
 }
 
-// What a pixel reads.
+// The texels that a pixel reads.
 struct PixelLookup {
   TextureCoordinates at;
   TexturePoint point;
@@ -49,7 +49,7 @@ struct PixelLookup {
   double share(int i) const { return i == 0 ? 1 - choice.mix : choice.mix; }
 };
 
-// Leaves derivatives alone where none are given.
+// Leaves derivatives unchanged if none are given.
 template <class T>
 void SetCoordinates(const TextureInput<T>& input, std::size_t pixel, TextureCoordinates* out) {
   const std::size_t n = input.coordinates();
@@ -67,7 +67,7 @@ LevelChoice LevelAt(const TextureInput<T>& input, std::size_t pixel, const Textu
   return ChooseLevel(input, level);
 }
 
-// *out is that of another pixel of this input, or empty.
+// *out is the lookup of another pixel of this input, or empty.
 template <class T>
 void LookUp(const TextureInput<T>& input, std::size_t pixel, PixelLookup* out) {
   SetCoordinates(input, pixel, &out->at);
@@ -82,14 +82,14 @@ void LookUp(const TextureInput<T>& input, std::size_t pixel, PixelLookup* out) {
   }
 }
 
-// The first texel of the texture that an image has, in a level.
+// The first texel of an image's texture in a level.
 template <class T>
 std::size_t FirstTexel(const TextureInput<T>& input, std::size_t level, std::size_t image) {
   return (input.textures == 1 ? 0 : image) * TexelsOf(input.levels[level].size, input.faces());
 }
 
-// The texels that a lookup mixes, of one level. What is missing at the corner of a cube is shared
-// by the others; what lies outside is left out.
+// The texels of one level that a lookup mixes. At the corner of a cube the others share the missing
+// texel's weight; texels outside are dropped.
 struct WeightedTexels {
   int count;
   std::size_t texel[4];  // of the level
@@ -119,9 +119,9 @@ const T* LevelTexels(const TextureInput<T>& input, const PixelLookup& lookup, in
   return input.levels[lookup.choice.low + static_cast<std::size_t>(i)].texels.data();
 }
 
-constexpr std::size_t kSumChannels = 8;  // that are summed side by side
+constexpr std::size_t kSumChannels = 8;  // summed in parallel
 
-// out[c] <- the texels' mixture in channels first to first + n - 1, n at most kSumChannels.
+// out[c] <- the texels' mix in channels first to first + n - 1, n at most kSumChannels.
 template <class T>
 void MixChannels(const TextureInput<T>& input, const PixelLookup& lookup,
                  const WeightedTexels (&texels)[2], std::size_t first, std::size_t n, T* out) {
@@ -149,7 +149,7 @@ void SamplePixel(const TextureInput<T>& input, const PixelLookup& lookup, std::s
   }
 }
 
-// What the cotangent of a pixel pulls on s and t, and on the mixture of levels.
+// Gradients of a pixel by s and t, and by the mix of levels.
 struct PixelPull {
   double d_st[2] = {}, d_mix = 0;
 };
@@ -195,7 +195,7 @@ PixelPull PullPoint(const TextureInput<T>& input, const PixelLookup& lookup, std
   return pull;
 }
 
-// `first`: where the levels begin among all texels.
+// `first`: offsets of the levels among all texels.
 template <class T>
 void PullTexels(const TextureInput<T>& input, const PixelLookup& lookup, std::size_t image,
                 std::span<const std::size_t> first, const T* d_out, BandSums::Adder* adder) {
@@ -232,7 +232,7 @@ void WriteCoordinates(const TextureInput<T>& input, const PixelLookup& lookup,
   }
 }
 
-// The levels one after the other: where the texels of each begin, and how many there are in all.
+// Offsets of the levels in one array of all texels, and the total number.
 template <class T>
 std::vector<std::size_t> LevelStarts(const TextureInput<T>& input) {
   std::vector<std::size_t> out = {0};
@@ -275,7 +275,7 @@ void SampleTextureBackwardRef(const TextureInput<T>& input, std::span<const T> d
     PixelLookup lookup{};
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
       const T* d = &d_out[pixel * input.channels];
-      // Mostly the background, which shows whatever stands at (0, 0) and is masked afterwards.
+      // Mostly the background, which samples the texel at (0, 0) and is masked afterwards.
       if (std::all_of(d, d + input.channels, [](T v) { return v == T(0); })) return;
       LookUp(input, pixel, &lookup);
       if (!lookup.point.valid) return;

@@ -26,7 +26,7 @@ namespace tilegrad::compat::nvdiffrast {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Vector body of texture_taps.h: the points on a texture that pixels look up, their footprints and
+// Vector body of texture_taps.h: the texture points that pixels look up, their footprints and
 // levels, and the adjoints. Lanes are pixels of a run; float.
 
 using RunTag = HWY_CAPPED(float, 16);
@@ -34,7 +34,7 @@ using RunIntTag = hn::RebindToSigned<RunTag>;
 using RunVec = hn::Vec<RunTag>;
 using RunInt = hn::Vec<RunIntTag>;
 using RunMask = hn::Mask<RunTag>;
-inline constexpr std::size_t kRun = 128;  // pixels: what is known of them stays in the first cache
+inline constexpr std::size_t kRun = 128;  // pixels: their data stays in the L1 cache
 
 // Coordinates of a run: those of the images, or a padded copy at their end.
 struct RunCoordinates {
@@ -61,7 +61,7 @@ struct RunCoordinates {
   }
 };
 
-// TexturePoint of texture_taps.h. Of cube maps also the direction along the axes of its face: p
+// TexturePoint of texture_taps.h. For cube maps also the direction along the axes of its face: p
 // and q are s and t in [-1, 1].
 struct PointLanes {
   RunVec st[2], slopes[4];
@@ -74,7 +74,7 @@ struct PointLanes {
 
 HWY_INLINE RunMask FiniteLanes(RunVec v) { return hn::Eq(hn::Sub(v, v), hn::Zero(RunTag())); }
 
-// Where a vector (x, y, z) lies along the axes of faces: kCubeFaces of texture_cube.h.
+// A vector (x, y, z) in the axes of faces: kCubeFaces of texture_cube.h.
 struct FaceFrame {
   RunVec s, t, major;
 
@@ -85,7 +85,7 @@ struct FaceFrame {
     major = hn::IfThenElse(p.axis[0], sx, hn::IfThenElse(p.axis[1], sy, sz));
   }
 };
-// And back.
+// The inverse.
 struct FromFaceFrame {
   RunVec xyz[3];
 
@@ -159,7 +159,7 @@ HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLan
 HWY_INLINE PointLanes FindPoints(const TextureInput<float>& input, const RunCoordinates& at,
                                  std::size_t i) {
   PointLanes out;
-  // Adjoints multiply both by 0 where there are no derivatives: garbage may be NaN.
+  // Adjoints multiply both by 0 if there are no derivatives: garbage could be NaN.
   for (RunVec& s : out.slopes) s = hn::Zero(RunTag());
   for (RunVec& m : out.d_major) m = hn::Zero(RunTag());
   if (input.boundary == TextureBoundary::kCube) {
@@ -167,7 +167,7 @@ HWY_INLINE PointLanes FindPoints(const TextureInput<float>& input, const RunCoor
   } else {
     FindPlainPoints(at, i, &out);
   }
-  for (RunVec& s : out.st) s = hn::IfThenElseZero(out.valid, s);  // weights are numbers, then
+  for (RunVec& s : out.st) s = hn::IfThenElseZero(out.valid, s);  // then weights are not NaN
   return out;
 }
 
@@ -207,7 +207,7 @@ struct FootprintLanes {
   }
 };
 
-// Of x > 0; exact where x is a power of two.
+// For x > 0; exact if x is a power of two.
 HWY_INLINE RunVec Log2Lanes(RunVec x) {
   const RunTag d;
   const RunIntTag di;
@@ -276,8 +276,8 @@ HWY_INLINE void CubeAdjointLanes(const PointLanes& p, const RunVec (&d_st)[2],
   }
 }
 
-// The texels that pixels read in one level, as Taps says, and their weights: of the level, and each
-// with the level's share.
+// The texels that pixels read in one level, as in Taps, and their weights: in the level, and each
+// times the level's share.
 struct alignas(128) TapRun {
   std::int32_t texel[kRun][4];
   float weight[kRun][4];
@@ -290,7 +290,7 @@ struct alignas(128) TapRun {
 struct LookupRun {
   TapRun taps[2];                // of the finer and the coarser level
   alignas(128) float mix[kRun];  // share of the coarser one
-  bool mixes;                    // some pixel has one
+  bool mixes;                    // for some pixel
 };
 
 inline bool UsesLevels(TextureFilter filter) {
@@ -298,7 +298,7 @@ inline bool UsesLevels(TextureFilter filter) {
          filter == TextureFilter::kLinearMipmapLinear;
 }
 
-// The levels of a vector of pixels: `fine`, and where `mixes` the next one takes `mix`.
+// The levels of a vector of pixels: `fine`, and where `mixes` the next one with weight `mix`.
 struct LevelLanesOf {
   RunInt fine;
   RunVec mix;
@@ -339,7 +339,7 @@ struct AxisLanes {
     RunVec x = hn::Mul(s, size);
     weight = slope = zero;
     if (input.filter == TextureFilter::kNearest) {
-      // Far away is outside, too, and fits into an integer.
+      // Far away is outside, too, and must fit into an integer.
       const RunVec cell = hn::Floor(hn::Min(hn::Max(x, hn::Set(d, -1.0f)), size));
       low = hn::Max(none, hn::Min(hn::ConvertTo(di, cell), n));
       if (input.boundary != TextureBoundary::kZero) low = hn::Max(hn::Zero(di), hn::Min(low, last));
@@ -384,7 +384,7 @@ struct AxisLanes {
 // The texel in column x and row y of a face, negative outside.
 struct TexelLanes {
   RunInt width, height, face, first;
-  bool outside;  // taps may be
+  bool outside;  // some taps may be
 
   HWY_INLINE RunInt At(RunInt x, RunInt y) const {
     const RunIntTag di;
@@ -397,8 +397,7 @@ struct TexelLanes {
   }
 };
 
-// Texels over the edges of a cube's faces, one by one: where a vector of pixels from `i` on has
-// any.
+// Texels across the edges of a cube's faces, one by one, if a vector of pixels from `i` on has any.
 inline HWY_NOINLINE void CrossEdges(const MipSize& size, const AxisLanes& x, const AxisLanes& y,
                                     RunInt face, hn::Mask<RunIntTag> cross, std::size_t i,
                                     TapRun* out) {
@@ -420,8 +419,8 @@ inline HWY_NOINLINE void CrossEdges(const MipSize& size, const AxisLanes& x, con
   }
 }
 
-// Fills the taps of pixels i to i + lanes - 1 at `level`. Negative levels and pixels that are not
-// valid have none.
+// Fills the taps of pixels i to i + lanes - 1 at `level`. Negative levels and invalid pixels have
+// none.
 HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& point, RunInt level,
                         RunVec share, std::size_t i, TapRun* out) {
   const RunTag d;
@@ -462,7 +461,7 @@ HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& poin
   CrossEdges(base, x, y, point.face, cross, i, out);
 }
 
-// What `count` pixels read.
+// The lookups of `count` pixels.
 HWY_INLINE void LookUp(const TextureInput<float>& input, const RunCoordinates& at,
                        std::size_t count, LookupRun* out) {
   const RunTag d;

@@ -107,7 +107,7 @@ double LevelOf(const double (&slopes)[4], const MipSize& size) {
 void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
                   double (&d_slopes)[4]) {
   const Footprint f(slopes, size);
-  // Of a round footprint both axes are the longer one; the derivative taken is that of their mean.
+  // For a round footprint both axes are the longer one; takes the derivative of their mean.
   const double cosine = f.root > 0 ? f.half / f.root : 0, sine = f.root > 0 ? f.c / f.root : 0;
   const double d_square = 0.5 * d_level / (f.square * std::numbers::ln2);
   const double d_a = 0.5 * (1 + cosine) * d_square, d_b = 0.5 * (1 - cosine) * d_square;
@@ -120,8 +120,8 @@ void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level
 
 namespace {
 
-// One axis: texels `low` and `high`, the weight of `high`, and its derivative by the coordinate.
-// Texels may be -1 or n of a cube map, which lie on the next face; kOutside holds zeros.
+// One axis: texels `low` and `high`, the weight of `high`, and its derivative by the coordinate. In
+// a cube map texels may be -1 or n, on the adjacent face; kOutside gives zeros.
 constexpr int kOutside = -2;
 struct AxisTaps {
   int low, high;

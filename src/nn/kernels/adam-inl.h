@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of adam.h. Bound by seven streams of memory, which hide the square root and the
+// Vector body of adam.h. Memory-bound by seven streams, which hide the square root and the
 // division.
 #if defined(TILEGRAD_NN_ADAM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_ADAM_INL_H_

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of Adam over a block of parameters: each number is read and written once. Kingma, Ba:
+// One step of Adam over a block of parameters, reading and writing each number once. Kingma, Ba:
 // Adam, ICLR 2015, with epsilon added after the bias correction, as PyTorch does.
 #pragma once
 
@@ -35,10 +35,10 @@ struct AdamProblem {
 void AdamStep(const AdamProblem<float>& problem, const Workers& workers);
 void AdamStep(const AdamProblem<double>& problem, const Workers& workers);
 
-// The sum of squares in double, merged in an order that n fixes.
+// The sum of squares in double, merged in an order that depends on n only.
 double SumOfSquares(const float* x, std::size_t n, const Workers& workers);
 double SumOfSquares(const double* x, std::size_t n, const Workers& workers);
-// Of each array the same sum; all in one loop.
+// The same sum for each array, in one loop.
 std::vector<double> SumsOfSquares(std::span<const std::span<const float>> arrays,
                                   const Workers& workers);
 std::vector<double> SumsOfSquares(std::span<const std::span<const double>> arrays,

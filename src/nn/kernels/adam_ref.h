@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that adam.h is held to.
+// Scalar reference of adam.h.
 #pragma once
 
 #include <cmath>

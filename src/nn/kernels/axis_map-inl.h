@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of axis_map.h: lanes run over the axes behind the mapped one. Along the last axis
-// there are none; a row's few terms are then summed one by one.
+// Vector body of axis_map.h: lanes run over the axes after the mapped one. For the last axis, which
+// has none after it, sums a row's few terms one by one.
 #if defined(TILEGRAD_NN_AXIS_MAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_AXIS_MAP_INL_H_
 #undef TILEGRAD_NN_AXIS_MAP_INL_H_
@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// One row of y where inner > 1.
+// One row of y if inner > 1.
 HWY_INLINE void MapLongRow(const AxisMapProblem<float>& p, std::size_t row) {
   const DF d;
   const std::size_t i = row % p.out, lanes = hn::Lanes(d);
@@ -32,7 +32,7 @@ HWY_INLINE void MapLongRow(const AxisMapProblem<float>& p, std::size_t row) {
   }
 }
 
-// Rows of y where inner is 1 and each has one term, as of a nearest resize: a copy of numbers.
+// Rows of y if inner is 1 and each has one term, as in a nearest resize: copies numbers.
 HWY_INLINE void MapPoints(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
   while (first < last) {
     const std::size_t i = first % p.out, count = HWY_MIN(p.out - i, last - first);

@@ -11,7 +11,7 @@
 namespace tilegrad::nn {
 
 //   y[o, i, k] = sum_t weight[t] x[o, index[t], k],   begin[i] <= t < begin[i + 1]
-// x [outer, in, inner], y [outer, out, inner]; terms are summed in the order of t.
+// x [outer, in, inner], y [outer, out, inner]; sums run in the order of t.
 template <class T>
 struct AxisMapProblem {
   std::size_t outer = 1, in = 1, out = 1, inner = 1;

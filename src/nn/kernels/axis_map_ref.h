@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that axis_map.h is held to.
+// Scalar reference of axis_map.h.
 #pragma once
 
 #include "nn/kernels/axis_map.h"

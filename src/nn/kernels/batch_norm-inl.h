@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of batch_norm.h. Two layouts: where a channel has pixels, lanes run along them and
-// one channel is a task (its statistics, then its values, which are still in the cache); where it
-// has one, each lane is one channel.
+// Vector body of batch_norm.h. Two layouts: if channels have several pixels, lanes run along them
+// and a channel is a task (its statistics, then its values, still in the cache); if they have one,
+// each lane is a channel.
 #if defined(TILEGRAD_NN_BATCH_NORM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_BATCH_NORM_INL_H_
 #undef TILEGRAD_NN_BATCH_NORM_INL_H_
@@ -17,7 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// y = scale x + shift of one channel (in all lanes), or of one channel a lane.
+// y = scale x + shift of one channel (in all lanes), or of one channel per lane.
 struct Normalise {
   VF mean, inverse, scale, shift;
 
@@ -31,7 +31,7 @@ struct Normalise {
   }
   HWY_INLINE VF Apply(VF x) const { return hn::MulAdd(x, scale, shift); }
   HWY_INLINE VF Standard(VF x) const { return hn::Mul(hn::Sub(x, mean), inverse); }
-  // d_y where relu passed y: the same expression as in Apply, so the same sign.
+  // d_y where relu passed y: evaluates the same expression as Apply, so signs agree.
   HWY_INLINE VF Mask(DF d, bool relu, VF x, VF dy) const {
     return relu ? hn::IfThenElseZero(hn::Gt(Apply(x), hn::Zero(d)), dy) : dy;
   }
@@ -134,7 +134,7 @@ void BackwardChannel(const BatchNormBackwardProblem<float>& p, std::size_t c) {
   }
 }
 
-// ---- One channel a lane: pixels = 1, channels [c, c + count) ----
+// ---- One channel per lane: pixels = 1, channels [c, c + count) ----
 
 void ForwardLanes(const BatchNormForwardProblem<float>& p, std::size_t c, std::size_t count) {
   const DF d;
@@ -186,7 +186,7 @@ void BackwardLanes(const BatchNormBackwardProblem<float>& p, std::size_t c, std:
   }
 }
 
-// Channels [begin, end) of either layout: one after the other, or a vector of them at a time.
+// Channels [begin, end) of either layout: one by one, or a vector of them at a time.
 template <class Channel, class Channels>
 HWY_INLINE void ForChannels(const BatchNormShape& shape, std::size_t begin, std::size_t end,
                             const Channel& channel, const Channels& channels) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Batch normalisation with the statistics of the batch, and ReLU in the same pass. Ioffe, Szegedy:
-// Batch normalization, ICML 2015. Bits depend on shape and SIMD target, never on the workers.
+// Batch normalization, ICML 2015. Bits depend on shape and SIMD target, never on the number of
+// workers.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +12,7 @@ namespace tilegrad::nn {
 
 struct BatchNormShape {
   std::size_t batch = 1, channels = 1, pixels = 1;      // x and y: [batch, channels, pixels]
-  std::size_t count() const { return batch * pixels; }  // elements to a channel
+  std::size_t count() const { return batch * pixels; }  // elements per channel
   std::size_t size() const { return batch * channels * pixels; }
 };
 
@@ -24,7 +25,7 @@ struct BatchNormParameters {
 };
 
 // mean[c], variance[c] (divided by count()) of x; y = gamma (x - mean) / sqrt(variance + epsilon) +
-// beta, and 0 in place of what is below it if relu.
+// beta, clamped to >= 0 if relu.
 template <class T>
 struct BatchNormForwardProblem {
   BatchNormShape shape;
@@ -37,7 +38,7 @@ struct BatchNormForwardProblem {
 void BatchNormForward(const BatchNormForwardProblem<float>& problem, const Workers& workers);
 void BatchNormForward(const BatchNormForwardProblem<double>& problem, const Workers& workers);
 
-// With h = (x - mean) / sqrt(variance + epsilon), and d_y set to 0 where relu was at 0:
+// With h = (x - mean) / sqrt(variance + epsilon), and d_y set to 0 where relu clamped:
 //   d_gamma = sum d_y h,  d_beta = sum d_y,
 //   d_x = gamma / sqrt(variance + epsilon) (d_y - d_beta / count - h d_gamma / count).
 template <class T>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that batch_norm.h is held to. T: float, double or std::complex<double>.
+// Scalar reference of batch_norm.h. T: float, double or std::complex<double>.
 #pragma once
 
 #include <cmath>

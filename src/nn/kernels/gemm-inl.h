@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matrix product, blocked after Goto and van de Geijn: Anatomy of high-performance matrix
-// multiplication, ACM TOMS 34(3), 2008. A is packed once for all; every work item packs the slice
-// of B that it needs, a block at a time that stays in L2. A panel of A stays in L1 while the panels
-// of that block pass by.
+// multiplication, ACM TOMS 34(3), 2008. A is packed once for all work items; each packs the slice
+// of B that it needs, in blocks that stay in L2. A panel of A stays in L1 while the panels of that
+// block stream past.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_INL_H_
@@ -23,19 +23,19 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
 // Packs the large operand of a matrix product, a block of columns and steps at a time. With few
-// rows on the other side (a training batch), copying it and its cache misses would cost as much as
-// multiplying. So the tiles of the block before pack a B that is not transposed, a row of a panel
+// rows on the other side (a training batch), copying it with its cache misses would cost as much as
+// multiplying. So the tiles of the previous block pack a B that is not transposed, a row of a panel
 // every few steps. A transposed B is packed a whole block at a time, in runs as long as the block
-// is deep, which the tiles of the block before prefetch.
+// is deep, prefetched by the tiles of the previous block.
 
-// From one packed panel to the next. The line between them keeps the panels out of each other's
-// cache sets while a row is written to all of them.
+// Stride between packed panels. The extra line keeps panels out of each other's cache sets while a
+// row is written to all of them.
 constexpr std::size_t PackedPanelStride(std::size_t steps) {
   return kTileColumns * steps + kLineFloats;
 }
 
-// Columns [begin, end) and steps [k, k + steps) of B, packed: panels of kTileColumns, zeros behind
-// the last column.
+// Columns [begin, end) and steps [k, k + steps) of B, packed: panels of kTileColumns, zero-padded
+// after the last column.
 struct ColumnBlock {
   std::size_t begin = 0, end = 0;
   std::size_t k = 0, steps = 0;
@@ -144,18 +144,18 @@ class ColumnPacker {
     }
   }
 
-  // Of a B that is not transposed: packs all but a last panel of fewer columns in `runs` runs.
+  // For a B that is not transposed: packs all but a narrower last panel in `runs` runs.
   PanelCopier Copier(std::size_t runs) const {
     return PanelCopier(RowOf(0), p_.ldb, block_, packed_,
                        DivideUp(block_.steps * whole_panels(), runs));
   }
-  // Of a transposed B: prefetches the block in `runs` runs.
+  // For a transposed B: prefetches the block in `runs` runs.
   BlockFetcher Fetcher(std::size_t runs) const {
     const std::size_t columns = block_.end - block_.begin;
     return BlockFetcher(p_.b + block_.begin * p_.ldb + block_.k, p_.ldb, columns, block_.steps,
                         DivideUp(columns * DivideUp(block_.steps, kLineFloats), runs));
   }
-  // The last panel of fewer columns.
+  // The last panel, if it is narrower.
   HWY_NOINLINE void PackRest() const {
     const std::size_t column = whole_panels() * kTileColumns;
     const std::size_t rest = block_.end - block_.begin - column;
@@ -187,24 +187,24 @@ class ColumnPacker {
 // Steps of k in one block, for which C is read and written once. With vectors of 16 floats a tile
 // is so large that panels of B need not stay in L1, and deeper blocks are faster.
 constexpr std::size_t kDepth = kLanes > 8 ? 512 : 256;  // the best of 128 to 512 there
-constexpr std::size_t kBlockFloats = 65536;  // of B in one block; the next one shares L2 with it
+constexpr std::size_t kBlockFloats = 65536;  // of B per block; the next block shares L2 with it
 constexpr std::size_t kBlockPanels = kBlockFloats / (kDepth * kTileColumns);
-// Of a transposed B, as it lies in memory and packed: both stay in L2.
+// For a transposed B, in memory and packed: both stay in L2.
 constexpr std::size_t kFetchedPanels = std::max<std::size_t>(64 / kTileColumns, kLanes > 8 ? 2 : 4);
-constexpr std::size_t kItemRows = 4096;  // many: each work item packs its columns of B for itself
+constexpr std::size_t kItemRows = 4096;  // many: each work item packs its own columns of B
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
-// How C is cut into work items. The sum of an element does not depend on it, so it may depend on
-// the number of workers: with several, some eight items for each, narrower first, then shorter.
+// Division of C into work items. The sum of an element does not depend on it, so it may depend on
+// the number of workers: with several, some eight items each, first narrower, then shorter.
 struct GemmItems {
   std::size_t rows, columns;
 };
 
-constexpr std::size_t kLeastRows = 128;  // of an item, or packing B would weigh too much
+constexpr std::size_t kLeastRows = 128;  // of an item, or packing B would dominate
 constexpr std::size_t kFewItemWorkers = 4;
 
-// The fewest columns of an item. Each item streams all rows of A: where these are few and B is read
-// row by row, as many columns as one block has, provided every worker gets some. Many workers take
+// The fewest columns of an item. Each item streams all rows of A: if these are few and B is read
+// row by row, as many columns as a block has, provided every worker gets some. Many workers take
 // narrow items rather than none: a layer of 384 outputs has three wide ones.
 inline std::size_t LeastColumns(const GemmProblem<float>& p, std::size_t workers) {
   const std::size_t least = (workers > kFewItemWorkers ? 1 : 4) * kTileColumns;
@@ -236,14 +236,14 @@ struct GemmPlan {
     return {begin * kTileColumns, std::min(p.n, end * kTileColumns), 0, p.k};
   }
   std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
-  // The fewer steps, the more columns: a panel of A passes by once for each block.
+  // The fewer steps, the more columns: a panel of A streams past once per block.
   std::size_t block_panels() const {
     return p.transpose_b ? kFetchedPanels : kBlockPanels * (kDepth / depths.largest());
   }
   std::size_t packed_b_size() const {
     return std::min(column_blocks.largest(), block_panels()) * PackedPanelStride(depths.largest());
   }
-  // Of a worker: the columns in use and the next ones.
+  // Per worker: the current columns and the next.
   std::size_t worker_size() const { return RoundUp(2 * packed_b_size(), kAlignment); }
 
   GemmProblem<float> p;
@@ -254,8 +254,7 @@ struct GemmPlan {
   Panels passes;         // of those blocks: A is packed for one pass at a time
 };
 
-// Packs row panel `panel` of A for depth blocks [depth, end), one after the other, each of all
-// panels.
+// Packs row panel `panel` of A for depth blocks [depth, end), in sequence, each of all panels.
 inline void PackRowPanel(const GemmPlan& plan, std::size_t panel, std::size_t depth,
                          std::size_t end, float* packed) {
   const GemmProblem<float>& p = plan.p;
@@ -298,7 +297,7 @@ HWY_INLINE void ForTiles(std::size_t first, std::size_t rows, const ColumnBlock&
   }
 }
 
-// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one, a
+// The tiles of `rows` row panels from `first` on with the packed columns. Like the next one, a
 // separate function: within a large caller GCC 12 does not keep a tile's sums in registers.
 inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                        const float* packed_a, const ColumnPacker& columns) {
@@ -317,7 +316,7 @@ HWY_INLINE void MultiplyWithTask(const GemmPlan& plan, std::size_t first, std::s
   });
 }
 
-// How often: at least 1.
+// Number of task runs: at least 1.
 inline std::size_t TaskRuns(std::size_t rows, const ColumnBlock& block) {
   return std::max<std::size_t>(1, rows * block.panels() * (block.steps / kRunSteps));
 }
@@ -340,8 +339,8 @@ inline HWY_NOINLINE void MultiplyAndFetch(const GemmPlan& plan, std::size_t firs
   MultiplyWithTask(plan, first, rows, packed_a, columns, fetcher);
 }
 
-// The blocks of B that a work item processes, in order: all columns of a depth, as the rows
-// of B lie in memory, or all depths of some columns, as they lie in a transposed B.
+// The blocks of B that a work item processes, in memory order: all columns of a depth, the order of
+// the rows of B, or all depths of some columns, the order of a transposed B.
 class BlockOrder {
  public:
   // Depth blocks [depth, end) of the plan's column block `columns`.
@@ -395,7 +394,7 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
   }
 }
 
-// Row panels of A that one task packs: a small A is packed before others would have come.
+// Row panels of A per task: one worker packs a small A before others would have joined.
 inline std::size_t PackedPanels(const GemmPlan& plan) {
   constexpr std::size_t kAlone = 16384;  // floats
   return plan.packed_a_size() < kAlone ? std::max<std::size_t>(1, plan.rows.count()) : 1;

@@ -2,7 +2,7 @@
 // Product of dense float matrices, the kernel under linear layers.
 //
 // The result's bits depend on the shapes, the options and the SIMD target, never on the number of
-// workers: every element of C is summed by one worker in an order that the shape fixes.
+// workers: one worker sums each element of C in an order that depends on the shape only.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace tilegrad::nn {
 
-// C[m,n] = op(A)[m,k] op(B)[k,n] (+ C) (+ bias), all row-major. Rows of a matrix lie `ld...` floats
-// apart. C overlaps neither A, B nor the bias. Any of m, n, k may be 0; an empty sum is 0.
+// C[m,n] = op(A)[m,k] op(B)[k,n] (+ C) (+ bias), all row-major. Rows of a matrix are `ld...` floats
+// apart. C must not overlap A, B or the bias. Any of m, n, k may be 0; an empty sum is 0.
 template <class T>
 struct GemmProblem {
   std::size_t m = 0, n = 0, k = 0;

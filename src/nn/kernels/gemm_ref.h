@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that gemm.h is held to. T: float, double or std::complex<double>.
+// Scalar reference of gemm.h. T: float, double or std::complex<double>.
 #pragma once
 
 #include "nn/kernels/gemm.h"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The environment of every NN kernel, besides its operands: the workers it may use, scratch memory
-// and options.
+// The environment of every NN kernel besides its operands: workers, scratch memory and options.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +9,12 @@
 
 namespace tilegrad::nn {
 
-// Scratch memory of the kernels. It grows to the largest use and is then reused, so that repeating
-// the same calls allocates nothing. One kernel at a time may use it.
+// Scratch memory of the kernels. Grows to the largest use and is then reused, so that repeating the
+// same calls allocates nothing. Only one kernel at a time may use it.
 class KernelScratch {
  public:
-  // At least `count` numbers with unspecified contents, aligned to kAlignment, until the next call.
+  // At least `count` numbers with unspecified contents, aligned to kAlignment, valid until the next
+  // call.
   float* Floats(std::size_t count) { return Grown(floats_, count); }
   std::size_t* Indices(std::size_t count) { return Grown(indices_, count); }
   std::size_t bytes() const {
@@ -25,7 +25,7 @@ class KernelScratch {
   template <class T>
   static T* Grown(AlignedVector<T>& buffer, std::size_t count) {
     if (buffer.size() < count) {
-      buffer = {};  // frees before it allocates: the old contents are not kept
+      buffer = {};  // frees before it allocates: discards the old contents
       buffer.resize(count);
     }
     return buffer.data();
@@ -37,7 +37,7 @@ class KernelScratch {
 struct KernelContext {
   const Workers& workers;
   KernelScratch& scratch;
-  // Convolutions may multiply less and round a little more: winograd.h.
+  // Convolutions may use fewer multiplications with slightly more rounding: winograd.h.
   bool winograd = true;
 };
 

@@ -33,7 +33,7 @@ inline std::vector<double> Magnitudes(const std::vector<float>& v) {
 
 // gamma_n = n u / (1 - n u), u = 2^-24: a sum of products in any order, with or without fused
 // multiply-add, differs from the exact one by at most gamma_n sum |a_i b_i|, n the most roundings
-// that one product passes through (Higham, Accuracy and Stability of Numerical Algorithms, 2nd
+// that one product goes through (Higham, Accuracy and Stability of Numerical Algorithms, 2nd
 // edition, sections 3.1 and 4.2): its own, one for each of the additions.
 inline double Gamma(std::size_t n) {
   const double nu = static_cast<double>(n) * 0x1.0p-24;
@@ -49,8 +49,8 @@ inline double RootMeanSquareError(const std::vector<float>& got, const std::vect
   return std::sqrt(sum / static_cast<double>(got.size()));
 }
 
-// A convolution with random operands: all three results of the kernels, and the reference's. For
-// proofs, as kernel_trial.h.
+// A convolution with random operands, and all three results of the kernels and of the reference.
+// For proofs, as kernel_trial.h.
 
 struct Conv2dOperands {
   std::vector<float> x, weight, bias, d_y;
@@ -78,7 +78,7 @@ inline Conv2dResults RunConv2d(const Conv2dShape& s, const Conv2dOperands& o,
   const Workers workers(options.workers);
   KernelScratch scratch;
   const KernelContext context{workers, scratch, options.winograd};
-  const float poison = std::numeric_limits<float>::quiet_NaN();  // all of it must be overwritten
+  const float poison = std::numeric_limits<float>::quiet_NaN();  // must be overwritten completely
   Conv2dResults r{std::vector<float>(s.out_size(), poison), std::vector<float>(s.in_size(), poison),
                   std::vector<float>(s.weight_size(), poison)};
   Conv2dForward(s, o.x.data(), o.weight.data(), options.bias ? o.bias.data() : nullptr, r.y.data(),
@@ -104,8 +104,8 @@ inline Conv2dTruth RunConv2dReference(const Conv2dShape& s, const Conv2dOperands
   return r;
 }
 
-// The most roundings that a product passes through in the direct kernels: those of one sum, plus
-// bias, plus the additions of blocks (at most one a channel, or one an image row for the weights)
+// The most roundings that a product goes through in the direct kernels: those of one sum, plus
+// bias, plus the additions of blocks (at most one per channel, or per image row for the weights)
 // into the result.
 struct Conv2dRoundings {
   explicit Conv2dRoundings(const Conv2dShape& s)

@@ -70,8 +70,7 @@ struct PackedColumns {
   HWY_INLINE void Advance() { next += kTileColumns; }
 };
 
-// Of k, from one run of a task to the next: some 50 to 100 cycles. With 16 lanes the best of 2
-// to 8.
+// Steps of k between runs of a task: some 50 to 100 cycles. With 16 lanes the best of 2 to 8.
 constexpr std::size_t kRunSteps = kLanes > 8 ? 4 : 8;
 
 // A packed panel; `task` runs every kRunSteps steps, in issue slots for loads, stores and integer
@@ -92,14 +91,14 @@ struct IndirectColumns {
   HWY_INLINE void Advance() { ++offset; }
 };
 
-// Where a tile goes: row r, vector v to c[r * ldc + offset[v]], of which count[v] lanes exist.
+// Destination of a tile: row r, vector v at c[r * ldc + offset[v]], with count[v] valid lanes.
 struct TileTarget {
   float* c;
   std::size_t ldc;
   std::array<std::size_t, kMostTileVectors> offset;
   std::array<std::size_t, kMostTileVectors> count;
-  const float* row_bias = nullptr;     // one float a row, or none
-  const float* column_bias = nullptr;  // one float a column, at the same offsets as in c, or none
+  const float* row_bias = nullptr;     // one float per row, or null
+  const float* column_bias = nullptr;  // one float per column, at the same offsets as in c, or null
   bool accumulate = false;
 };
 
@@ -110,7 +109,7 @@ HWY_INLINE Vec WithBiasAndOld(Vec sum, const TileTarget& t, std::size_t row, con
   return t.accumulate ? hn::Add(hn::LoadU(Tag(), c), sum) : sum;
 }
 
-// Through a copy, without touching memory beyond the existing lanes.
+// Through a copy, without touching memory beyond the valid lanes.
 inline HWY_NOINLINE void StorePartialVector(Vec sum, const TileTarget& t, std::size_t row,
                                             std::size_t v) {
   HWY_ALIGN float bias[kLanes] = {}, c[kLanes] = {};
@@ -142,8 +141,8 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   Vec sum[R][V];
 
   HWY_INLINE void Clear() { (ClearRow<row>(), ...); }
-  // sum += rows columns^T over `steps` steps of k. The compiler unrolls a run whole, with an exit
-  // after each step. (As a function of its own it came out 2 to 3 % slower in products.)
+  // sum += rows columns^T over `steps` steps of k. The compiler unrolls a run completely, with an
+  // exit after each step. (As a separate function it made products 2 to 3 % slower.)
   template <class Rows, class Columns>
   HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
     constexpr bool kBusy = requires { columns.task; };
@@ -176,8 +175,8 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 
  private:
-  // If a register is left beside the sums, V vectors of columns and one of a row, two steps are
-  // joined, so that the second one's loads may go first. Otherwise they would spill sums, and the
+  // If a register is left beside the sums, V vectors of columns and one of a row, joins two steps,
+  // so that the second one's loads may be scheduled earlier. Otherwise sums would spill, and the
   // exits of a run keep steps apart. docs/lab.md has the effect of either.
   static constexpr bool kSparesRegister = R * V + V + 1 < kRegisters;
 
@@ -242,7 +241,7 @@ HWY_INLINE void PackedRowsTile(const float* packed, std::size_t rows, Columns co
 
 // Packs a strip of a matrix in the order in which the micro-kernel reads it.
 
-// Four numbers of one row, or of rows i and i + 4, side by side.
+// Four numbers of one row, or of rows i and i + 4, concatenated.
 template <class D>
 HWY_INLINE hn::Vec<D> LoadFours(D d, const float* in, std::size_t in_stride) {
   if constexpr (hn::MaxLanes(d) == 4) {
@@ -278,7 +277,7 @@ HWY_INLINE void TransposeStripBy(D d, const float* in, std::size_t in_stride, st
                                  std::size_t steps, float* out, std::size_t out_stride) {
   const std::size_t lanes = hn::Lanes(d);
   for (std::size_t i = 0; i < rows; i += lanes) {
-    const std::size_t row = std::min(i, rows - lanes);  // may overlap the block before it
+    const std::size_t row = std::min(i, rows - lanes);  // may overlap the previous block
     for (std::size_t k = 0; k < steps; k += 4) {
       TransposeFours(d, in + row * in_stride + k, in_stride, out + k * out_stride + row,
                      out_stride);
@@ -309,7 +308,7 @@ HWY_INLINE void CopyStripBy(D d, const float* in, std::size_t in_stride, std::si
   const std::size_t lanes = hn::Lanes(d), last = rows - lanes;
   for (std::size_t k = 0; k < steps; ++k, in += in_stride, out += out_stride) {
     for (std::size_t i = 0; i < last; i += lanes) hn::StoreU(hn::LoadU(d, in + i), d, out + i);
-    hn::StoreU(hn::LoadU(d, in + last), d, out + last);  // may overlap the one before
+    hn::StoreU(hn::LoadU(d, in + last), d, out + last);  // may overlap the previous one
   }
 }
 
@@ -324,7 +323,7 @@ inline void CopyStrip(const float* in, std::size_t in_stride, std::size_t rows, 
   }
 }
 
-// A matrix op(M) as the packers see it: `transposed` says that rows, not steps, are contiguous.
+// A matrix op(M) for the packers: if `transposed`, rows are contiguous, not steps.
 struct PackSource {
   const float* data;
   std::size_t ld;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a range is cut into nearly equal parts. The cut depends on the sizes alone.
+// Divides a range into nearly equal parts. The division depends on the sizes alone.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ class Panels {
  public:
   Panels(std::size_t total, std::size_t limit) : Panels(Count{DivideUp(total, limit)}, total) {}
 
-  // The same as `count` parts, 0 < count <= total.
+  // The same in `count` parts, 0 < count <= total.
   static Panels Parts(std::size_t total, std::size_t count) { return Panels(Count{count}, total); }
 
   std::size_t count() const { return count_; }
@@ -26,7 +26,7 @@ class Panels {
   struct Range {
     std::size_t begin, end;
   };
-  // [begin, end) of a panel, counted from `origin`.
+  // [begin, end) of a panel, relative to `origin`.
   Range range(std::size_t panel, std::size_t origin = 0) const {
     return {origin + begin(panel), origin + begin(panel + 1)};
   }

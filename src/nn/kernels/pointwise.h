@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Element-by-element functions, and binary ones with broadcasting. Bits depend on the operands and
-// the SIMD target, never on the number of workers.
+// Elementwise functions, and binary ones with broadcasting. Bits depend on the operands and the
+// SIMD target, never on the number of workers.
 #pragma once
 
 #include <array>
@@ -46,7 +46,7 @@ struct UnaryProblem {
 };
 
 // y[i0,..,i4] = f(a[sum i strides_a], b[sum i strides_b]); y is dense. The last axis has strides 0
-// or 1; axes that are not used have extent 1.
+// or 1; unused axes have extent 1.
 template <class T>
 struct BinaryProblem {
   static constexpr int kRank = 5;
@@ -55,7 +55,7 @@ struct BinaryProblem {
   std::array<std::size_t, kRank> strides_a{}, strides_b{};
   const T* a = nullptr;
   const T* b = nullptr;
-  T* y = nullptr;  // may be a or b where that one is dense
+  T* y = nullptr;  // may be a or b if that one is dense
   double p = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that pointwise.h is held to. T: float, double or std::complex<double>; a complex
-// number is compared by its real part, which is what a complex step needs.
+// Scalar reference of pointwise.h. T: float, double or std::complex<double>; complex numbers
+// compare by their real parts, as a complex step requires.
 #pragma once
 
 #include <cmath>
@@ -16,8 +16,8 @@ double RealPart(const T& x) {
   return static_cast<double>(std::real(x));
 }
 
-// log(1 + x) without cancellation. Of complex numbers, whose real part a complex step does not
-// read, by the plain formula.
+// log(1 + x) without cancellation. For complex numbers, whose real part a complex step does not
+// read, the plain formula.
 template <class T>
 T Log1pOf(const T& x) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -84,7 +84,7 @@ T BinaryRef(BinaryOp op, T a, T b, double p) {
   return a;
 }
 
-// Where row `row` (all axes but the last) of each operand begins.
+// Offset of row `row` (all axes but the last) in each operand.
 struct RowOffsets {
   std::size_t a = 0, b = 0;
 };

@@ -24,15 +24,15 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// A work item packs its columns of B for itself; rows of as many columns are long enough for
-// memory. A group of rows of C, two of them, stay in L2 beside those columns.
+// Each work item packs its own columns of B; rows of that many columns are long enough for memory.
+// Two groups of rows of C stay in L2 beside those columns.
 constexpr GemmItems kUpdateItems{.rows = 256, .columns = 1024};
-// Down to this, so that many workers have two each of a matrix that is not large.
+// The minimum, so that many workers have two items each of a smaller matrix.
 constexpr GemmItems kLeastUpdateItems{.rows = 32, .columns = 256};
 constexpr std::size_t kEnoughItemsFor = 4;  // workers
 constexpr std::size_t kGroupPanels = 2;     // row panels in a group: the best of 1 to 8
 
-static_assert(kMostProductAdamSteps <= kDepth);  // or a group would be summed in several passes
+static_assert(kMostProductAdamSteps <= kDepth);  // else a group would be summed in several passes
 
 inline GemmItems UpdateItemsFor(const GemmProblem<float>& p, std::size_t workers) {
   GemmItems items = kUpdateItems;
@@ -52,7 +52,7 @@ struct ProductAdamPlan {
         adam(problem),
         rule(problem.coefficients) {}
 
-  // Between rows of a group: a line more than they have, so that they do not share cache sets.
+  // Stride between rows of a group: one extra line, so that they do not share cache sets.
   std::size_t group_ld() const { return gemm.column_blocks.largest() * kTileColumns + kLineFloats; }
   std::size_t group_size() const {
     return RoundUp(kGroupPanels * gemm.rows.largest() * group_ld(), kAlignment);
@@ -60,7 +60,7 @@ struct ProductAdamPlan {
   std::size_t packed_b_size() const {
     return RoundUp(gemm.column_blocks.largest() * PackedPanelStride(gemm.p.k), kAlignment);
   }
-  // Of a worker: packed columns, the group that is computed and the one that Adam uses.
+  // Per worker: packed columns, the group being computed and the one that Adam uses.
   std::size_t worker_size() const { return packed_b_size() + 2 * group_size(); }
 
   GemmPlan gemm;
@@ -72,8 +72,8 @@ struct ProductAdamPlan {
 // between tiles, so that its prefetches arrive while a tile is computed.
 class GroupUpdater {
  public:
-  GroupUpdater() = default;  // of no rows
-  // gradient: of these rows and columns; rows lie plan.group_ld() apart.
+  GroupUpdater() = default;  // no rows
+  // gradient: for these rows and columns; rows are plan.group_ld() apart.
   GroupUpdater(const ProductAdamPlan& plan, Panels::Range rows, const ColumnBlock& columns,
                const float* gradient)
       : plan_(&plan),
@@ -92,7 +92,7 @@ class GroupUpdater {
   }
 
  private:
-  // The next `count` numbers of the present row, or all that it has left.
+  // The next `count` numbers of the current row, or the rest of it.
   HWY_INLINE void Update(std::size_t count) {
     const AdamRule rule = plan_->rule;
     const std::size_t ld = plan_->gemm.p.n, at = row_ * ld + begin_;
@@ -122,7 +122,8 @@ class GroupUpdater {
   const float* gradient_ = nullptr;
 };
 
-// Row panels [first, end) of the packed columns, into `group`, interleaved with Adam over `before`.
+// Multiplies row panels [first, end) with the packed columns into `group`, interleaved with Adam
+// over `before`.
 inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Range panels,
                                        const float* packed_a, const ColumnPacker& columns,
                                        float* group, GroupUpdater& before) {
@@ -164,7 +165,7 @@ inline void UpdateItem(const ProductAdamPlan& plan, std::size_t item, const floa
   updater.Finish();
 }
 
-// The plans of several steps, and where what they share lies.
+// The plans of several steps, and the addresses of what they share.
 struct ProductAdamPlans {
   ProductAdamPlans(std::span<const ProductAdamProblem> problems, std::size_t workers)
       : count(problems.size()) {
@@ -178,7 +179,7 @@ struct ProductAdamPlans {
     }
   }
 
-  // Calls run(plan number, index in the plan) for number `at` of those that `ends` counts.
+  // Calls run(plan number, index in the plan) for item `at`, where `ends` counts items.
   template <class Ends, class Run>
   void In(const Ends& ends, std::size_t at, const Run& run) const {
     std::size_t i = 0;

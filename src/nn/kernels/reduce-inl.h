@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of reduce.h. Where the last axis is reduced, lanes run along it; where it is kept,
-// each lane sums its own output.
+// Vector body of reduce.h. If the last axis is reduced, lanes run along it; if it is kept, each
+// lane sums its own output.
 #if defined(TILEGRAD_NN_REDUCE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_REDUCE_INL_H_
 #undef TILEGRAD_NN_REDUCE_INL_H_

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums and extrema over axes. Bits depend on the shape and the SIMD target, never on the number of
-// workers: every output is summed by one worker in an order that the shape fixes.
+// workers: one worker sums each output in an order that depends on the shape only.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace tilegrad::nn {
 
-// x seen as [k0, r0, k1, r1, k2, r2] (row-major): kept and reduced axes in turn, extent 1 where
-// there is none. y is [k0, k1, k2].
+// x viewed as [k0, r0, k1, r1, k2, r2] (row-major): kept and reduced axes alternate, with extent 1
+// for absent ones. y is [k0, k1, k2].
 struct ReduceLayout {
   std::array<std::size_t, 3> kept = {1, 1, 1};
   std::array<std::size_t, 3> reduced = {1, 1, 1};
@@ -21,7 +21,7 @@ struct ReduceLayout {
   std::size_t inputs_each() const { return reduced[0] * reduced[1] * reduced[2]; }
 };
 
-// y = sum of x over the reduced axes; 0 where there is nothing to sum.
+// y = sum of x over the reduced axes; 0 for an empty sum.
 void ReduceSum(const ReduceLayout& layout, const float* x, float* y, const Workers& workers);
 void ReduceSum(const ReduceLayout& layout, const double* x, double* y, const Workers& workers);
 

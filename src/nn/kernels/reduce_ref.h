@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that reduce.h is held to. T: float, double or std::complex<double> (sums only).
+// Scalar reference of reduce.h. T: float, double or std::complex<double> (sums only).
 #pragma once
 
 #include "nn/kernels/reduce.h"
 
 namespace tilegrad::nn {
 
-// Where the elements of output `o` lie: x[base + i0 steps[0] + i1 steps[1] + i2], i < reduced.
+// Addresses of the elements of output `o`: x[base + i0 steps[0] + i1 steps[1] + i2], i < reduced.
 struct ReduceAddress {
   std::size_t base;
   std::array<std::size_t, 2> steps;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of sample_colors.h: lanes run over vertices, the numbers of a cell are the same in
-// all.
+// Vector body of sample_colors.h: lanes are vertices, the numbers of a cell are broadcast.
 #if defined(TILEGRAD_NN_SAMPLE_COLORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
 #undef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
@@ -23,8 +22,8 @@ using Tag = hn::ScalableTag<float>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kMostLanes = hn::MaxLanes(Tag());
 
-// CellWeights, of as many vertices as there are lanes. Far centres are brought to kFarthest, where
-// no bell reaches the picture, and have no gradient there.
+// CellWeights for a vector of vertices. Far centres are clamped to kFarthest, where no bell reaches
+// the picture, and have no gradient there.
 struct LaneWeights {
   static constexpr float kFarthest = 1e6f;
   HWY_ALIGN float w[kColorCells * kMostLanes], offset[kColorCells * kMostLanes];
@@ -42,7 +41,7 @@ struct LaneWeights {
   }
   HWY_INLINE Vec At(std::size_t i) const { return hn::Load(Tag(), w + i * hn::Lanes(Tag())); }
 
-  // What arrives through `by_w`, the derivatives by w.
+  // Back-propagates `by_w`, the derivatives by w.
   HWY_INLINE void Backward(const float* by_w, Vec tau, Vec* by_mean, Vec* by_tau) const {
     const Tag d;
     *by_mean = hn::Zero(d);
@@ -57,7 +56,7 @@ struct LaneWeights {
   }
 };
 
-// SampledColor, of as many vertices as there are lanes.
+// SampledColor for a vector of vertices.
 struct LaneColors {
   const ColorCells<float>& cells;
   Vec wide, tau, gain, sum[4];
@@ -150,7 +149,7 @@ struct LaneColors {
   }
 };
 
-// Calls run(first vertex, how many) of each vector of vertices; the last may hold fewer.
+// Calls run(first vertex, count) for each vector of vertices; the last may hold fewer.
 template <class Run>
 HWY_INLINE void ForVectors(std::size_t vertices, const Run& run) {
   const std::size_t lanes = hn::Lanes(Tag());

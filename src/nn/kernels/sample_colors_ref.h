@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scalar truth of sample_colors.h: one vertex, forward and backward.
+// Scalar reference of sample_colors.h: one vertex, forward and backward.
 #pragma once
 
 #include <array>
@@ -10,15 +10,14 @@
 namespace tilegrad::nn {
 
 inline constexpr std::size_t kColorCells = 16;  // along each side of the picture
-// Weight of a cell that is far away: every cell has some, so the mean exists wherever the centre
-// is.
+// Weight of far cells: every cell has some, so the mean exists wherever the centre is.
 inline constexpr double kFarWeight = 1e-4;
 
-// Least variance of the bell: a cell's side, squared. Below kWidest all cells weigh alike.
+// Least variance of the bell: a cell's side, squared. Below kWidest all cells have equal weight.
 inline constexpr double kLeastVariance = 4.0 / (kColorCells * kColorCells), kWidest = -20;
-inline constexpr double kNothing = 1e-12;  // added to the cover that is seen: nothing is black
+inline constexpr double kNothing = 1e-12;  // added to the visible coverage: nothing is black
 
-// Premultiplied RGBA of the cells, one row after the other.
+// Premultiplied RGBA of the cells, row by row.
 template <class T>
 using ColorCells = std::array<std::array<T, 4 * kColorCells>, kColorCells>;
 
@@ -27,7 +26,7 @@ T CellCentre(std::size_t i) {
   return T((2.0 * static_cast<double>(i) + 1) / kColorCells - 1);
 }
 
-// One picture's vertices. What a pass does not need is null.
+// One picture's vertices. Null for what a pass does not need.
 template <class T>
 struct ColorSpans {
   std::size_t vertices;
@@ -50,7 +49,7 @@ struct CellWeights {
       w[i] = bell[i] + T(kFarWeight);
     }
   }
-  // Adds to the derivatives by mean and tau what arrives through d, the derivatives by w.
+  // Adds to the derivatives by mean and tau, given d, the derivatives by w.
   void Backward(const std::array<T, kColorCells>& d, T tau, T* d_mean, T* d_tau) const {
     for (std::size_t i = 0; i < kColorCells; ++i) {
       *d_mean += d[i] * bell[i] * 2 * tau * offset[i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shared by the vector bodies of this folder: the float vector, tails, sums in a fixed order.
+// Shared by the vector bodies of this folder: the float vector, tails, sums in fixed order.
 #if defined(TILEGRAD_NN_VECTOR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_VECTOR_INL_H_
 #undef TILEGRAD_NN_VECTOR_INL_H_
@@ -18,7 +18,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::ScalableTag<float>;
 using VF = hn::Vec<DF>;
 
-// The first `count` < Lanes(d) numbers; the other lanes are 0. Never touches what lies beyond.
+// The first `count` < Lanes(d) numbers; the other lanes are 0. Never touches memory beyond.
 HWY_INLINE VF LoadTail(DF d, const float* from, std::size_t count) {
   HWY_ALIGN float lanes[hn::MaxLanes(DF())] = {};
   for (std::size_t i = 0; i < count; ++i) lanes[i] = from[i];
@@ -31,7 +31,7 @@ HWY_INLINE void StoreTail(VF v, DF d, float* to, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) to[i] = lanes[i];
 }
 
-// A whole vector or, where count < Lanes(d), a tail.
+// A whole vector or, if count < Lanes(d), a tail.
 HWY_INLINE VF LoadSome(DF d, const float* from, std::size_t count) {
   return HWY_LIKELY(count >= hn::Lanes(d)) ? hn::LoadU(d, from) : LoadTail(d, from, count);
 }
@@ -46,7 +46,7 @@ HWY_INLINE void StoreSome(VF v, DF d, float* to, std::size_t count) {
 
 HWY_INLINE float SumLanes(DF d, VF v) { return hn::GetLane(hn::SumOfLanes(d, v)); }
 
-// Four independent sums hide the latency of the addition (4 cycles, 2 a cycle on AVX2 machines).
+// Four independent sums hide the latency of addition (4 cycles, 2 per cycle on AVX2 machines).
 struct RowSum {
   DF d;
   VF s0, s1, s2, s3;

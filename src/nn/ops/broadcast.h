@@ -9,10 +9,10 @@
 
 namespace tilegrad::nn {
 
-// The shape that a and b are repeated to; false if they do not fit.
+// The shape to which a and b are broadcast; false if they do not match.
 bool BroadcastShape(const Shape& a, const Shape& b, Shape& result);
 
-// Axes merged where both operands allow it, so that loops are few and long. Unused leading axes
+// Merges axes where both operands allow it, so that loops are few and long. Unused leading axes
 // have extent 1; an axis along which an operand is repeated has stride 0.
 struct Broadcast {
   using Extents = std::array<std::size_t, Shape::kMaxRank>;

@@ -54,8 +54,8 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   s.kernel_height = size(e.weight[2]);
   s.kernel_width = size(e.weight[3]);
   s.padding = static_cast<std::size_t>(options.padding);
-  // A step beyond the padded image leaves one pixel, as any longer one does; the kernels' tables
-  // grow with the square of the stride.
+  // A step beyond the padded image leaves one pixel, like any longer one; the kernels' tables grow
+  // with the square of the stride.
   const Shape padded = PaddedShape(e.x, options.padding);
   s.stride = size(
       std::min<std::int64_t>(options.stride, std::max({padded[2], padded[3], std::int64_t{1}})));
@@ -179,8 +179,8 @@ Var Conv2dWeightGrad(const Var& x, const Var& dy, ImageSize kernel, const ConvOp
 
 namespace {
 
-// Where the largest element of each window of an image lies. Nothing is computed, and a window's
-// few elements lie in few cache lines, so there is no vector body.
+// The position of the largest element in each window of an image. There is no arithmetic, and a
+// window's few elements lie in few cache lines, so there is no vector body.
 
 struct PoolShape {
   std::size_t planes = 1, height = 1, width = 1;  // x: [planes, height, width]

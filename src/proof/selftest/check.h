@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a check of `tilegrad selftest` is, and how its numbers are compared. A check computes with
-// the code that it checks, passes every result through CheckContext::Take, and holds it to a
-// formula or to a slower and simpler computation, within a tolerance that stands beside it.
+// The checks of `tilegrad selftest`, and how they compare numbers. A check runs the code under
+// test, passes every result through CheckContext::Take, and compares it with a formula or a slower
+// and simpler computation, within a tolerance stated beside it.
 #pragma once
 
 #include <cmath>
@@ -24,9 +24,9 @@ using Numbers = std::variant<std::span<float>, std::span<double>, std::span<std:
 
 struct CheckContext {
   const Workers& workers;
-  std::vector<std::string> targets;  // SIMD targets to check, names as RunnableTargets has them
-  // Receives each result before its check and may alter it: so tests see that the check
-  // then fails. The program has none.
+  std::vector<std::string> targets;  // SIMD targets to check, named as in RunnableTargets
+  // Receives each result before its check and may alter it, so that tests can see that the check
+  // then fails. Empty in the program.
   std::function<void(std::string_view what, const Numbers& numbers)> tamper = {};
 
   template <class Vector>
@@ -35,10 +35,10 @@ struct CheckContext {
   }
 };
 
-// What a check found that holds.
+// The result of a check that holds.
 struct Finding {
-  std::string text;  // "off by 1.2e-07, allowed 6.0e-05"
-  double share = 0;  // of what is allowed, used by the number that is off the most; 0: none is
+  std::string text;              // "off by 1.2e-07, allowed 6.0e-05"
+  double share = 0;              // largest deviation as a fraction of what is allowed; 0: exact
   std::string fingerprint = {};  // 8 hexadecimal digits of the bits of all results, or empty
 };
 
@@ -47,12 +47,12 @@ struct Check {
   std::function<Result<Finding>(const CheckContext&)> run;  // error: what is wrong, and by how much
 };
 
-// The check on each target of the context. Finds what the target found whose numbers are off the
-// most; errors name the target.
+// The check on each target of the context. Reports the finding with the largest deviation; errors
+// name the target.
 Check OnEveryTarget(const Check& check);
 
-// Compares results with what they must be, and remembers the worst. Errors name the first number
-// that is too far off; NaN is.
+// Compares results with expected values and keeps the worst deviation. Errors name the first number
+// that is too far off; NaN always is.
 class Gauge {
  public:
   // |got - want| <= allowed, number by number; infinities must agree.
@@ -61,8 +61,8 @@ class Gauge {
     return ExpectEach(what, got, want, [allowed](std::size_t) { return allowed; });
   }
 
-  // The same with `share` of the largest |want| as what is allowed. That must not be 0: a
-  // comparison of nothing but zeros proves nothing.
+  // The same, allowing `share` of the largest |want|, which must not be 0: a comparison of zeros
+  // proves nothing.
   template <class Got, class Want>
   Status ExpectOfLargest(std::string_view what, const Got& got, const Want& want, double share) {
     double most = 0;
@@ -92,22 +92,22 @@ class Gauge {
  private:
   Status Add(std::string_view what, std::size_t index, double got, double want, double allowed);
 
-  double share_ = 0, off_ = 0, allowed_ = 0;  // of the worst
+  double share_ = 0, off_ = 0, allowed_ = 0;  // of the worst number
 };
 
-// Errors name the first number whose bits differ: those of 0 and -0 do.
+// Errors name the first number whose bits differ (0 and -0 do).
 Status ExpectSameBits(std::string_view what, std::span<const float> got,
                       std::span<const float> want);
 
 std::vector<Check> TriangleChecks();    // images of one triangle against closed formulas
 std::vector<Check> SphereChecks();      // every gradient against float64, and that against steps
-std::vector<Check> AlphaBoundChecks();  // the bound on alpha, and any order of faces
+std::vector<Check> AlphaBoundChecks();  // the bound on alpha, and independence of face order
 std::vector<Check> SameBitsChecks();    // threads, batches
-std::vector<Check> ExtremeChecks();     // degenerate scenes, numbers that are none
+std::vector<Check> ExtremeChecks();     // degenerate scenes, numbers that are not finite
 std::vector<Check> KernelChecks();      // products and convolutions of networks
-std::vector<Check> TrainingChecks();    // the gradient penalty, and steps of training
-std::vector<Check> FileChecks();        // written and read back
-std::vector<Check> MetricChecks();      // scores that are known
+std::vector<Check> TrainingChecks();    // the gradient penalty, and training steps
+std::vector<Check> FileChecks();        // write and read back
+std::vector<Check> MetricChecks();      // scores with known values
 
 std::vector<Check> AllChecks();  // in this order
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that formulas are not made for: numbers stay numbers. Numbers that are none are errors
-// that say where.
+// Degenerate scenes: results stay finite. Input that is not finite is an error that says where.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,8 +15,8 @@
 namespace tilegrad::selftest {
 namespace {
 
-// Faces without area, seen from the edge, behind the camera, through its plane and far beyond the
-// image; colours, so that there is more than a silhouette.
+// Faces without area, edge-on, behind the camera, through its plane and far beyond the image; with
+// colours, to cover more than silhouettes.
 OwnedScene<float> DegenerateScene() {
   OwnedScene<float> scene;
   scene.mesh.positions = {0,     0,     -1, 0,     0,     -1, 0,    0,     -1, 1, 0,    -2,
@@ -61,14 +60,14 @@ Result<Finding> DegenerateFaces(const CheckContext& context) {
   for (const double delta : {1e-12, 1e-3, 1e6}) {
     const std::string place = fmt::format("delta {}", delta);
     TILEGRAD_TRY(CheckFinite(context, DegenerateScene(), delta).Within(place));
-    auto flat = MakeSphere({.width = 64, .height = 64});  // a sphere without thickness
+    auto flat = MakeSphere({.width = 64, .height = 64});  // a flattened sphere
     for (std::size_t i = 0; i < flat.mesh.positions.size(); i += 3) flat.mesh.positions[i] = 0;
     TILEGRAD_TRY(CheckFinite(context, flat, delta).Within(place + ", flat"));
   }
   return Finding{"finite"};
 }
 
-// A scene with one number that is none, and what must stand in the error.
+// A scene with one number that is not finite, and the expected text of the error.
 struct BadNumber {
   const char* place;
   float* (*number)(OwnedScene<float>*);
@@ -114,8 +113,8 @@ std::vector<Check> ExtremeChecks() {
           OnEveryTarget({"NaN and infinity in a scene", NumbersThatAreNone})};
 }
 
-// |alpha - equation 6 over all faces| is at most what the renderer says that it spent, which is at
-// most what it was allowed; in any order of faces.
+// |alpha - equation 6 over all faces| is at most the reported error, which is at most the allowed
+// one; in any order of faces.
 
 namespace {
 
@@ -130,8 +129,8 @@ struct BoundCase {
 };
 constexpr BoundCase kCases[] = {{1e-2, 8.4e-5, {1e-2, 1e-3, 0}}, {1e-3, 2.3e-4, {1e-2, 1e-3, 0}}};
 
-// A small sphere, so that there is much of everything that may be dropped: faces that are far from
-// pixels, from blocks and from whole tiles of them.
+// A small sphere, with many faces of every kind that may be dropped: far from pixels, from blocks
+// and from whole tiles of them.
 struct BoundScene {
   OwnedMesh<float> mesh;
   RenderOptions options;
@@ -166,7 +165,7 @@ Result<std::vector<double>> TrueAlpha(const BoundScene& scene) {
   return std::vector<double>(frame.alpha.begin(), frame.alpha.end());
 }
 
-// What is dropped lowers alpha, so that above it there is only rounding.
+// Dropping lowers alpha, so only rounding can raise it.
 Status CheckBound(const CheckContext& context, const BoundScene& scene, double rounding,
                   const std::vector<double>& want, Gauge* gauge) {
   Frame frame;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that are written and read back, in a folder that is gone afterwards.
+// Files written and read back, in a folder that is removed afterwards.
 #include <cstdlib>
 #include <cstring>
 
@@ -13,7 +13,7 @@
 namespace tilegrad::selftest {
 namespace {
 
-// A new folder where temporary files go; it is removed with all that is in it.
+// A new temporary folder, removed with its contents at the end.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -28,7 +28,7 @@ class TemporaryFolder {
     path_ = name;
   }
   ~TemporaryFolder() {
-    std::error_code error;  // nobody to tell
+    std::error_code error;  // errors are ignored
     if (status_.ok()) std::filesystem::remove_all(path_, error);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
@@ -69,7 +69,7 @@ Mesh TexturedSphere() {
   return mesh;
 }
 
-// Positions and uv of all corners, as files may split or join vertices.
+// Positions and uv of all corners, since files may split or join vertices.
 struct Corners {
   std::vector<float> positions, uvs;
 
@@ -99,7 +99,7 @@ Status ExpectBytes(const CheckContext& context, std::string_view what,
   return Gauge().Expect(what, got, want, 0);
 }
 
-// The file counts v from the top: 1 - v rounds twice, by 2^-25 each time.
+// The file measures v from the top: 1 - v rounds twice, by 2^-25 each time.
 Result<Finding> Glb(const CheckContext& context) {
   const TemporaryFolder folder;
   TILEGRAD_TRY(folder.status());
@@ -113,7 +113,7 @@ Result<Finding> Glb(const CheckContext& context) {
   return Finding{"written and read back"};
 }
 
-// Numbers with nine digits are read as they were.
+// Numbers with nine digits round-trip exactly.
 std::string ObjText(const Mesh& mesh) {
   std::string text;
   for (const glm::vec3& p : mesh.positions) {

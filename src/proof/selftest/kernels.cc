@@ -11,7 +11,7 @@
 namespace tilegrad::selftest {
 namespace {
 
-// Extents with tails, blocks of depth, and operands as layers and their gradients have them.
+// Extents with tails, blocks of depth, and operands as in layers and their gradients.
 struct ProductCase {
   std::size_t m, n, k;
   bool transpose_a, transpose_b;
@@ -119,8 +119,8 @@ constexpr nn::Conv2dShape kWinograd[] = {{2, 20, 9, 10, 16, 3, 3, 1, 1},
                                          {1, 16, 12, 9, 18, 5, 5, 2, 2}};
 
 // The transforms cost some accuracy: root mean square errors are 0.6 to 2.4 times those of the
-// direct kernels (winograd.h), which the check before holds to their bound. 4 times are
-// allowed; a term that is wrong makes tens of thousands.
+// direct kernels (winograd.h), whose bound the previous check tests. Allows 4 times; a wrong term
+// gives tens of thousands.
 Status CheckWinograd(const CheckContext& context, const nn::Conv2dShape& s, Gauge* gauge) {
   if (!nn::WinogradFits(s)) return InternalError("is not taken by Winograd's algorithm");
   const nn::Conv2dOperands o = nn::RandomConv2dOperands(s, 8);
@@ -158,7 +158,7 @@ std::vector<Check> KernelChecks() {
   };
 }
 
-// Scores of meshes whose scores are known.
+// Scores of meshes with known scores.
 
 namespace {
 
@@ -171,8 +171,8 @@ Status ExpectScore(const CheckContext& context, const std::string& what, double 
   return InternalError("{} is {}, expected {}", what, score[0], want);
 }
 
-// The faces of the rod lie in the middle of voxels: 15 of 32 wide, it passes through 16 x 16 in
-// each layer, and the cube fills them all.
+// The faces of the rod lie in the middle of voxels: 15 of 32 wide, it crosses 16 x 16 in each
+// layer, and the cube fills all.
 Result<Finding> Iou(const CheckContext& context) {
   TILEGRAD_ASSIGN(const auto torus, train::Voxelize(Torus(1, 0.4f, 24, 12), kVoxels));
   TILEGRAD_ASSIGN(const auto cube, train::Voxelize(Box({0, 0, 0}, {1, 1, 1}), kVoxels));

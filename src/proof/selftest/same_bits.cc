@@ -10,7 +10,7 @@
 namespace tilegrad::selftest {
 namespace {
 
-// Three images of several bins and bands, which are not whole; meshes of one and of many chunks.
+// Three images of several bins and bands, the last ones partial; meshes of one and of many chunks.
 std::vector<OwnedScene<float>> MakeBatch() {
   std::vector<OwnedScene<float>> scenes;
   for (const int level : {2, 4, 3}) {
@@ -66,7 +66,7 @@ OwnedCotangents<float> Repeated(const OwnedCotangents<float>& one, std::size_t c
   return out;
 }
 
-// Of some scenes of the batch, in one call.
+// Renders some scenes of the batch in one call.
 Status RenderTogether(Batch& batch, std::span<OwnedScene<float>> scenes, const Workers& workers,
                       Bits* bits) {
   std::vector<Scene> views;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All images and gradients of a sphere: the engine beside the reference in double, and the
-// reference's gradients beside complex steps.
+// All images and gradients of a sphere: the engine against the reference in double, and the
+// reference's gradients against complex steps.
 #include <algorithm>
 
 #include "proof/complex_step.h"
@@ -14,7 +14,7 @@ namespace {
 
 using Gradients = std::map<std::string, std::vector<double>>;
 
-// Whether numbers of the sphere have a gradient that is not 0 in some light.
+// Whether numbers of the sphere have a nonzero gradient under this lighting.
 bool HasGradient(Lighting lighting, const std::string& kind) {
   if (kind == "specular" || kind == "shininess") return lighting == Lighting::kPhong;
   if (kind == "ambient" || kind == "diffuse") return UsesLights({.lighting = lighting});
@@ -41,9 +41,9 @@ Gradients TakeGradients(const CheckContext& context, OwnedScene<T>& d) {
   return out;
 }
 
-// Vertices are rounded to 1/1024 pixel before visibility is decided. No centre of a pixel of this
-// sphere is so near to an edge that rounding before that could decide: moving all numbers of the
-// scene by up to two units in the last place changes nothing.
+// Vertices are rounded to 1/1024 pixel before visibility is decided. No pixel centre of this sphere
+// is so near to an edge that earlier rounding could decide: moving all numbers of the scene by up
+// to two units in the last place changes nothing.
 Status ExpectFaceIds(std::span<const std::int32_t> got, std::span<const std::int32_t> want) {
   const auto covered = std::count_if(want.begin(), want.end(), [](int id) { return id >= 0; });
   if (covered < 300) return InternalError("the sphere covers {} pixels only", covered);
@@ -89,7 +89,7 @@ Status CheckSphere(const CheckContext& context, const SphereShape& shape, Gauge*
   BothRenderings both;
   TILEGRAD_TRY(RenderOwned(scene, options, ImagesWithGradients(), d_frame.Cast<float>(),
                            context.workers, &both.got));
-  // The reference is given the engine's own visibility, which is checked apart.
+  // The reference uses the engine's visibility, which is checked separately.
   both.want = RenderOwnedRef<double>(scene64, options, ImagesWithGradients(), d_frame,
                                      both.got.frame.face_ids);
   TILEGRAD_TRY(ExpectReference(context, shape.lighting, &both, gauge));
@@ -164,8 +164,8 @@ std::array<float, 3> RandomTriple(double low, double high, Rng* rng) {
   return {Random(rng, low, high), Random(rng, low, high), Random(rng, low, high)};
 }
 
-// Three away from the origin, at which it looks, from the side; with this f a sphere of 0.8 leaves
-// a sixth of the image free on each side.
+// At a distance of three from the origin, looking at it from the side; with this f a sphere of 0.8
+// leaves a sixth of the image free on each side.
 CameraT<float> SideCamera(const SphereShape& shape) {
   CameraT<float> camera;
   constexpr double kAxes[9] = {2.0 / 3, -2.0 / 3, 1.0 / 3,  1.0 / 3, 2.0 / 3,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene of most checks: a sphere with bumps that has colours, a texture, two materials and
-// light.
+// The scene of most checks: a bumpy sphere with colours, a texture, two materials and light.
 #pragma once
 
 #include <map>
@@ -15,17 +14,17 @@ struct SphereShape {
   Lighting lighting = Lighting::kPhong;
   Normals normals = Normals::kSmooth;
   Filter filter = Filter::kBilinear;
-  float near_plane = 0.01f;     // the sphere begins at a depth of 2.2
+  float near_plane = 0.01f;     // the sphere starts at a depth of 2.2
   int level = 2;                // of the icosphere: 20 * 4^level faces
   int width = 32, height = 32;  // pixels of the camera's image
   std::uint64_t seed = 1;
 };
 
-// The same bits on every machine: sums, products and square roots only.
+// The same bits on every machine, since it uses sums, products and square roots only.
 OwnedScene<float> MakeSphere(const SphereShape& shape);
 
-// Every kind of light, of normals from positions and of filter with a gradient; one sphere is cut
-// open, so that its inside is seen, too.
+// Covers every lighting model, normals derived from positions, and filters with a gradient; one
+// sphere is cut open, so that its inside is visible, too.
 struct NamedSphere {
   const char* name;
   SphereShape shape;
@@ -43,7 +42,7 @@ Outputs ImagesWithGradients();  // color, alpha, depth, normals, uv
 
 RenderOptions SphereOptions(const SphereShape& shape);
 
-// The numbers of a scene, or of its gradient, by what they belong to.
+// The numbers of a scene or its gradient, by field.
 template <class T>
 std::map<std::string, std::vector<T>> NumbersOf(OwnedScene<T>& scene) {
   std::map<std::string, std::vector<T>> out;

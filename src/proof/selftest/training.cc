@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient of a gradient (the penalty of WGAN-GP), and steps of training.
+// The gradient of a gradient (the penalty of WGAN-GP), and training steps.
 #include <cmath>
 
 #include "base/hash.h"
@@ -12,7 +12,7 @@ namespace {
 using nn::Context;
 using nn::Var;
 
-// A critic with channels enough for the SIMD kernels and Winograd's algorithm, and images for it.
+// A critic with enough channels for the SIMD kernels and Winograd's algorithm, and images for it.
 struct PenaltyCase {
   Context context;
   Rng rng{9, 25};
@@ -35,7 +35,7 @@ struct PenaltyCase {
   }
 };
 
-// In double, of a critic with the float one's numbers.
+// In double, for a critic with the float one's numbers.
 struct TrueCase : PenaltyCase {
   explicit TrueCase(const Workers& workers) : PenaltyCase(workers, nn::DType::kF64) {}
   Status TakeFrom(PenaltyCase& single) { return LoadState(critic, nn::State(single.critic)); }
@@ -55,7 +55,7 @@ Result<std::vector<std::vector<double>>> PenaltyGradient(PenaltyCase& at) {
   return out;
 }
 
-// The penalty where all parameters have gone `step` along a random direction; they come back.
+// The penalty after moving all parameters by `step` along a random direction; restores them.
 double PenaltyAlong(TrueCase& at, double step) {
   const auto move = [&](double by) {
     Rng rng(11, 25);
@@ -110,7 +110,7 @@ Result<Finding> PenaltyInFloat(const CheckContext& context) {
   Gauge gauge;
   for (std::size_t i = 0; i < want.size(); ++i) {
     context.Take("d_" + names[i].name, got[i]);
-    // The critic is linear between the kinks of its rectifiers: biases do not move its slope.
+    // The critic is linear between the kinks of its rectifiers: biases do not change its slope.
     const bool zero = names[i].name.ends_with("bias");
     TILEGRAD_TRY(zero ? gauge.Expect("d_" + names[i].name, got[i], want[i], 0)
                       : gauge.ExpectOfLargest("d_" + names[i].name, got[i], want[i], kFloatShare));
@@ -134,7 +134,7 @@ nn::Sequential MakeGenerator(Context& context, Rng& rng) {
   return net;
 }
 
-// A small adversarial game, as `tilegrad train` has its own: Wasserstein loss with penalty, Adam.
+// A small adversarial game, as in `tilegrad train`: Wasserstein loss with penalty, Adam.
 class Game {
  public:
   explicit Game(const Workers& workers)

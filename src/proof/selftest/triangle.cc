@@ -13,8 +13,8 @@ namespace {
 
 using Point = std::array<double, 2>;
 
-// No pixel centre is nearer than 1/50 pixel to an edge, so that neither rounding nor the grid of
-// 1/1024 pixel to which vertices are rounded decides what is covered. Depths differ.
+// No pixel centre is nearer than 1/50 pixel to an edge, so that neither rounding nor the snapping
+// of vertices to 1/1024 pixel decides coverage. Depths differ.
 constexpr std::array<std::array<double, 3>, 3> kCorners = {
     {{-0.61, -0.43, -2.0}, {0.57, -0.52, -2.5}, {0.08, 0.66, -1.5}}};
 constexpr std::array<std::array<double, 3>, 3> kColors = {

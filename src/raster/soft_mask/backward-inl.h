@@ -79,7 +79,7 @@ class TileBackward {
   }
 
  private:
-  // The chunk from a node on, unless it is there.
+  // Fills in the chunk that starts at a node, unless it is loaded already.
   void Fill(std::size_t* next) {
     if (*next != chunk_begin_) {
       chunk_begin_ = chunk_end_ = *next;
@@ -95,8 +95,8 @@ class TileBackward {
   }
 
   // The pixels of block b among `soft` that have a gradient. Sets their push, 2 d_alpha times the
-  // product over all faces: moving the nearest point towards the pixel lowers z. Dark pixels, whose
-  // product is unknown, get theirs later.
+  // product over all faces: moving the nearest point towards the pixel lowers z. Dark pixels, with
+  // unknown product, get theirs later.
   HWY_INLINE std::uint64_t TakePixels(const SoftBlock& block, std::uint64_t soft, std::size_t b) {
     std::uint64_t bits = 0;
     for (std::uint32_t rows = RowsOf(soft); rows != 0; rows &= rows - 1) {
@@ -145,7 +145,7 @@ class TileBackward {
     return bits << to;
   }
 
-  // All faces are in the chunk: the members of a block are listed once.
+  // All faces fit in the chunk: lists the members of each block once.
   void OneChunk() {
     ClearSums();
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
@@ -228,8 +228,8 @@ class TileBackward {
     return (1 - scratch_->blocks[b].alpha[i]) * static_cast<double>(near_product_[b][i]);
   }
 
-  // Gradients of the near faces in dark pixels, for which the push is that of the product over the
-  // far ones; then the push of the others, if they can matter.
+  // Gradients of the near faces in dark pixels, with the push from the product over the far ones;
+  // then the push of the others, if they can matter.
   void DarkGradients(std::size_t b) {
     const SoftBlock& block = scratch_->blocks[b];
     const auto push = [&](std::size_t i, double product) {
@@ -282,7 +282,7 @@ class TileBackward {
   SoftReach reach_;
   std::size_t chunk_begin_ = std::numeric_limits<std::size_t>::max(), chunk_end_ = 0;
   PixelScale scale_;
-  std::uint64_t dark_[kTileBlocks] = {};  // pixels whose product is to be found
+  std::uint64_t dark_[kTileBlocks] = {};  // pixels whose product must be found
   std::uint64_t weak_[kTileBlocks] = {};  // pixels where weak faces matter
   alignas(64) float push_[kTileBlocks][kBlockPixels];
   alignas(64) float near_product_[kTileBlocks][kBlockPixels];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The blocks of a tile: which pixels are background, and where they lie.
+// The blocks of a tile: their background pixels and geometry.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
@@ -22,11 +22,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// Which nodes of the tree a tile looks at. Lanes are nodes, groups.
+// The tree nodes that a tile visits. Lanes are nodes, groups.
 
 namespace simd = tilegrad::HWY_NAMESPACE;
 
-// The nodes that a tile looks at.
+// The nodes that a tile visits.
 struct SoftNodes {
   std::size_t count = 0;
   std::size_t faces = 0;  // in them
@@ -47,13 +47,13 @@ inline SoftBox CentresOf(const PixelRect& rect, const SoftMaskPlan& plan) {
           static_cast<float>(plan.unit_x),    static_cast<float>(plan.unit_y)};
 }
 
-// The squared distance behind which groups are dropped, and a little for its rounding.
+// The squared distance beyond which groups are dropped, plus a margin for its rounding.
 inline float GroupLimit(const SoftMaskPlan& plan) {
   return static_cast<float>(plan.group_z * (1 + 0x1p-20));
 }
 
-// The groups that are near some pixel of a region. A box inside the region is no nearer to a group
-// than the region is, in floating point too, so no group that a tile would keep is lost.
+// The groups near some pixel of a region. A box inside the region is no nearer to a group than the
+// region is, in floating point too, so it includes every group that a tile would keep.
 inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const PixelRect& rect,
                            SoftNearGroups* near) {
   const SoftTag d;
@@ -93,9 +93,9 @@ HWY_INLINE std::size_t AppendNodes(const SoftTree& tree, std::size_t group, cons
   return count;
 }
 
-// Nodes of groups nearer than group_z into `found`, unless they are beyond z = `end`; returns how
-// many. Adds a bound on the sum of A of the other groups to `dropped`, and all faces of these ones
-// to `near_faces`.
+// Collects the nodes of groups nearer than group_z in `found`, unless they are beyond z = `end`;
+// returns their number. Adds a bound on the sum of A of the other groups to `dropped`, and all
+// faces of these groups to `near_faces`.
 HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPlan& plan,
                                          const SoftBox& box, int end, SoftMaskScratch* scratch,
                                          double* dropped, double* near_faces) {
@@ -119,14 +119,14 @@ HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPla
   return count;
 }
 
-// A histogram of nodes by the integer part of their z, which is less than `end`.
+// A histogram of nodes by the integer part of their z, for z less than `end`.
 struct SoftHistogram {
   int end;
-  double beyond;  // faces of others, from `end` on
+  double beyond;  // faces of the other nodes, from `end` on
   float faces[kEndZ + 1];
   std::int32_t nodes[kEndZ + 1];
 
-  // `near_faces` is how many faces there are in all.
+  // `near_faces` is the total number of faces.
   HWY_INLINE SoftHistogram(const SoftBoxes& boxes, const SoftNodesAt& found, std::size_t count,
                            int end_z, double near_faces)
       : end(end_z), beyond(near_faces) {
@@ -140,8 +140,8 @@ struct SoftHistogram {
       beyond -= static_cast<double>(more);
     }
   }
-  // Drops the farthest as long as `budget` lasts; returns the first whole z that is dropped, and
-  // adds what that costs to `dropped`.
+  // Drops the farthest nodes within `budget`; returns the first integer z dropped, and adds the
+  // error of that to `dropped`.
   int DropFar(double budget, double* dropped) const {
     int from = end;
     double influence = std::ldexp(1.0, -end), cost = beyond * influence;
@@ -157,7 +157,7 @@ struct SoftHistogram {
   }
 };
 
-// The nodes that a tile with background in `box` must look at, near ones first: a counting sort.
+// The nodes that a tile with background in `box` must visit, near ones first: a counting sort.
 inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
                                SoftMaskScratch* scratch) {
   SoftNodes out;
@@ -179,7 +179,7 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
     begin[z] = out.count;
     out.count += static_cast<std::size_t>(histogram.nodes[z]);
   }
-  begin[end] = out.count;  // those that are dropped go behind the others: no branch
+  begin[end] = out.count;  // dropped nodes go behind the others: branch-free
   if (scratch->nodes.size() < count) scratch->nodes.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     scratch->nodes[begin[std::min(found.z[i], end)]++] = found.node[i];
@@ -192,13 +192,13 @@ HWY_INLINE std::size_t PixelIndex(const SoftMaskPlan& plan, int x, int y) {
          static_cast<std::size_t>(x);
 }
 
-// Where a block begins in SoftMaskImages::transmittance; its rows follow, `width` numbers each.
+// Offset of a block in SoftMaskImages::transmittance; its rows follow, `width` numbers each.
 HWY_INLINE std::size_t TransmittanceIndex(const SoftMaskPlan& plan, const SoftBlock& block) {
   return static_cast<std::size_t>(block.y0) * static_cast<std::size_t>(plan.width) +
          static_cast<std::size_t>(block.x0) * static_cast<std::size_t>(block.height);
 }
 
-// The tile after `tile` in `region`, as ForTiles goes; empty behind the last one.
+// The tile after `tile` in `region`, in the order of ForTiles; empty after the last one.
 HWY_INLINE PixelRect NextTile(const PixelRect& region, const PixelRect& tile) {
   const bool right = tile.x1 < region.x1;
   const int x = right ? tile.x1 : region.x0, y = right ? tile.y0 : tile.y1;
@@ -214,7 +214,7 @@ HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const PixelRect& tile, co
   }
 }
 
-// Calls visit(pixel of the image, pixel of the block) for the first pixel of each row.
+// Calls visit(pixel index in the image, in the block) for the first pixel of each row.
 template <class Visit>
 HWY_INLINE void ForRows(const SoftMaskPlan& plan, const SoftBlock& block, const Visit& visit) {
   for (int y = 0; y < block.height; ++y) {
@@ -226,11 +226,11 @@ HWY_INLINE void ForRows(const SoftMaskPlan& plan, const SoftBlock& block, const 
 using TileTag = hn::CappedTag<float, kTileSize>;
 using TileIntTag = hn::RebindToSigned<TileTag>;
 
-// Some pixels of a tile, as bits of its blocks.
+// A subset of a tile's pixels, as bits of its blocks.
 class TilePixels {
  public:
-  // Those in whose lanes chosen(index in the image) is true, which is asked for whole vectors, and
-  // at the right side of the image for one(index in the image).
+  // The pixels where chosen(index in the image) is true, evaluated for whole vectors, or one(index
+  // in the image) at the right edge of the image.
   template <class Chosen, class One>
   HWY_INLINE TilePixels(const SoftMaskPlan& plan, const PixelRect& rect, const Chosen& chosen,
                         const One& one) {
@@ -249,7 +249,7 @@ class TilePixels {
       return row;
     };
     for (std::size_t b = 0; b < kTileBlocks; b += 2) {
-      std::uint64_t left = 0, right = 0;  // not in memory, as the array is
+      std::uint64_t left = 0, right = 0;  // not in memory, as the array would be
       const int y0 = rect.y0 + static_cast<int>(b / 2 * kBlockSize);
       const int rows = HWY_MIN(rect.y1 - y0, static_cast<int>(kBlockSize));
       for (int y = 0; y < rows; ++y) {
@@ -324,8 +324,8 @@ HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const PixelRect& rect, Soft
   }
 }
 
-// The blocks of a tile, and the box around all pixels to compute. bits_of(block, its number) says
-// which.
+// The blocks of a tile, and the box around all pixels to compute, given by bits_of(block, its
+// number).
 template <class Bits>
 HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const PixelRect& rect, const Bits& bits_of,
                                SoftBlock* blocks) {
@@ -352,7 +352,7 @@ HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
   return std::any_of(blocks, blocks + kTileBlocks, [](const SoftBlock& b) { return b.live != 0; });
 }
 
-// Fills the arrays per pixel of a block. With vectors: compilers would choose rep stos, which is
+// Fills the per-pixel arrays of a block. With vectors: compilers would choose rep stos, which is
 // slow to start.
 template <class T>
 HWY_INLINE void FillPixels(T value, T* to) {

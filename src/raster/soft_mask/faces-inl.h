@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The faces of a tile, and what a block sees of them. Lanes are faces.
+// The faces of a tile, and their edges relative to a block. Lanes are faces.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
@@ -55,8 +55,8 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   }
 }
 
-// The sine of the turn from edge 0 to edge 1, 0 where it is within its rounding, at most 14 u of 16
-// ("Nearest features"), or where one of them is a point.
+// The sine of the turn from edge 0 to edge 1, 0 if it is within its rounding, at most 14 u of 16
+// ("Nearest features"), or if one of them is a point.
 HWY_INLINE SoftVec TurnOf(SoftTag d, const SoftVec (&tx)[3], const SoftVec (&ty)[3],
                           const SoftVec (&inverse)[3]) {
   const SoftVec sine = hn::MulSub(tx[0], ty[1], hn::Mul(ty[0], tx[1]));
@@ -127,7 +127,7 @@ HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
   PrefetchNumbers(tree.corners.at(node, 0), kCornerNumbers * kNodeFaces);
 }
 
-// Which faces a tile looks at: those of `nodes` within z of the box, up to `most` at a time.
+// The faces that a tile visits: those of `nodes` within z of the box, up to `most` at a time.
 struct TileFaces {
   const SoftTree& tree;
   std::span<const std::int32_t> nodes;
@@ -136,11 +136,11 @@ struct TileFaces {
   std::size_t most;
 };
 
-// The next of them: fills the chunk from nodes[*next] on.
+// Fills the chunk with the next faces, from nodes[*next] on.
 inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chunk) {
   const auto& [tree, nodes, box, z, most] = faces;
   const SoftTag d;
-  constexpr std::size_t kAhead = 4;  // nodes lie anywhere
+  constexpr std::size_t kAhead = 4;  // nodes are scattered in memory
   chunk->shorts.count = chunk->longs.count = 0;
   while (*next < nodes.size() && chunk->shorts.count + chunk->longs.count + kNodeFaces <= most) {
     if (*next + kAhead < nodes.size()) {
@@ -153,8 +153,8 @@ inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chun
   ForgetDiagonals(d, &chunk->longs);
 }
 
-// Faces seen from the middle of a block's background: corners, and for each edge where that point
-// lies relative to it ("The distance to a boundary").
+// Faces relative to the centre of a block's background: corners, and the position of that centre
+// relative to each edge ("The distance to a boundary").
 struct FaceEdges {
   SoftVec x[3], y[3];
   SoftVec tx[3], ty[3], side[3], first[3], last[3], inverse[3];
@@ -191,7 +191,7 @@ using SoftDoubleTag = hn::CappedTag<double, kSoftLanes / 2>;
 using SoftDouble = hn::Vec<SoftDoubleTag>;
 using SoftNarrowTag = hn::Rebind<float, SoftDoubleTag>;  // as many floats
 
-// Finite, and the square is at most infinite.
+// Stays finite, and its square is at most infinite.
 HWY_INLINE void StoreNarrow(SoftDouble v, float* to) {
   const SoftDoubleTag d;
   const SoftDouble most = hn::Set(d, 1e30);
@@ -205,7 +205,8 @@ struct LongFaces {
   alignas(64) float v[kArrays][kSoftLanes];
 };
 
-// Edge k of the faces with corners x, y, in double: a difference of large numbers. To lanes `at`.
+// Edge k of the faces with corners x, y, in double: a difference of large numbers. Written to lanes
+// `at`.
 HWY_INLINE void LongEdge(const SoftDouble (&x)[3], const SoftDouble (&y)[3], std::size_t k,
                          std::size_t at, LongFaces* out) {
   const SoftDoubleTag d;
@@ -225,7 +226,7 @@ HWY_INLINE void LongEdge(const SoftDouble (&x)[3], const SoftDouble (&y)[3], std
   }
 }
 
-// The same of faces with long edges.
+// The same for faces with long edges.
 HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
                                const SoftMaskPlan& plan, const SoftBlock& block) {
   const SoftDoubleTag dd;

@@ -23,8 +23,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// Which pixels of a block are within reach of a face: those of an octagon around it. Lanes are
-// faces.
+// The pixels of a block within reach of a face: those of an octagon around it. Lanes are faces.
 
 using SoftByteTag = hn::Repartition<std::uint8_t, SoftTag>;
 using SoftBytes = hn::Vec<SoftByteTag>;
@@ -32,13 +31,13 @@ using SoftBitsTag = hn::Repartition<std::uint64_t, SoftTag>;
 using SoftBits = hn::Vec<SoftBitsTag>;  // pixels of a block, for half of the faces
 
 // The pixels of a block in one direction: columns, rows, or the diagonals of equal x + y or x - y.
-// What brings the low or high end of a face, in pixels, to the index of the first one within reach
-// or the first one behind; how many there are.
+// Offsets that map the low or high end of a face, in pixels, to the index of the first pixel within
+// reach or the first one beyond; and their number.
 struct PixelAxis {
   float low, high, count;
 
-  // In pixels: where the first one lies, and how far a kernel reaches. 1/64 covers rounding, of
-  // which that relative to `reach` is in `reach`, and ties, which may become the even neighbour.
+  // In pixels: the position of the first one, and the reach of a kernel. 1/64 covers rounding, of
+  // which that relative to `reach` is in `reach`, and ties, which may round to the even neighbour.
   PixelAxis(float first, float reach, float pixels)
       : low((0.5f - kRounding) - (first + reach)),
         high((0.5f + kRounding) + (reach - first)),
@@ -70,7 +69,7 @@ struct BlockAxes {
         differences(at.x - at.y - kLast, reach.diagonals, kDiagonals) {}
 };
 
-// The first and the one behind the last, in the lowest byte of each face's four.
+// The first pixel and the one after the last, in the lowest byte of each face's four.
 struct PixelRange {
   SoftBytes begin, end;
 
@@ -88,7 +87,8 @@ struct PixelRange {
 
 // Tables of bytes.
 struct PixelBytes {
-  // For each half of four numbers of four bytes: eight times its first one, then its second.
+  // For each half of four numbers of four bytes: eight times the half's first number, then its
+  // second.
   alignas(16) std::uint8_t spread[2][16] = {};
   alignas(16) std::uint8_t below[16] = {};                // bits of the columns less than the index
   alignas(16) std::uint8_t row[16] = {}, above[16] = {};  // 0 to 7, 7 to 0
@@ -105,7 +105,7 @@ struct PixelBytes {
 };
 inline constexpr PixelBytes kPixelBytes;
 
-// The ranges that a face's octagon is made of; the last of x - y + 7.
+// The ranges of a face's octagon; the last of x - y + 7.
 struct PixelOctagon {
   PixelRange columns, rows, sums, differences;
 
@@ -137,7 +137,7 @@ struct PixelOctagon {
   }
 };
 
-// Pixels that see faces, a vector of them in two.
+// Pixels that see faces, one vector of faces in two halves.
 struct FacePixels {
   SoftBits first, second;
 
@@ -188,7 +188,7 @@ HWY_INLINE FacePixels PixelsOfFaces(SoftTag d, const SoftFaceArrays& faces, std:
                      range(A::kLeastDifference, A::kMostDifference, axes.differences)});
 }
 
-// Those of faces i, i + 1, ... of which the box is within `reach` of the block's background.
+// Lanes of faces i, i + 1, ... whose box is within `reach` of the block's background.
 HWY_INLINE SoftMask BoxesNear(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
                               const SoftBlock& block, float reach) {
   const auto side = [&](SoftFaceArrays::Array a) HWY_ATTR { return hn::Load(d, faces.v[a] + i); };
@@ -198,13 +198,13 @@ HWY_INLINE SoftMask BoxesNear(SoftTag d, const SoftFaceArrays& faces, std::size_
   return hn::Le(z, hn::Set(d, reach * reach));
 }
 
-// Selects one of three, lane by lane.
+// Selects one of three per lane.
 template <class V, class M>
 HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
   return hn::IfThenElse(first, v[0], hn::IfThenElse(second, v[1], v[2]));
 }
 
-// Members are appended at `at`, a copy of the list's count: compilers would reload that after each
+// Appends members at `at`, a copy of the list's count: compilers would reload the count after each
 // vector store.
 HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, std::size_t at,
                            SoftList* to) {
@@ -260,29 +260,29 @@ HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, SoftInt slot, So
   AppendTags(slot, hn::Zero(SoftIntTag()), compact, at, to);
 }
 
-// The `pixels` of a block for which features are found. If `split`, faces nearer than `reach.near`
-// go to the boundaries, whichever feature is nearest.
+// The `pixels` of a block to find features for. If `split`, faces nearer than `reach.near` become
+// boundaries, whichever feature is nearest.
 struct FeatureSearch {
   const SoftBlock& block;
   std::uint64_t pixels;
   const SoftReach& reach;
   bool split;
-  // What follows from these, once for all faces ("Nearest features"). Whether edges behind are
-  // looked for: where a block is larger than faces reach, faces lie all around its pixels.
+  // Derived values, computed once for all faces ("Nearest features"). Whether to look for edges
+  // behind: if a block is larger than faces reach, faces lie all around its pixels.
   const bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
-  // Exceeds the rounding of distances to edge lines: 32 u of the largest term in them.
+  // Exceeds the rounding of distances to edge lines: 32 u of their largest term.
   const float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
                                      kLongEdge * (block.box.unit_x + block.box.unit_y));
 };
 
-// Some faces: all, and those that are not near ones; where they are in the chunk.
+// Some faces: all, and the not near ones; their positions in the chunk.
 struct FeatureFaces {
   SoftMask all, far;
   SoftInt slot;
 };
 
-// Edges with the pixels of a block on their inner side, where none can lie within the face: nearest
-// points that are on them are on another edge, too.
+// Edges that have the block's pixels on their inner side, where none can lie within the face:
+// nearest points on them are on another edge, too.
 HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
                             SoftMask (&behind)[3]) {
   const SoftBlock& block = search.block;
@@ -300,12 +300,12 @@ HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& 
   for (SoftMask& b : behind) b = hn::And(b, outside);
 }
 
-// Edges of which all pixels of a block have the first corner, or the last one, as nearest point.
+// Edges whose first or last corner is the nearest point for all pixels of a block.
 struct EdgeEnds {
   SoftMask start[3], end[3];
 };
 
-// Faces of which the nearest point is on one edge, by edge, unless it is a corner ("Nearest
+// Faces whose nearest point is on a single edge, by edge, unless it is a corner ("Nearest
 // features").
 HWY_INLINE void FindOnlyEdges(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
                               const EdgeEnds& at, SoftMask (&only)[3]) {
@@ -350,7 +350,7 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces
                    &lists->boundaries);
 }
 
-// Fills a list up to whole vectors: `far` are its arrays of distances.
+// Pads a list to whole vectors: `far` are its arrays of distances.
 template <std::size_t kArrays>
 HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArrays>* list) {
   const SoftTag d;
@@ -361,13 +361,13 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
   for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
 }
 
-// Vectors of faces of which one is near: their first faces, and which lanes are near.
+// Vectors with a near face: their first faces, and the lanes that are near.
 struct NearVectors {
   std::size_t count = 0;
   std::int32_t first[kChunkRoom];
   std::uint8_t lanes[kChunkRoom];  // bits
 
-  // No branch: it would be hard to predict.
+  // Branch-free: a branch would be hard to predict.
   HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {
     for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
       const SoftMask near = hn::And(BoxesNear(d, faces, i, search.block, search.reach.root),

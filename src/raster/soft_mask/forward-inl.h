@@ -18,15 +18,15 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// Equation 6, one face more: a + (1 - a) A. Keeps small alphas precise, unlike 1 - product.
+// Equation 6 for one more face: a + (1 - a) A. Keeps small alphas precise, unlike 1 - product.
 HWY_INLINE SoftVec Over(SoftTag d, SoftVec a, SoftVec influence) {
   return hn::MulAdd(hn::Sub(hn::Set(d, 1.0f), a), influence, a);  // (6)
 }
 
-// Alpha over the members of a chunk, pixel by pixel and lane by lane, for a block.
+// Alpha over the members of a chunk, per pixel and lane of a block.
 class PartialAlpha {
  public:
-  // Of scratch->lists. scratch->partial is 0, and is again after Merge.
+  // Uses scratch->lists. scratch->partial must be 0, and is 0 again after Merge.
   PartialAlpha(SoftBlock* block, SoftMaskScratch* scratch)
       : lists_(scratch->lists), block_(block), partial_(scratch->partial), work_(&scratch->work) {}
 
@@ -64,7 +64,7 @@ class PartialAlpha {
     }
   }
 
-  // Into the block's alpha, in double.
+  // Merges into the block's alpha, in double.
   HWY_INLINE void Merge() {
     const SoftTag d;
     ForPixels(touched_, [&](std::size_t i) HWY_ATTR {
@@ -82,7 +82,7 @@ class PartialAlpha {
   }
 
  private:
-  // Called before member m. Merges after every kChunkFaces members, so that rounding in the lanes
+  // Call before member m. Merges after every kChunkFaces members, so that rounding in the lanes
   // stays bounded; only the backward pass has longer lists.
   HWY_INLINE void MergeBefore(std::size_t m) {
     if (m != 0 && m % kChunkFaces == 0) Merge();
@@ -104,13 +104,14 @@ class PartialAlpha {
       Put(d, i, simd::Exp2Neg(d, hn::Load(d, of_pixel[i])).power);  // (5): A = 2^-z
     });
   }
-  // The product of the lanes' 1 - a, for when 1 - alpha has lost its digits. Notes the least lane.
+  // The product of the lanes' 1 - a, for 1 - alpha that has lost its digits. Records the least
+  // lane.
   HWY_INLINE double SmallProduct(SoftTag d, SoftVec a, std::size_t pixel) {
     SoftVec left = hn::Sub(hn::Set(d, 1.0f), a);
     const SoftMask dark = hn::Lt(left, hn::Set(d, static_cast<float>(kLightProduct)));
     const SoftVec rounding = hn::Set(d, static_cast<float>(LaneRounding(hn::MaxLanes(d))));
     left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
-    // A dark lane stays dark: that rounding leaves its product too few digits for a gradient.
+    // Keeps a dark lane dark: rounding leaves its product too few digits for a gradient.
     const SoftVec noted = hn::IfThenElse(dark, hn::Min(left, hn::Set(d, kMostDark)), left);
     block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, noted)));
     return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));
@@ -127,8 +128,8 @@ class PartialAlpha {
   std::uint64_t touched_ = 0;
 };
 
-// Pixels whose product is within `stop` need no more faces. Where further ones may matter for the
-// gradient, the backward pass processes them.
+// Stops pixels whose product is within `stop`: they need no more faces. Where others may matter for
+// the gradient, the backward pass processes them.
 HWY_INLINE void StopPixels(const SoftMaskPlan& plan, double stop, SoftBlock* block) {
   ForPixels(block->live, [&](std::size_t i) {
     if (1 - block->alpha[i] > stop) return;
@@ -138,7 +139,7 @@ HWY_INLINE void StopPixels(const SoftMaskPlan& plan, double stop, SoftBlock* blo
   });
 }
 
-// The error spent by the block: of pixels that stopped, their product; of others, what was dropped.
+// The error spent by the block: for stopped pixels, their product; for others, the dropped faces.
 HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double share) {
   double spent = 0;
   if (block.live != 0) {
@@ -151,8 +152,8 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
   return std::min(spent, 1.0);
 }
 
-// Copies a row of a block to an image. By quads, as rows are written: a wider load could not be
-// forwarded from those stores.
+// Copies a row of a block to an image. By quads, like the writes of rows: store forwarding to a
+// wider load would fail.
 HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float* to) {
   const QuadTag d;
   if (width < kBlockSize) {
@@ -259,7 +260,7 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
   }
 }
 
-// One tile, after FindNearGroups. Returns what it spent.
+// One tile, after FindNearGroups. Returns the error spent.
 inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
                           const SoftMaskRegion& tile, const SoftMaskImages& images,
                           SoftMaskScratch* scratch) {

@@ -23,7 +23,7 @@ struct PixelScale {
   float x, y;
 };
 
-// Appends those gradients of faces [count] that are not 0: quad(0, i) and quad(1, i) are a row.
+// Appends the nonzero gradients of faces [count]: quad(0, i) and quad(1, i) are a row.
 template <class Row>
 HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, const Row& quad,
                                 const PixelScale& scale, AlignedVector<SoftFaceGradient>* out) {
@@ -39,7 +39,7 @@ HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, co
     hn::StoreU(hn::Mul(first, to_pixels), d, to->d_corner[0]);
     hn::StoreU(hn::LowerHalf(d_last, hn::Mul(last, to_pixels)), d_last, to->d_corner[2]);
     to->face = faces[i];
-    // No branch: it would be hard to predict.
+    // Branch-free: a branch would be hard to predict.
     to += !hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)));
   }
   out->resize(static_cast<std::size_t>(to - out->data()));
@@ -71,14 +71,14 @@ HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
   return small ? SmallOdds(d, a) : LargeOdds(d, a);
 }
 
-// On the nearest of the faces' three edges: the offset of the pixel from it, and the share of the
-// edge's second corner.
+// On the nearest of the faces' three edges: the offset to the pixel, and the weight of the edge's
+// second corner.
 struct Nearest {
   SoftVec offset_x, offset_y, second;
   SoftMask on1, on2;  // edge 1, edge 2; else edge 0
 };
 
-// Of a pixel; *nearest_z: the squared distance.
+// For a pixel; *nearest_z: the squared distance.
 HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
                              std::size_t pixel, SoftVec* nearest_z) {
   SoftVec z[3], x[3], y[3], second[3];
@@ -120,7 +120,7 @@ class NearestOfPixels {
   alignas(64) float v_[5][kBlockPixels][kSoftLanes];
 };
 
-// Where the pixels of a block lie relative to edges.
+// Offsets of a block's pixels from edges.
 class OffsetsOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const EdgeOffset& o) {
@@ -149,7 +149,7 @@ struct FarPixels {
   }
 };
 
-// Sums of corner gradients, by faces.
+// Sums of corner gradients, by face.
 struct CornerSums {
   SoftVec x[3], y[3];
 
@@ -170,17 +170,17 @@ struct CornerSums {
   }
 };
 
-// By pixels: squared distances first, then what they make of the push.
+// By pixel: first squared distances, then what they make of the push.
 using Pushes = float[kBlockPixels][kSoftLanes];
 
-// Of the pixels `bits`, pushed by what push_all(far, pushes) finds for each. Loops apart, so that
-// what is under way at a time is not one chain from the edges to the sums.
+// Sums over the pixels `bits`, with the push that push_all(far, pushes) computes for each. Separate
+// loops, so that the work in flight is not one chain from the edges to the sums.
 template <class PushAll>
 HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
                                  std::uint64_t bits, const PushAll& push_all) {
   NearestOfPixels nearest;
   alignas(64) Pushes pushes;
-  FarPixels far;  // not in memory, as the others are
+  FarPixels far;  // not in memory, unlike the others
   ForPixels(bits, [&](std::size_t i) HWY_ATTR {
     SoftVec z;
     nearest.Store(d, i, NearestOf(d, faces, block, i, &z));
@@ -194,7 +194,7 @@ HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const 
   return sums;
 }
 
-// The sums of each face in turn, as rows.
+// The sums of each face as a row.
 struct SumRows {
   alignas(64) float quads[2][4 * kSoftLanes];
 
@@ -211,7 +211,7 @@ struct SumRows {
 struct ChunkSums {
   float (&v)[2 * kChunkRoom][kSumRow];
 
-  // Adds those of the members from m on.
+  // Adds the sums of the members from m on.
   HWY_INLINE void Add(SoftTag d, const SoftList& list, std::size_t m,
                       const CornerSums& corners) const {
     const QuadTag dq;
@@ -239,7 +239,7 @@ struct ChunkSums {
   }
 };
 
-// Faces of a block of which A <= 63/64; push [kBlockPixels] is 2 d_alpha times the product over all
+// Faces of a block with A <= 63/64; push [kBlockPixels] is 2 d_alpha times the product over all
 // faces.
 struct WeakFaces {
   const SoftBlock& block;
@@ -299,7 +299,7 @@ struct WeakFaces {
         far.Note(d, i, z);
       });
       PushAll(bits, far, pushes);
-      // Of push along n and t, and of both times the share of the second corner.
+      // Sums of the push along n and t, and of both times the weight of the second corner.
       SoftVec side = hn::Zero(d), beyond = side, second_side = side, second_beyond = side;
       ForPixels(bits, [&](std::size_t i) HWY_ATTR {
         const EdgeOffset o = offsets.At(d, i);
@@ -335,7 +335,7 @@ struct WeakFaces {
   }
 
  private:
-  // One loop per number of factors that the odds need: which pixel needs which is hard to predict.
+  // One loop per number of factors in the odds: which pixel needs which is hard to predict.
   HWY_INLINE void PushAll(std::uint64_t bits, const FarPixels& far, Pushes& pushes) const {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
@@ -350,7 +350,7 @@ struct WeakFaces {
   }
 };
 
-// Appends the boundaries of scratch->lists, which come from its chunk, for the live pixels;
+// Appends the boundaries of scratch->lists, whose chunk is scratch's, for the live pixels;
 // `product` is that of all near faces.
 inline void AppendNear(const SoftBlock& block, float* product, AlignedVector<SoftNearFaces>* near,
                        SoftMaskScratch* scratch) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The members of a block's lists, a vector at a time, and the pixels that see them. Lanes are
+// The members of a block's lists, one vector at a time, and the pixels that see them. Lanes are
 // faces.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_MEMBERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -28,7 +28,7 @@ HWY_INLINE void ForPixels(std::uint64_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
-// Calls visit(row, bits of its columns) for each row that has some.
+// Calls visit(row, bits of its columns) for each row that has any.
 template <class Visit>
 HWY_INLINE void ForRowsOf(std::uint64_t bits, const Visit& visit) {
   for (std::uint32_t rows = RowsOf(bits); rows != 0; rows &= rows - 1) {
@@ -81,7 +81,7 @@ struct AxisInfluence {
 };
 
 // A vector of corners. Equation 5 factors: A = 2^-(x - vx)^2 2^-(y - vy)^2, one power per column
-// and one per row.
+// and per row.
 template <bool kWithOffsets>
 struct VertexMembers {
   AxisInfluence<kWithOffsets> columns, rows;
@@ -99,8 +99,8 @@ struct VertexMembers {
   }
 };
 
-// Where a pixel lies relative to edges: (side, beyond) leads from the nearest point to the pixel in
-// the edge's frame (n, t); `along` is that point's distance from the first corner.
+// The offset of a pixel from edges: (side, beyond) leads from the nearest point to the pixel in the
+// edge's frame (n, t); `along` is that point's distance from the first corner.
 struct EdgeOffset {
   SoftVec side, beyond, along;
 };
@@ -126,7 +126,7 @@ struct EdgeMembers {
     EdgeOffset o;
     o.side = hn::MulAdd(tx, y, hn::NegMulAdd(ty, x, side));
     const SoftVec step = hn::MulAdd(tx, x, hn::Mul(ty, y));
-    // Not before the first corner, even where rounding puts the last one there.
+    // Never before the first corner, even if rounding puts the last one there.
     const SoftVec nearest = hn::Max(hn::Min(step, last), first);
     o.beyond = hn::Sub(step, nearest);
     o.along = hn::Sub(nearest, first);
@@ -154,7 +154,7 @@ HWY_INLINE SoftVec Neighbour(SoftTag, SoftVec v) { return hn::Shuffle2301(v); }
 HWY_INLINE SoftVec NextPair(SoftTag, SoftVec v) { return hn::Shuffle1032(v); }
 HWY_INLINE SoftVec NextQuartet(SoftTag d, SoftVec v) { return hn::ReverseBlocks(d, v); }
 
-// The products of all lanes, and of all lanes but the own.
+// The products of all lanes, and of all lanes but one's own.
 struct LaneProducts {
   SoftVec all, others;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The soft mask as the paper's implementations compute it, for comparisons: a face counts only if
-// the pixel lies in its box grown by `box`, and only the first `max_faces` of those count, in the
-// order of the faces. alpha can be far from equation 6 and depends on that order; soft_mask.h has
-// neither fault. Scalar template: float, double, std::complex<double>.
+// The soft mask of the paper's implementations, for comparisons: a face counts only if the pixel
+// lies in its box grown by `box`, and only the first `max_faces` of those, in face order. alpha can
+// be far from equation 6 and depends on that order; soft_mask.h has neither fault. Scalar template:
+// float, double, std::complex<double>.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ struct PaperSoftMask {
   double box = 0.02;            // NDC; "boxlen", "expand"
   int max_faces = 30;           // "knum"
   double eps = 1e-13;           // NDC^2, added to the squared length of an edge
-  double farthest = 4;          // NDC^2, the squared distance of what is farther away than that
+  double farthest = 4;          // NDC^2; larger squared distances become this
 };
 
 // Corners in NDC, y up.
@@ -116,7 +116,7 @@ void PaperAlphaRefBackward(std::span<const NdcFace<T>> faces, const T& px, const
                            const PaperSoftMask& rule, const T& d_alpha,
                            std::span<NdcFace<T>> d_faces) {
   const auto candidates = PaperCandidates(faces, px, py, rule);
-  std::vector<T> suffix(candidates.size() + 1, T(1));  // product over the candidates behind
+  std::vector<T> suffix(candidates.size() + 1, T(1));  // product over the candidates after it
   for (std::size_t n = candidates.size(); n-- > 0;) {
     suffix[n] = suffix[n + 1] * (T(1) - candidates[n].influence);
   }

@@ -9,7 +9,7 @@ namespace tilegrad::raster {
 
 double DropZ(std::size_t n, double share) {
   const double count = static_cast<double>(std::max<std::size_t>(n, 1));
-  // A little more, which covers the rounding of the logarithm and of the power that is booked.
+  // A margin for the rounding of the logarithm and of the recorded power.
   const double z = std::log2(count / share) + 0x1p-30;
   return share > 0 ? std::clamp<double>(z, 0.0, kEndZ) : kEndZ;
 }
@@ -18,7 +18,7 @@ SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
   SoftMaskPlan plan;
   plan.width = options.width;
   plan.height = options.height;
-  // Sharper kernels than 1e-15 pixel are not resolved, and would overflow; nor wider ones than
+  // Kernels sharper than 1e-15 pixel are not resolved, and would overflow; nor wider ones than
   // 1e37 pixels.
   const double longer = std::max(options.width, options.height);
   const double root =

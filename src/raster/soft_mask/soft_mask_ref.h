@@ -14,7 +14,7 @@
 
 namespace tilegrad::raster {
 
-// From NDC distances to pixels: x_ndc = 2 x / W.
+// Factors from pixels to NDC: x_ndc = 2 x / W.
 template <class T>
 struct SoftScale {
   T x, y;  // NDC per pixel
@@ -74,8 +74,8 @@ T SoftAlphaRef(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces, 
   return T(1) - outside;
 }
 
-// Calls add(n, corner, d_x, d_y) for the two corners of faces[n] that its nearest point lies
-// between. The product's derivative by prefix and suffix products, without division.
+// Calls add(n, corner, d_x, d_y) for the two corners of faces[n] between which its nearest point
+// lies. Differentiates the product with prefix and suffix products, without division.
 template <class T, class Add>
 void SoftAlphaRefBackward(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces, T px,
                           T py, const SoftScale<T>& scale, T d_alpha, const Add& add) {

@@ -27,8 +27,9 @@ using SoftMask = hn::Mask<SoftTag>;
 using SoftIntTag = hn::RebindToSigned<SoftTag>;
 using SoftInt = hn::Vec<SoftIntTag>;
 
-// A lower bound of the squared distance between lanes of boxes and one box, kernel units. Sides are
-// subtracted with one rounding, so it is relatively exact to 8 u, which the last factor covers.
+// A lower bound of the squared distance between lanes of boxes and one box, kernel units. Each side
+// is subtracted with one rounding, so the relative error is at most 8 u, which the last factor
+// covers.
 HWY_INLINE SoftVec BoxDistance(SoftTag d, SoftVec left, SoftVec top, SoftVec right, SoftVec bottom,
                                const SoftBox& box) {
   const SoftVec zero = hn::Zero(d);
@@ -100,7 +101,7 @@ HWY_INLINE void StoreGroup(SoftTag d, std::size_t group, SoftTree* tree) {
       group, &tree->groups);
 }
 
-// Groups [begin, end) with all that is in them.
+// Builds groups [begin, end) and everything in them.
 inline void BuildSoftGroupsTarget(std::size_t begin, std::size_t end, SoftTree* tree) {
   const SoftTag d;
   for (std::size_t n = begin * kGroupNodes; n < end * kGroupNodes; ++n) StoreNode(d, n, tree);
@@ -122,7 +123,7 @@ class Compactor {
     ints_ = hn::IndicesFromVec(SoftIntTag(), lanes);
   }
   std::size_t count() const { return count_; }
-  // A whole vector is written.
+  // Writes a whole vector.
   HWY_INLINE void Store(SoftVec v, float* to) const {
     hn::StoreU(hn::TableLookupLanes(v, floats_), SoftTag(), to);
   }

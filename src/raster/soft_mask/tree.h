@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The faces of an image that take part in the soft mask, in a hierarchy of boxes: a node holds
 // kNodeFaces faces, a group kGroupNodes nodes. A tile drops whole groups and nodes that are far
-// from its background, and takes what remains near ones first.
+// from its background, and visits the others nearest first.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ inline constexpr std::size_t kNodeFaces = kPacketFaces;
 inline constexpr std::size_t kGroupNodes = kPacketGroup;
 inline constexpr std::size_t kGroupFaces = kNodeFaces * kGroupNodes;
 
-// Boxes and how many faces are in them, as structure of arrays.
+// Boxes and their face counts, as a structure of arrays.
 struct SoftBoxes {
   enum Array { kLeft, kTop, kRight, kBottom, kFaces, kArrays };
   AlignedVector<float> values;
@@ -38,8 +38,8 @@ struct SoftTree {
   SoftBoxes nodes, groups;
 };
 
-// The tree over `tree->corners`, which SetUpFaces has filled. Reuses its memory. `workers`
-// null: the calling thread.
+// Builds the tree over `tree->corners`, filled by SetUpFaces. Reuses its memory. `workers` null:
+// the calling thread.
 void BuildSoftTree(SoftTree* tree, const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

@@ -19,7 +19,7 @@ ImageU8 RgbOf(int width, int height, const At& at) {
   return out;
 }
 
-// One unit of T is 1 / scale.
+// 1 / scale is the unit of T.
 template <class T>
 ImageU8 PlanarOverGrey(const PlanarRgba<T>& image, float grey, float scale) {
   const std::size_t plane = image.alpha.size();

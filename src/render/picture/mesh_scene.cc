@@ -47,7 +47,7 @@ std::vector<float> AlphaTexels(const ImageU8& image) {
   return out;
 }
 
-// Formats without modes have an alpha of materials alone; 0 is more often a mistake than
+// In formats without alpha modes only materials have alpha; 0 is more often a mistake than
 // invisible glass.
 SurfaceCover CoverOf(const Material& material, bool blend) {
   const float alpha = material.base_color.a;
@@ -110,7 +110,7 @@ void MeshScene::AddAlignedNormals() {
   scene_.shading.normals = Normals::kGiven;
 }
 
-// The view of a material's texture, one for each way of looking it up.
+// Index of the view of a material's texture, one per sampler.
 int MeshScene::AddTexture(const Material& material) {
   if (material.base_color_texture < 0 || mesh_.corner_uvs.empty()) return -1;
   const auto index = static_cast<std::size_t>(material.base_color_texture);
@@ -199,7 +199,7 @@ void MeshScene::AddCover() {
 namespace {
 
 constexpr int kMaxSize = 4096;
-constexpr int kLitSamples = 4, kUnlitSamples = 3;  // a side of a pixel
+constexpr int kLitSamples = 4, kUnlitSamples = 3;  // per side of a pixel
 
 MeshSceneOptions LitOptions() {
   MeshSceneOptions options;
@@ -327,8 +327,8 @@ Status LayerRenderer::DrawAlpha(const SceneCover& cover, const Camera& camera,
   return engine_.Render({&scene, 1}, options, outputs, &alpha_);
 }
 
-// Passes on what this layer shows, and opens the pixels that are not done to the next one. Returns
-// whether there are such.
+// Reports what this layer shows, and opens unfinished pixels to the next one. Returns whether there
+// are any.
 bool LayerRenderer::Visit(const Scene& scene, const SceneCover& cover, const TakeLayer& take) {
   const Images images = ImagesOf(layer_);
   bool any = false;

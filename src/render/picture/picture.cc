@@ -85,7 +85,7 @@ void AverageSamples(const Images& samples, int scale, Picture* picture) {
   }
 }
 
-// Sums over layers, averaged over squares, as AverageSamples has it.
+// Averages the layers' sums over squares, like AverageSamples.
 void PictureRenderer::AverageLayers(const PictureRequest& request, Picture* picture) const {
   const auto scale = static_cast<std::size_t>(request.supersampling);
   const auto width = static_cast<std::size_t>(request.width);

@@ -82,7 +82,7 @@ struct VertexSums {
 
   explicit VertexSums(std::size_t vertices) : x(vertices), y(vertices) {}
 
-  // What the tile's faces have, of which face n of the rule is ids[n] of the mesh.
+  // Adds the gradients of a tile's faces; face n of the rule is ids[n] of the mesh.
   void Add(const raster::ScreenMesh& mesh, const std::vector<std::int32_t>& ids,
            const NearFacesT<float>& tile) {
     for (std::size_t n = 0; n < tile.source.size(); ++n) {
@@ -106,7 +106,7 @@ void AddCamera(const Camera& b, Camera* a) {
   a->cy += b.cy;
 }
 
-// Sums its gradients by itself, tile after tile of the image.
+// Sums its own gradients, tile by tile of the image.
 class PaperAlpha final : public AlphaStage {
  public:
   AlphaNeeds needs() const override { return {.bounded = false, .own_sums = true}; }
@@ -119,7 +119,7 @@ class PaperAlpha final : public AlphaStage {
                   PipelineGradients* d_scene) const override;
 
  private:
-  // The faces that take part, in their order, and the gradients of those near the tiles of a bin.
+  // The faces that take part, in order, and the gradients of those near the tiles of a bin.
   struct Image {
     std::vector<std::int32_t> ids;  // of the mesh
     std::vector<raster::NdcFace<float>> faces;

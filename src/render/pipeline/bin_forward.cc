@@ -49,7 +49,7 @@ void FillRows(const raster::PixelRect& rect, int width, T value, T* image) {
   }
 }
 
-// Where no face is drawn.
+// For bins without faces.
 void WriteBackground(const raster::PixelRect& rect, int width, std::int32_t* ids, float* depth) {
   FillRows(rect, width, raster::kNoFace, ids);
   if (depth != nullptr) FillRows(rect, width, std::numeric_limits<float>::infinity(), depth);
@@ -61,7 +61,7 @@ void WriteDepth(const raster::PixelRect& rect, int width, const float* inverse, 
   });
 }
 
-// Turns the weights of a cut piece's corners into those of its source face.
+// Converts the weights of a clipped piece's corners to those of its source face.
 void MixCutWeights(const PipelineScene& scene, const raster::ScreenMesh& mesh,
                    const raster::PixelRect& rect, const std::int32_t* faces, float* w1, float* w2) {
   ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
@@ -90,7 +90,7 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
   return all != raster::kNoFace;
 }
 
-// Behind what the pixels of `peeled` show; they show this layer then.
+// Draws what is behind `peeled`, and updates it to this layer.
 void PeelBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, float* peeled) {
   worker->behind.assign(raster::kBinSize * raster::kBinSize, 0);
   ForEachPixel(task.rect, input.options.width, [&](std::size_t in_bin, std::size_t in_image) {
@@ -131,7 +131,7 @@ bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFr
   return true;
 }
 
-// Where a bin's attributes go: into the frame, or to the stage.
+// The destination of a bin's attributes: the frame, or the stage.
 raster::PlanarView<float> AttributeTarget(const BinInput& input, const BinTask& task,
                                           const ImageOfFrame& part, WorkerScratch* worker) {
   const auto channels = static_cast<std::size_t>(input.image.attributes.channels);

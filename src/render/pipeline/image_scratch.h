@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scratch of a Renderer: what is kept per image of the batch and per worker. Everything grows to
-// its largest use and stays.
+// Scratch of a Renderer, per image of the batch and per worker. All of it grows to its largest use
+// and stays allocated.
 #pragma once
 
 #include <cstddef>
@@ -26,9 +26,9 @@
 namespace tilegrad {
 
 // The faces of a batch's meshes. Scenes that share their array of faces, as those of a template
-// mesh do, share what follows from it: it then stays in the cache from image to image.
+// mesh do, share everything derived from it, which then stays in the cache from image to image.
 
-// Tells whether an image still has the faces that it was prepared from.
+// Identifies the faces that an image was prepared from.
 struct TopologyId {
   std::size_t index = 0;
   std::uint64_t version = 0;  // 0: no faces
@@ -42,26 +42,26 @@ struct FaceTopology {
   raster::FaceCorners corners;        // of `faces`
 };
 
-// Grows to its largest use and stays.
+// Grows to its largest use and stays allocated.
 class Topologies {
  public:
-  // Makes the topologies of a batch, if they are not those of the last one.
+  // Builds the topologies of a batch, unless they are those of the last one.
   void Update(std::span<const PipelineScene> scenes, const Workers& workers);
 
-  // That of scene n. Images may look at its corners as long as it has the same id.
+  // The topology of scene n. Images may keep views of its corners as long as it has the same id.
   const FaceTopology& of(std::size_t n) const { return topologies_[of_scene_[n]]; }
 
  private:
   void Group(std::span<const PipelineScene> scenes);
 
-  std::deque<FaceTopology> topologies_;   // stay where they are as more come
-  std::vector<std::size_t> of_scene_;     // which of them
-  std::vector<std::size_t> first_scene_;  // that has it
+  std::deque<FaceTopology> topologies_;   // a deque, so that addresses stay valid as it grows
+  std::vector<std::size_t> of_scene_;     // index into topologies_, per scene
+  std::vector<std::size_t> first_scene_;  // that uses it, per topology
   std::uint64_t updates_ = 0;
 };
 
-// What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
-// the forward pass of the same scenes.
+// The inputs an ImageScratch was made from, to see whether it is still valid: a backward pass
+// mostly follows the forward pass of the same scenes.
 struct PreparedFrom {
   bool valid = false, drawn_bins = false, alpha = false;
   AlignedVector<float> positions;
@@ -70,7 +70,7 @@ struct PreparedFrom {
   RenderOptions options;
 };
 
-// A scene on the screen, ready for its bins.
+// A scene projected to the screen, ready for its bins.
 struct ImageScratch {
   raster::ScreenMeshBuffers buffers;
   raster::ScreenMesh mesh;
@@ -81,8 +81,8 @@ struct ImageScratch {
   raster::DrawnFaces drawn_faces;
   raster::BinListBuffers drawn_buffers;
   raster::BinLists drawn;
-  raster::SoftTree soft;                                 // where the rule of alpha asks for it
-  AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, as MergeScratch's
+  raster::SoftTree soft;                                 // if the alpha rule needs it
+  AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, like MergeScratch's
   PreparedFrom prepared;
 };
 
@@ -90,16 +90,16 @@ struct ImageScratch {
 struct MergeScratch {
   AlignedVector<float> d_vertices;              // [V][4] d_x, d_y, d_inverse_depth, 0
   AlignedVector<float> d_rows;                  // [rows of attributes][groups of channels][4]
-  AlignedVector<float> d_attributes, d_clip_t;  // where faces were cut
+  AlignedVector<float> d_attributes, d_clip_t;  // only if faces were clipped
   raster::ProjectBackwardScratch project;
 };
 
 // Gradients of the faces seen in one band of an image.
 struct BandGradients {
   std::size_t stride = 0;
-  AlignedVector<std::int32_t> faces;   // those of slots 1, 2, ...
+  AlignedVector<std::int32_t> faces;   // the faces of slots 1, 2, ...
   AlignedVector<float> values;         // as FinishBand writes them; never shrinks
-  AlignedVector<std::int32_t> pieces;  // where faces were cut: which piece each pixel sees
+  AlignedVector<std::int32_t> pieces;  // if faces were clipped: the piece visible at each pixel
 };
 
 // Gradients through the alpha of one bin of an image.
@@ -108,17 +108,17 @@ using BinGradients = AlignedVector<raster::SoftFaceGradient>;
 struct WorkerScratch {
   std::size_t index;  // of the worker
   raster::VisibilityBin bin;
-  AlignedVector<float> behind;  // of a frame that is peeled, [kBinSize][kBinSize]
+  AlignedVector<float> behind;  // for depth peeling, [kBinSize][kBinSize]
   raster::InterpolateScratch interpolate;
   raster::BandSums band;
   MergeScratch merge;
   RenderStats stats;
   RenderTimes times;
-  // Of a PixelStage: attributes of a strip, the faces of a strip on the way back, cotangents of a
-  // band.
+  // For a PixelStage: attributes of a strip, the faces of a strip in the backward pass, cotangents
+  // of a band.
   AlignedVector<float> varyings, d_varyings;
   AlignedVector<std::int32_t> strip_faces;
-  // Of an image that is small enough to be one task: it stays in the worker's cache.
+  // For an image small enough to be one task: stays in the worker's cache.
   raster::DrawnFaces drawn_faces;
   raster::BinListBuffers drawn_buffers;
   BandGradients band_gradients;

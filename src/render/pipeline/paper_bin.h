@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule of raster/soft_mask/paper_ref.h, tile by tile: only faces near a tile are looked at, in
-// their order, so the result is that of all of them. Scalar; T: float, double. It serves the
-// renderer (alpha_stage.cc) and faces that come projected (compat/kaolin/projected_raster.h).
+// The rule of raster/soft_mask/paper_ref.h, tile by tile: visits only faces near a tile, in order,
+// with the same result as visiting all. Scalar; T: float, double. Used by the renderer
+// (alpha_stage.cc) and for projected faces (compat/kaolin/projected_raster.h).
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace tilegrad {
 
-// 1 / delta, but no more than float can multiply by: the kernel is as sharp as pixels are long
-// before, and infinity times the distance 0 is no number.
+// 1 / delta, limited to what float can multiply by: the kernel is sharper than pixels long before,
+// and infinity times the distance 0 would be NaN.
 inline double InverseDelta(double delta) { return std::min(1 / delta, 1e30); }
 
 inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
@@ -49,19 +49,19 @@ raster::NdcFace<T> NdcFaceOf(const raster::ScreenMeshT<T>& mesh, std::size_t fac
   return out;
 }
 
-// Some faces of an image, in their order, and where they come from.
+// Some faces of an image, in order, with their indices.
 template <class T>
 struct NearFacesT {
   std::vector<raster::NdcFace<T>> faces;
   std::vector<std::size_t> source;
 };
 
-// Those whose box, grown by `box` (NDC), may hold a pixel centre of `rect`, in an image of width x
-// height.
+// The faces whose box, grown by `box` (NDC), may contain a pixel centre of `rect`, in an image of
+// width x height.
 template <class T>
 NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster::PixelRect& rect,
                         int width, int height, double box) {
-  const double grown = box + 1e-5;  // of rounding to float in InPaperBox
+  const double grown = box + 1e-5;  // margin for rounding to float in InPaperBox
   const double x0 = NdcX(double(rect.x0), width) - grown;
   const double x1 = NdcX(double(rect.x1), width) + grown;
   const double y0 = NdcY(double(rect.y1), height) - grown;
@@ -78,7 +78,7 @@ NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster:
   return out;
 }
 
-// The same of faces that were near a larger rectangle.
+// The same from faces near a larger rectangle.
 template <class T>
 NearFacesT<T> FacesNear(const NearFacesT<T>& of, const raster::PixelRect& rect, int width,
                         int height, double box) {
@@ -106,7 +106,7 @@ void ForPaperTiles(std::span<const raster::NdcFace<T>> faces, double box, const 
   });
 }
 
-// Calls visit(pixel of the image, x, y) in NDC for the pixels of a tile.
+// Calls visit(pixel index in the image, x, y), in NDC, for the pixels of a tile.
 template <class T, class Visit>
 void ForNdcPixels(const PaperRegion& tile, const Visit& visit) {
   for (int i = tile.rect.y0; i < tile.rect.y1; ++i) {

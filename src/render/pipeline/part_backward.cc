@@ -13,7 +13,7 @@
 namespace tilegrad {
 namespace {
 
-// Faces of the screen mesh, from the ids of the caller's faces, in rows of a mesh that was cut.
+// Converts ids of the caller's faces to faces of a clipped screen mesh, in rows.
 void FindPieces(const raster::ScreenMesh& mesh, int row_begin, std::span<const std::int32_t> ids,
                 AlignedVector<std::int32_t>* faces) {
   faces->resize(ids.size());
@@ -24,7 +24,7 @@ void FindPieces(const raster::ScreenMesh& mesh, int row_begin, std::span<const s
   }
 }
 
-// Where a band lies in the batch.
+// Position of a band in the batch.
 struct BandPlace {
   int row_begin, row_end;
   std::size_t plane;         // pixels of an image
@@ -66,7 +66,7 @@ struct StripPlace {
   int row_count() const { return band.row_end - band.row_begin; }
 };
 
-// The faces of a strip, in rows of kBinSize. Returns whether there is one.
+// Gathers the faces of a strip, in rows of kBinSize. Returns whether there are any.
 bool GatherStripFaces(const StripPlace& strip, AlignedVector<std::int32_t>* faces) {
   faces->assign(static_cast<std::size_t>(raster::kBinSize * strip.row_count()), raster::kNoFace);
   std::int32_t all = raster::kNoFace;
@@ -113,8 +113,7 @@ void RunStageBackward(const BackwardInput& input, const ImageScratch& image, con
   clock.Lap(&worker->times.stage);
 }
 
-// The cotangents of the attributes of a band, from the stage. False: it met a number that is not
-// finite.
+// The cotangents of a band's attributes, from the stage. False: a number is not finite.
 bool BandCotangents(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
                     const BandPlace& place, std::span<const std::int32_t> faces,
                     WorkerScratch* worker) {
@@ -203,7 +202,7 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
 
 namespace {
 
-// All is loaded before anything is stored, so that compilers see one vector.
+// Loads everything before storing anything, so that compilers see one vector.
 void AddQuad(const float* from, float* to) {
   float sum[4];
   for (int i = 0; i < 4; ++i) sum[i] = to[i] + from[i];
@@ -238,7 +237,7 @@ void AddBinGeometry(const raster::ScreenMesh& mesh, const BinGradients& bin, flo
   }
 }
 
-// `d_rows` [row][group][4] of the attributes' rows.
+// Adds to `d_rows` [row][group][4] of the attributes' rows.
 void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradients& band,
                        float* d_rows) {
   const std::size_t groups = raster::ChannelGroups(image.attributes.channels);
@@ -255,8 +254,8 @@ void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradi
   });
 }
 
-// [row][channels] <- [row][group][4]: whole quads as long as what is too much of one is written
-// over by the next.
+// [row][channels] <- [row][group][4]: copies whole quads as long as the next one overwrites the
+// excess of each.
 void PackRows(const AlignedVector<float>& quads, std::size_t channels, std::span<float> rows) {
   const std::size_t groups = raster::ChannelGroups(static_cast<int>(channels));
   const float* from = quads.data();
@@ -288,7 +287,7 @@ void SumAttributes(const ImageScratch& image, const ImageGradients& gradients,
   PackRows(*d_rows, channels, d_attributes);
 }
 
-// Attributes of a mesh that was cut; d_clip_t is wanted wherever geometry is.
+// Attributes of a clipped mesh; d_clip_t is needed whenever geometry is.
 void MergeClippedAttributes(const PipelineScene& scene, const ImageScratch& image,
                             const ImageGradients& gradients, MergeScratch* scratch,
                             PipelineGradients* d_scene) {

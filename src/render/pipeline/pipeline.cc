@@ -19,7 +19,7 @@ namespace {
 struct ForwardCall {
   std::span<const PipelineScene> scenes;
   const RenderOptions& options;
-  PrepareRequest request;  // and the rule of alpha
+  PrepareRequest request;  // with the alpha rule
   Pipeline::Attributes attributes;
   FrameImages* frame;
 };
@@ -30,14 +30,14 @@ struct BackwardCall {
   PrepareRequest request;
   std::span<PipelineGradients> d_scenes;
   raster::SquareGrid grid;  // of bins
-  std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
+  std::size_t bands, bins;  // of each image; no bins if alpha has no gradient
 
-  // Of bins: what joins the gradients of bands on the screen.
+  // Bins whose gradients are merged with those of bands on the screen.
   std::size_t summed_bins() const { return bins > 0 && input.alpha->needs().own_sums ? 0 : bins; }
   bool wants_geometry(std::size_t n) const {
     return !d_scenes[n].positions.empty() || d_scenes[n].camera;
   }
-  // Where faces were cut, geometry moves the attributes at the cut.
+  // In clipped meshes, geometry moves the attributes at the cut.
   raster::BackwardRequest request_of(std::size_t n, const raster::ScreenMesh& mesh) const {
     const bool geometry = wants_geometry(n);
     return {geometry, !d_scenes[n].attributes.empty() || (geometry && mesh.was_clipped())};
@@ -46,9 +46,9 @@ struct BackwardCall {
 
 }  // namespace
 
-// How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
-// cache of its worker from beginning to end; so are larger ones as long as there are enough of them
-// for all workers, who share the parts of the last ones.
+// Splits the stages of a batch into tasks. An image of one bin is one task, so that it stays in its
+// worker's cache from start to end; so are larger ones as long as there are enough for all workers,
+// who share the parts of the last ones.
 struct Pipeline::Impl {
   explicit Impl(const Workers& w)
       : workers(&w),
@@ -99,7 +99,7 @@ struct Pipeline::Impl {
   }
 
   const Workers* workers;
-  std::atomic<bool> sound = true;  // false: on a way back some number was not finite
+  std::atomic<bool> sound = true;  // false: a number was not finite in a backward pass
   std::unique_ptr<AlphaStage> all_faces, paper;
   AlphaStage* alpha = nullptr;  // of the last call; null: no alpha
   Topologies topologies;
@@ -127,7 +127,7 @@ void Pipeline::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                 bin, worker, call.frame);
 }
 
-// The list of drawn faces, the largest thing of all, is the worker's, not the image's.
+// The list of drawn faces, the largest array of all, is the worker's, not the image's.
 void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
@@ -222,7 +222,7 @@ void Pipeline::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
   if (sound) Merge(call, n, part);
 }
 
-// Three sums that can be made at once, for the sake of a batch of one: the longest first.
+// Three independent sums that can run in parallel, for batches of one: the longest first.
 void Pipeline::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
                               const Workers::Part& part, PipelineGradients* d_scene) {
   ImageScratch& image = images[n];
@@ -260,7 +260,7 @@ void Pipeline::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
   clock.Lap(&worker->times.merge);
 }
 
-// Of a rule that does not hand its sums to MergeGeometry.
+// For a rule that does not pass its sums to MergeGeometry.
 void Pipeline::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
   if (call.bins == call.summed_bins() || !call.wants_geometry(n)) return;
   alpha->AddToScene(call.scenes[n], n, images[n], &call.d_scenes[n]);

@@ -8,7 +8,7 @@
 namespace tilegrad {
 namespace {
 
-// `attributes` of the scene, in the layout of the mesh; `storage` is for a mesh that was cut.
+// Converts `attributes` of the scene to the layout of the mesh; `storage` is for a clipped mesh.
 raster::AttributeViewT<const float> InMeshLayout(const PipelineScene& scene,
                                                  const raster::ScreenMesh& mesh,
                                                  raster::AttributeViewT<const float> attributes,
@@ -76,8 +76,8 @@ void PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats) {
   const PipelineScene& scene = in.scene;
-  // Compared only if that may save something: positions change from frame to frame. By bits, not
-  // hashes: what was kept is what would be computed again.
+  // Compares only if that may save work: positions change from frame to frame. By bits, not hashes,
+  // so that reuse gives what recomputation would.
   const bool same_positions =
       request.reuse && SameBits(scene.mesh->positions, image->prepared.positions);
   if (!same_positions || !IsPrepared(in, options, request, image->prepared)) {
@@ -99,7 +99,7 @@ namespace {
 
 std::size_t VerticesOf(const PipelineScene& scene) { return scene.mesh->positions.size() / 3; }
 
-// The very same array: its numbers need no check.
+// Whether both use the same array: its numbers need no comparison.
 bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
   return a.mesh->faces.data() == b.mesh->faces.data() &&
          a.mesh->faces.size() == b.mesh->faces.size() && VerticesOf(a) == VerticesOf(b);
@@ -115,7 +115,7 @@ bool HasFacesOf(const FaceTopology& topology, const PipelineScene& scene) {
 
 }  // namespace
 
-// Only neighbours are compared, so that a batch of all different meshes costs no more.
+// Compares only adjacent scenes, so that a batch of all different meshes costs no more.
 void Topologies::Group(std::span<const PipelineScene> scenes) {
   of_scene_.resize(scenes.size());
   first_scene_.clear();

@@ -15,7 +15,7 @@
 namespace tilegrad {
 namespace {
 
-// The arrays of a scene that are packed. Scenes with the same ones share what is packed.
+// Whether the packed arrays of two scenes are the same; then they share the packed data.
 bool SameSources(const Scene& a, const Scene& b) {
   bool same = a.faces.data() == b.faces.data() && a.faces.size() == b.faces.size();
   if (!same || a.positions.data() != b.positions.data()) return false;  // most often
@@ -184,7 +184,7 @@ Rows RowsOfStream(const Scene& scene, const SceneStream<float>& stream) {
   return scene.shading.normals == Normals::kFlat ? Rows::kFace : Rows::kVertex;
 }
 
-// Numbers to interpolate, their stride, and what a row belongs to.
+// Numbers to interpolate, their stride, and the index of their rows.
 struct Source {
   const float* values;
   std::size_t stride;
@@ -318,7 +318,7 @@ void AddSurfaces(const StageScene& scene, const SceneSums& sums, std::span<Surfa
   }
 }
 
-// From unit directions to those of the caller.
+// From unit directions to the caller's directions.
 void AddLights(const StageScene& scene, const SceneSums& sums, std::span<Light> d_lights) {
   for (std::size_t k = 0; k < d_lights.size(); ++k) {
     const auto& unit = scene.lights[k].direction;
@@ -393,7 +393,7 @@ void GradientMerge::Run(const Batch& batch) {
   if (batch.plan.to_texture) MergeTextures(batch);
 }
 
-// Positions that were interpolated, and normals derived from positions.
+// Gradients of interpolated positions, and of normals derived from positions.
 void GradientMerge::AddToPositions(const Batch& batch, std::size_t n) {
   SceneScratch& s = scratch_[n];
   if (s.d_positions.empty()) return;
@@ -411,7 +411,7 @@ void GradientMerge::AddToPositions(const Batch& batch, std::size_t n) {
   AddNormalsAdjoint(scene, normals, s.d_units, s.d_positions);
 }
 
-// Of a stream; others, to which this adds nothing, are set to 0 unless that is done later.
+// For a stream; sets other arrays, to which this adds nothing, to 0 unless that happens later.
 void GradientMerge::FillArray(const Batch& batch, std::span<const Targets::Target> array) const {
   const Targets::Target& first = array.front();
   const BackwardPlan& plan = batch.plan;
@@ -419,7 +419,7 @@ void GradientMerge::FillArray(const Batch& batch, std::span<const Targets::Targe
   const std::span<float> out = first.out;
   std::fill(out.begin(), out.end(), 0.0f);
   const bool position = first.stream == Varying::kPosition;
-  // Normals of positions are pulled; those that the scene has besides are not used.
+  // Normals derived from positions get the gradient; normals given in the scene are unused.
   const bool unused =
       first.stream == Varying::kNormal && plan.parts.shading.normals != Normals::kGiven;
   if (!first.stream || unused || (!position && !plan.pulled[*first.stream])) return;
@@ -434,7 +434,7 @@ void GradientMerge::FillArray(const Batch& batch, std::span<const Targets::Targe
   }
 }
 
-// Lights, coefficients, surfaces and, beside what geometry pulls, cameras.
+// Lights, coefficients, surfaces and, besides the part from geometry, cameras.
 void GradientMerge::MergeUniforms(const Batch& batch) {
   const std::span<const StageScene> scenes = batch.inputs.scenes();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
@@ -452,7 +452,7 @@ void GradientMerge::FindTextures(const Batch& batch) {
   textures_.clear();
   for (const auto& array : batch.targets.arrays()) {
     if (!array.front().texture) continue;
-    const shade::TexturePyramid* most = nullptr;  // one is mip-mapped: there is room for its levels
+    const shade::TexturePyramid* most = nullptr;  // the one with mip levels, if any
     for (const Targets::Target& target : array) {
       const auto* pyramid = batch.inputs.scenes()[target.scene].textures[*target.texture];
       if (most == nullptr || pyramid->sizes().size() > most->sizes().size()) most = pyramid;
@@ -464,7 +464,7 @@ void GradientMerge::FindTextures(const Batch& batch) {
   }
 }
 
-// Each texel gets its sum in the order of scenes, bands and pixels, whatever the number of parts.
+// Sums each texel in the order of scenes, bands and pixels, whatever the number of parts.
 void GradientMerge::MergeTextures(const Batch& batch) {
   FindTextures(batch);
   workers_->For(textures_.size(), [&](std::size_t i, std::size_t) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scenes of a batch made ready for the renderer and its shade stage: lights with unit
-// directions, textures with their levels, streams side by side as a plan says. Scratch that is
-// reused.
+// Prepares the scenes of a batch for the renderer and its shade stage: lights with unit directions,
+// textures with mip levels, streams packed according to a plan. Reuses its scratch.
 #pragma once
 
 #include <cstddef>
@@ -24,42 +23,43 @@
 
 namespace tilegrad {
 
-// The streams of a scene side by side, as the renderer interpolates them, and gradients taken apart
-// again.
+// Packs the streams of a scene as the renderer interpolates them, and unpacks gradients.
 
-// Normals of a scene, where they are derived from its positions: [V] or [F].
+// Normals of a scene derived from its positions: [V] or [F].
 using SceneNormals = AlignedVector<shade::UnitVector<float>>;
 void DeriveNormals(const Scene& scene, SceneNormals* normals);
 
-// out [rows][channels] in the rate of the set. `normals` as DeriveNormals makes them.
+// out [rows][channels] at the rate of the set. `normals` from DeriveNormals.
 void PackVaryings(const Scene& scene, const VaryingSet& set, const SceneNormals& normals,
                   AlignedVector<float>* out);
 
-// Adds what `packed` [rows][channels], a gradient of PackVaryings' array, says of one stream to
-// `stream`: as in the scene; positions for kPosition; for derived normals, [V] or [F] of three.
+// Adds the gradient of one stream in `packed` [rows][channels], the gradient of PackVaryings'
+// output, to `stream`: as in the scene; positions for kPosition; for derived normals, [V] or [F] of
+// three.
 void AddStream(const Scene& scene, const VaryingSet& set, Varying what,
                std::span<const float> packed, std::span<float> stream);
 
-// Adds to d_positions the adjoint of DeriveNormals. d_units [V] or [F] is overwritten.
+// Adds the adjoint of DeriveNormals to d_positions. Overwrites d_units [V] or [F].
 void AddNormalsAdjoint(const Scene& scene, const SceneNormals& normals,
                        std::span<shade::Vec3<float>> d_units, std::span<float> d_positions);
 
-// What to lay side by side.
+// The streams to pack.
 struct StreamSets {
-  const VaryingSet& varyings;              // forward, or what is pulled on
+  const VaryingSet& varyings;              // forward, or those with a requested cotangent
   bool normals = false;                    // normals are needed, derived if the scene says so
-  const VaryingSet* recomputed = nullptr;  // on the way back, where it is not the same
+  const VaryingSet* recomputed = nullptr;  // in the backward pass, if different
 };
 
 class ShadeInputs {
  public:
   explicit ShadeInputs(const Workers& workers) : workers_(&workers) {}
 
-  // Everything but streams, which Pack or UsePlain adds. `textures`: whether they are sampled.
+  // Prepares everything but streams, which Pack or UsePlain adds. `textures`: whether they are
+  // sampled.
   void Begin(std::span<const Scene> scenes, bool textures);
-  // Streams side by side. Error: normals of positions that overflow float.
+  // Packs streams. Error: normals of positions that overflow float.
   Status Pack(std::span<const Scene> scenes, const StreamSets& sets);
-  // Streams as they are: colours, user attributes, or none.
+  // Uses streams unpacked: colours, user attributes, or none.
   void UsePlain(std::span<const Scene> scenes, bool colors, bool user);
 
   std::span<const StageScene> scenes() const { return stage_scenes_; }
@@ -71,17 +71,17 @@ class ShadeInputs {
   const SceneWork& work() const { return work_; }  // since Begin
 
  private:
-  // What is packed of a scene, or of several that share their arrays.
+  // The packed streams of a scene, or of several that share their arrays.
   struct ScenePack {
     SceneNormals normals;
     AlignedVector<float> varyings;    // forward, or pulled
-    AlignedVector<float> recomputed;  // where it is not the same
+    AlignedVector<float> recomputed;  // if different
   };
 
   void PrepareTextures(std::span<const Scene> scenes);
   void FindPacks(std::span<const Scene> scenes);
   void DerivePackNormals(std::span<const Scene> scenes);
-  bool PackStreams(std::span<const Scene> scenes, const StreamSets& sets);  // all are finite
+  bool PackStreams(std::span<const Scene> scenes, const StreamSets& sets);  // false: not finite
 
   const Workers* workers_;
   SceneWork work_;
@@ -94,36 +94,36 @@ class ShadeInputs {
 };
 
 // Last stage of the backward pass of shading: turns the cotangents of a scene's streams and the
-// sums of bands into gradients of the scene. Sums are formed in the order of scenes and bands.
+// sums of bands into gradients of the scene. Sums in the order of scenes and bands.
 
-// Scratch that is reused.
+// Reuses its scratch.
 class GradientMerge {
  public:
   using Targets = GradientTargets<float>;
 
   explicit GradientMerge(const Workers& workers) : workers_(&workers) {}
 
-  // Where Pipeline::Backward is to write, given the views that it gets: scratch of each scene.
+  // The destinations for Pipeline::Backward, given its views: scratch of each scene.
   std::span<PipelineGradients> Begin(const BackwardPlan& plan, std::span<const PipelineScene> views,
                                      const Targets& targets);
 
-  // What a merge is about.
+  // Input of a merge.
   struct Batch {
     const BackwardPlan& plan;
     const ShadeInputs& inputs;
-    const ShadeStage* stage;  // null: none has run
+    const ShadeStage* stage;  // null: no stage ran
     const Targets& targets;
   };
-  // Overwrites the arrays of the targets and their scenes' own records.
+  // Overwrites the arrays of the targets and their per-scene records.
   void Run(const Batch& batch);
 
  private:
-  // Of one scene before they are summed.
+  // Gradients of one scene before summation.
   struct SceneScratch {
     AlignedVector<float> d_varyings, d_positions;
     AlignedVector<shade::Vec3<float>> d_units;
   };
-  // The array of a texture's gradient.
+  // The gradient array of a texture.
   struct TextureTarget {
     std::span<const Targets::Target> array;
     const shade::TexturePyramid* pyramid;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of run.h: one pixel, from what was interpolated to colour, and back. T: float,
+// Reference of run.h: one pixel, from interpolated values to colour, and its adjoint. T: float,
 // double, std::complex<double>.
 #pragma once
 
@@ -17,7 +17,7 @@
 
 namespace tilegrad {
 
-// What was interpolated, and what holds for the pixel's face. Also the gradient of it.
+// The interpolated values, and properties of the pixel's face. Also their gradient.
 template <class T>
 struct ShadePixel {
   shade::Vec3<T> color = {T(1), T(1), T(1)};
@@ -28,7 +28,7 @@ struct ShadePixel {
   std::size_t surface = 0;
 };
 
-// The list of what is interpolated: calls visit(varying, its numbers).
+// The list of interpolated values: calls visit(varying, its numbers).
 template <class T, class Visit>
 void ForEachPixelPart(ShadePixel<T>& p, const Visit& visit) {
   visit(Varying::kColor, std::span<T>(p.color));
@@ -38,7 +38,7 @@ void ForEachPixelPart(ShadePixel<T>& p, const Visit& visit) {
   visit(Varying::kLightDirection, std::span<T>(p.light_direction));
 }
 
-// What pixels of a scene have in common. Also the gradient of it.
+// What pixels of a scene share. Also its gradient.
 template <class T>
 struct ShadeUniforms {
   std::vector<SurfaceT<T>> surfaces;
@@ -56,7 +56,7 @@ shade::ColorFactorsT<T> FactorsOf(const ShadingModel& shading, const SurfaceT<T>
   return {s.base_color, {T(0), T(0), T(0)}, {T(1), T(1), T(1)}, {T(0), T(0), T(0)}};
 }
 
-// Values on the way to the colour of a pixel.
+// Intermediate values in the colour of a pixel.
 template <class T>
 struct PixelValues {
   shade::UnitVector<T> normal, eye, light;
@@ -85,7 +85,7 @@ class PixelShaderRef {
     return v;
   }
 
-  // Adds to *d and *d_uniforms. d_normal: on the unit normal.
+  // Adds to *d and *d_uniforms. d_normal: by the unit normal.
   void Backward(const ShadePixel<T>& p, const shade::Vec3<T>& d_color,
                 const shade::Vec3<T>& d_normal, ShadePixel<T>* d,
                 ShadeUniforms<T>* d_uniforms) const {

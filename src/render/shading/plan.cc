@@ -16,7 +16,7 @@ Rate RateOf(const SceneParts& parts, Varying v) {
   return normals == Normals::kFlat ? Rate::kCorner : Rate::kVertex;
 }
 
-// Corner rate as soon as one of them has it.
+// Corner rate if any of them has it.
 void Finish(const SceneParts& parts, VaryingSet* set) {
   set->user_channels = parts.user_channels;
   for (std::size_t i = 0; i < kVaryings; ++i) {
@@ -28,7 +28,7 @@ void Finish(const SceneParts& parts, VaryingSet* set) {
   }
 }
 
-// Whether an image of colour is nothing but the interpolated colours.
+// Whether the colour image is just the interpolated colours.
 bool IsPlainColor(const SceneParts& parts) {
   return parts[Varying::kColor] && !parts.textures && !parts.surfaces && !parts.lit() &&
          !parts.shading.clamp;
@@ -50,7 +50,7 @@ ShadeSteps ColorSteps(const SceneParts& parts) {
           .highlight = parts.shading.lighting == Lighting::kPhong};
 }
 
-// Whose normals are computed in the end.
+// Flips normals at the end of their computation.
 void TurnNormals(const SceneParts& parts, ShadeSteps* steps) {
   steps->turn = steps->normal && parts.shading.two_sided;
 }
@@ -93,7 +93,7 @@ VaryingSet PulledVaryings(const BackwardPlan& plan) {
   return set;
 }
 
-// Whether the adjoint of colour needs what light or surfaces multiply.
+// Whether the adjoint of colour needs the factors of light or surfaces.
 bool PullsOnFactors(const BackwardPlan& plan) { return plan.to_light || plan.to_surfaces; }
 bool PullsOnTexture(const BackwardPlan& plan) { return plan.to_uv || plan.to_texture; }
 
@@ -125,7 +125,7 @@ VaryingSet RecomputedVaryings(const BackwardPlan& plan) {
   return set;
 }
 
-// Of all but the user's channels.
+// For all but the user's channels.
 constexpr std::array<int, kVaryings> kWidths = [] {
   std::array<int, kVaryings> out = {};
   Scene scene;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Only what is needed is computed. The plan is made once for a batch, from what its scenes hold,
-// the requested images and gradients; every stage consults it, and it can be printed.
+// Plans which steps to compute, once per batch, from the arrays of its scenes and the requested
+// images and gradients; every stage consults the plan, and it can be printed.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace tilegrad {
 
-// Which of the varyings, and where their channels stand: in their order.
+// A subset of the varyings, and their channels, in order.
 struct VaryingSet {
   std::array<bool, kVaryings> has = {};
   Rate rate = Rate::kVertex;  // of the array that holds them
@@ -29,15 +29,15 @@ struct VaryingSet {
   bool operator==(const VaryingSet&) const = default;
 };
 
-// What a batch of scenes is made of; they must agree.
+// The arrays and model of a batch of scenes, which must agree.
 struct SceneParts {
   ShadingModel shading;
-  std::array<bool, kVaryings> has = {};    // which streams
+  std::array<bool, kVaryings> has = {};    // streams present
   std::array<Rate, kVaryings> rates = {};  // of them
   bool textures = false, surfaces = false;
-  bool bilinear = false;  // some texture is filtered: coordinates have a gradient
+  bool bilinear = false;  // some texture is filtered: uvs have a gradient
   bool trilinear = false;
-  bool may_overflow = false;  // some number is so large that images may leave float's range
+  bool may_overflow = false;  // some number is so large that images may overflow float
   int user_channels = 0;
 
   bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
@@ -49,18 +49,18 @@ struct SceneParts {
 struct ShadeSteps {
   bool color = false, texture = false, level = false, normal = false, light = false;
   bool highlight = false;
-  bool turn = false;  // normals of faces that are seen from behind
+  bool turn = false;  // flip normals of faces seen from behind
 
   bool any() const { return color || texture || normal; }
 };
 
-// `color`: the requested image, or the one with a cotangent.
+// `color`: the image is requested, or has a cotangent.
 struct ForwardPlan {
   SceneParts parts;
   Outputs request;
   VaryingSet varyings;
   ShadeSteps steps;
-  // Attributes are images themselves: the colours, or the user's channels. Nothing is packed.
+  // Attributes are images themselves: the colours, or the user's channels. Nothing to pack.
   bool colors_only = false, user_only = false;
 
   bool staged() const {
@@ -68,7 +68,7 @@ struct ForwardPlan {
   }
 };
 
-// Which cotangents and gradients there are, in any scene of a batch.
+// The cotangents and requested gradients of a batch, in any of its scenes.
 struct GradientWishes {
   bool d_color = false, d_normals = false, d_uv = false, d_depth = false, d_user = false,
        d_alpha = false;
@@ -81,32 +81,32 @@ struct GradientWishes {
 struct BackwardPlan {
   SceneParts parts;
   GradientWishes wishes;
-  VaryingSet pulled;      // have a requested cotangent
-  VaryingSet recomputed;  // are needed for that; may be `pulled` itself
+  VaryingSet pulled;      // varyings whose cotangent is needed
+  VaryingSet recomputed;  // varyings needed for that; may equal `pulled`
   ShadeSteps steps;       // of the recomputation
-  // The targets of the adjoint of colour.
+  // Targets of the colour adjoint.
   bool to_colors = false, to_texture = false, to_uv = false, to_light = false, to_normal = false,
        to_eye = false, to_light_vectors = false, to_surfaces = false;
   bool geometry = false;
   bool colors_only = false, user_only = false;  // as in ForwardPlan
 
-  // Whether pixels have to be visited for more than alpha.
+  // Whether pixels must be visited for more than alpha.
   bool staged() const;
 };
 
 ForwardPlan PlanForward(const SceneParts& parts, const Outputs& request);
 BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes);
 
-// One stage of a call, as it was run.
+// One stage of a call.
 struct StageReport {
   std::string_view name;
-  std::int64_t count = 0;  // of `unit`; 0: it did not run
+  std::int64_t count = 0;  // of `unit`; 0: did not run
   std::string_view unit;
   double milliseconds = 0;  // summed over workers
-  std::string what;         // on what, or what spares it
+  std::string what;         // what it ran on, or why it did not
 };
 
-// A call of Renderer: its stages in their order, those too that did not run.
+// The stages of a Renderer call in order, including those that did not run.
 struct PlanReport {
   bool backward = false;
   std::vector<StageReport> stages;

@@ -49,7 +49,7 @@ StageReport Only(std::string_view name, std::int64_t count, std::string_view uni
   return {name, count, unit, ms, count > 0 ? std::move(what) : std::string(spared)};
 }
 
-// Steps that both directions have, after interpolation.
+// Steps shared by both directions, after interpolation.
 void AddShading(const SceneParts& parts, const ShadeWork& w, std::vector<StageReport>* out) {
   out->push_back(
       Only("gather", w.pixels, "pixels", w.gather, "foreground only", "attributes are the image"));
@@ -68,7 +68,7 @@ void AddScene(const SceneParts& parts, const SceneWork& w, std::vector<StageRepo
                       parts.trilinear ? "with their levels" : "level 0 only", "none needed"));
 }
 
-// The rule, and what it evaluated if it counts that.
+// The rule, and its evaluation counts if it has any.
 std::string Evaluated(const RenderStats& stats, std::string_view where = "") {
   if (stats.pairs == 0) return fmt::format("{}{}", stats.alpha_rule, where);
   return fmt::format("{}{}: {} pairs of face and pixel, {} exponentials", stats.alpha_rule, where,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan of a call with what it came to: counts and times by stage.
+// Reports the plan of a call with counts and times by stage.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 
 namespace tilegrad {
 
-// What a call did outside of the renderer's own stages, and the milliseconds it took.
+// Counts of what a call did outside of the pipeline, and milliseconds.
 struct SceneWork {
   std::int64_t normals = 0;  // faces whose normals were derived
-  std::int64_t texels = 0;   // of textures made ready
-  std::int64_t packed = 0;   // numbers of streams laid side by side
+  std::int64_t texels = 0;   // of prepared textures
+  std::int64_t packed = 0;   // packed numbers of streams
   double normals_ms = 0, textures_ms = 0, pack_ms = 0, merge_ms = 0;
 };
 
-// Of one call. `shade` is 0 where no stage ran.
+// Of one call. `shade` is 0 if no stage ran.
 struct CallWork {
   RenderStats stats;
   RenderTimes times;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run of pixels of one surface, from what was interpolated to colour, and back: the kernels of
-// src/shade, one after the other, as the plan says.
+// A run of pixels of one surface, from interpolated values to colour, and its adjoint: runs the
+// kernels of src/shade in sequence, according to the plan.
 #pragma once
 
 #include <algorithm>
@@ -26,11 +26,11 @@
 
 namespace tilegrad {
 
-// What the pixels of a surface in an image have in common.
+// What the pixels of a surface in an image share.
 struct RunScene {
   const ShadingModel* shading;
   const Surface* surface;
-  std::span<const Light> lights;  // unit directions; empty: one for each pixel
+  std::span<const Light> lights;  // unit directions; empty: one direction per pixel
   const shade::ShPolynomial* sh;
   const shade::TexturePyramid* texture;  // null: none
   shade::Vec3<float> eye;                // the camera's position
@@ -42,21 +42,20 @@ struct RunScene {
 // others.
 struct RunValues {
   shade::RunPlane vertex_color[3], uv[2], normal[3], position[3], light_direction[3];
-  shade::RunPlane side;   // 1 or -1: normals are turned by it; with ShadeSteps::turn
-  shade::RunPlane level;  // of the texture
+  shade::RunPlane side;   // 1 or -1: factor of normals; with ShadeSteps::turn
+  shade::RunPlane level;  // mip level
   shade::RunPlane texture[3], unit[3], inverse_length, eye[3], inverse_eye, unit_light[3],
       inverse_light, light, highlight, color[3];
 };
 
-// Cotangents. `color` and, where normals are an image, `unit` are given; the others are computed.
+// Cotangents. `color` is given and, if normals are an image, `unit`; the others are computed.
 struct RunCotangents {
   shade::RunPlane color[3], unit[3];
   shade::RunPlane vertex_color[3], uv[2], normal[3], position[3], light_direction[3];
   shade::RunPlane texture[3], light, highlight, eye[3];
 };
 
-// The list of what is interpolated: calls visit(varying, planes of it), of RunValues or
-// RunCotangents.
+// The list of interpolated values: calls visit(varying, its planes), of RunValues or RunCotangents.
 template <class Run, class Visit>
 void ForEachVarying(Run& run, const Visit& visit) {
   visit(Varying::kColor, std::span(run.vertex_color));
@@ -66,24 +65,24 @@ void ForEachVarying(Run& run, const Visit& visit) {
   visit(Varying::kLightDirection, std::span(run.light_direction));
 }
 
-// Sums of cotangents over pixels, for what the pixels share.
+// Sums of cotangents over pixels, for what pixels share.
 struct SurfaceSums {
   shade::ColorFactorsT<double> factors = {};
   double shininess = 0;
 };
 struct SceneSums {
   std::vector<SurfaceSums> surfaces;
-  std::vector<LightT<double>> lights;  // on unit directions
+  std::vector<LightT<double>> lights;  // by unit directions
   shade::ShPolynomialT<double> sh = {};
   shade::Vec3<double> eye = {};
-  // Of depth = -(z . p + t_z), z the third row of the rotation.
+  // For depth = -(z . p + t_z), z the third row of the rotation.
   shade::Vec3<double> depth_axis = {};
   double depth_shift = 0;
 
   void Clear(std::size_t surface_count, std::size_t light_count);
 };
 
-// What was done to pixels in a call, and the milliseconds it took.
+// Counts and milliseconds of the shading kernels in a call.
 struct ShadeWork {
   std::int64_t pixels = 0, lookups = 0, normals = 0, lit = 0, highlights = 0;
   double gather = 0, normal = 0, texture = 0, light = 0, color = 0, adjoint = 0, scatter = 0;
@@ -91,13 +90,13 @@ struct ShadeWork {
   void Add(const ShadeWork& other);
 };
 
-// Fills what `steps` ask for, but colour.
+// Fills everything that `steps` request except colour.
 void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v,
               ShadeWork* work);
-// Colour, after ShadeRun.
+// Computes colour, after ShadeRun.
 void ColorRun(std::size_t count, const ForwardPlan& plan, const RunScene& scene, RunValues* v);
 
-// Where the adjoint of a run goes. `shares` null: not wanted.
+// The destinations of a run's adjoint. `shares` null: not requested.
 struct RunTargets {
   RunCotangents* d;
   SurfaceSums* surface;
@@ -105,18 +104,17 @@ struct RunTargets {
   shade::TexelShare* shares;
 };
 
-// Given ShadeRun's values and d->color (if the plan's wishes have it) and d->unit (likewise
-// d_normals, else anything): the cotangents of the varyings that are pulled.
+// From ShadeRun's values, d->color (if wishes.d_color) and d->unit (if wishes.d_normals, else
+// anything), computes the cotangents of the pulled varyings.
 void ShadeRunAdjoint(std::size_t count, const BackwardPlan& plan, const RunScene& scene,
                      const RunValues& v, const RunTargets& out);
 
-// The pyramid level of a texture for a pixel: log2 of the texels that one step on the screen
-// crosses, the longer of the steps to the right and down (L. Williams, Pyramidal parametrics,
-// 1983).
+// The mip level for a pixel: log2 of the texels crossed by one pixel step on the screen, the longer
+// of the steps right and down (L. Williams, Pyramidal parametrics, 1983).
 //
 // With u = N / Q over a face (raster/interpolate.h), du/dx = (dN/dx - u dQ/dx) / Q. Planes are in
-// double for any T: of a face that was cut at the near plane the image holds a far end, where that
-// difference is a small remainder of what N and Q are elsewhere.
+// double for any T: a face clipped at the near plane may show only its far end, where that
+// difference is tiny compared with N and Q elsewhere.
 
 // Derivatives of (u, v) over a face, as planes: N of each, and Q.
 struct UvPlanes {
@@ -125,7 +123,7 @@ struct UvPlanes {
   double x0 = 0, y0 = 0, least_q = 0;
 };
 
-// How what is v0, v1, v2 at the corners of a face changes over the screen.
+// Screen-space gradient of a quantity that is v0, v1, v2 at the corners of a face.
 inline void SetSlopes(const raster::FacePlane<double>& face, double v0, double v1, double v2,
                       double* x, double* y) {
   *x = face.gx[1] * (v1 - v0) + face.gx[2] * (v2 - v0);
@@ -158,8 +156,8 @@ UvPlanes UvPlanesOf(const raster::ScreenMeshT<T>& mesh,
   return out;
 }
 
-// At the pixel centre (px, py), where the coordinates are (u, v), of a texture's size. Real: float,
-// whose logarithm is quicker, or double.
+// The level at pixel centre (px, py), with coordinates (u, v), for a texture of this size. Real:
+// float, whose logarithm is faster, or double.
 template <class Real>
 Real UvLevel(const UvPlanes& p, double px, double py, const double (&uv)[2], const int (&size)[2]) {
   const double q = std::max(p.q + p.q_x * (px - p.x0) + p.q_y * (py - p.y0), p.least_q);
@@ -175,21 +173,21 @@ Real UvLevel(const UvPlanes& p, double px, double py, const double (&uv)[2], con
   return Real(0.5) * std::log2(static_cast<Real>(most));
 }
 
-// Normals and light directions that are given may have any length. What is below a threshold after
-// interpolation has no direction (shade/normalize.h), which must mean: below it beside the others.
+// Given normals and light directions may have any length. Interpolated ones below a threshold count
+// as having no direction (shade/normalize.h), so the threshold must be relative to the others.
 
-// The power of two that brings the largest component of `directions` to about 1; 1 where it is
-// that already. It changes neither what becomes of directions nor, as a constant, their derivative.
+// The power of two that scales the largest component of `directions` to about 1; 1 if it is so
+// already. It changes neither normalised directions nor, as a constant, their derivative.
 template <class T>
 auto DirectionScale(std::span<const T> directions) {
   using Real = decltype(RealPart(T()));
   Real most = 0;
   for (const T& x : directions) most = std::max(most, std::abs(RealPart(x)));
   if (most == 0 || (most >= Real(0.0625) && most <= Real(16))) return Real(1);
-  return std::ldexp(Real(1), std::clamp(-std::ilogb(most), -126, 126));  // float holds it
+  return std::ldexp(Real(1), std::clamp(-std::ilogb(most), -126, 126));  // representable in float
 }
 
-// What a stream of a scene is multiplied by before it is interpolated, and its gradient after.
+// The factor on a scene's stream before interpolation, and on its gradient after.
 template <class T>
 auto StreamScale(const SceneT<T>& scene, Varying what) {
   const bool directions = what == Varying::kLightDirection ||

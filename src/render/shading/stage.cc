@@ -13,8 +13,8 @@ namespace {
 
 using shade::RunPlane;
 
-// The pixels of `rows` (kBinSize wide) that show a face, in their order, surface after surface.
-// `face_surfaces` [F] of `source_face` [mesh faces], or empty: all 0.
+// The foreground pixels of `rows` (kBinSize wide), in order, grouped by surface. `face_surfaces`
+// [F] of `source_face` [mesh faces], or empty: all 0.
 void FindSegments(const raster::FaceRows& rows, int columns,
                   std::span<const std::int32_t> source_face,
                   std::span<const std::int32_t> face_surfaces,
@@ -43,7 +43,7 @@ void FindSegments(const raster::FaceRows& rows, int columns,
   });
 }
 
-// Calls visit(run) for the runs that segments make.
+// Calls visit(run) for the runs formed by segments.
 template <class Visit>
 void ForEachRun(std::span<const PixelSegment> segments, const Visit& visit) {
   for (std::size_t i = 0; i < segments.size();) {
@@ -66,7 +66,7 @@ void ForEachRunPixel(const PixelRun& run, const Visit& visit) {
   }
 }
 
-// Where pixels of a strip stand in a plane of an image: rows of `row` floats.
+// Offsets of a strip's pixels in a plane of an image: rows of `row` floats.
 struct StripRows {
   std::ptrdiff_t row;
   std::ptrdiff_t operator()(std::int32_t at) const {  // of a pixel of the strip
@@ -84,7 +84,7 @@ void PadRun(std::size_t count, RunPlane* p) {
   std::fill(p->at + count, p->at + PaddedEnd(count), p->at[count - 1]);
 }
 
-// The same with zeros, as cotangents want it.
+// The same with zeros, as cotangents require.
 void PadRunWithZeros(std::size_t count, RunPlane* p) {
   std::fill(p->at + count, p->at + PaddedEnd(count), 0.0f);
 }
@@ -134,8 +134,8 @@ T* PlaneOf(T* batch, std::size_t planes, std::size_t c, std::size_t pixels,
   return batch + (strip.image * planes + c) * pixels + strip.first;
 }
 
-// Counter-clockwise in space is clockwise here, where y goes down. In double: of faces that reach
-// far out of the image float does not know the sign.
+// Counter-clockwise in space is clockwise here, where y goes down. In double: for faces that reach
+// far out of the image float cannot decide the sign.
 bool SeenFromFront(const raster::ScreenMesh& mesh, std::size_t f) {
   const raster::ScreenCorners<double> c = raster::Wide(raster::CornersOf(mesh, f));
   return (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]) <= 0;
@@ -378,7 +378,7 @@ void ShadeStage::ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
   }
 }
 
-// Adds the cotangent of the image of coordinates.
+// Adds the cotangent of the uv image.
 void ShadeStage::AddUvCotangents(const PixelStrip& strip, const PixelRun& run,
                                  RunCotangents* d) const {
   for (std::size_t c = 0; c < 2; ++c) {
@@ -391,7 +391,7 @@ void ShadeStage::AddUvCotangents(const PixelStrip& strip, const PixelRun& run,
   }
 }
 
-// Room for the shares of a run's lookups; null where the texture has no gradient.
+// Allocates the shares of a run's lookups; null if the texture has no gradient.
 shade::TexelShare* ShadeStage::NewShares(const RunScene& scene, std::size_t count,
                                          StageBand* band) const {
   if (!backward_->to_texture || scene.texture == nullptr) return nullptr;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading as a stage of the renderer: the foreground pixels of a strip are gathered into runs of
-// one surface (run.h), shaded and scattered to the images; on the way back, to cotangents of what
-// was interpolated, and sums for each band.
+// Shading as a stage of the renderer: gathers the foreground pixels of a strip into runs of one
+// surface (run.h), shades them and scatters the results to the images; backward, to cotangents of
+// the interpolated values, and sums per band.
 #pragma once
 
 #include <array>
@@ -19,21 +19,21 @@
 
 namespace tilegrad {
 
-// Neighbours in a row of a strip whose faces have one surface.
+// Adjacent pixels in a row of a strip whose faces have the same surface.
 struct PixelSegment {
   std::int32_t surface;
   std::int32_t at;     // of the first pixel in the strip
   std::int32_t count;  // up to kRunPixels
 };
 
-// Segments of one surface, of kRunPixels at most together.
+// Segments of one surface, at most kRunPixels pixels together.
 struct PixelRun {
   std::span<const PixelSegment> segments;
   std::size_t count;  // pixels
   std::int32_t surface() const { return segments[0].surface; }
 };
 
-// A scene of the batch, ready for its pixels.
+// A scene of the batch, prepared for shading.
 struct StageScene {
   const Scene* scene = nullptr;
   std::vector<Surface> surfaces;
@@ -44,13 +44,13 @@ struct StageScene {
   std::vector<const shade::TexturePyramid*> textures;
 };
 
-// What a band of an image has summed.
+// The sums of one band of an image.
 struct StageBand {
   SceneSums sums;
   std::vector<std::vector<shade::TexelShare>> shares;  // of each texture
 };
 
-// Of one worker.
+// Scratch of one worker.
 struct StageWorker {
   std::vector<PixelSegment> segments;
   RunValues values;
@@ -62,7 +62,7 @@ class ShadeStage : public PixelStage {
  public:
   explicit ShadeStage(std::size_t workers);
 
-  // What the next call is about; all is kept by the caller.
+  // Start a call; the caller keeps all arguments alive.
   void BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
                     const RenderOptions& options, FrameImages* frame);
   void BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,

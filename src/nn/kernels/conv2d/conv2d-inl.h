@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward convolution and its input gradient, stated as a ConvProduct each.
+// Forward convolution and its input gradient, each expressed as a ConvProduct.
 
 #if defined(TILEGRAD_NN_KERNELS_CONV2D_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_CONV2D_INL_H_
@@ -20,7 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// The tables of a product in one piece of index memory: phases, then taps, then steps of a block.
+// The tables of a product in one block of index memory: phases, then taps, then steps of a block.
 inline std::size_t ConvIndexCount(std::size_t phases, std::size_t taps) {
   return phases + 1 + 2 * taps + std::max(kConvDepth * phases + taps, taps);
 }
@@ -60,8 +60,8 @@ inline ConvTaps ForwardTaps(const Conv2dShape& s, const PlaneGrid& planes, std::
   return taps;
 }
 
-// Input pixel h = q s + a (phase a) meets y[q + i] under tap u where u + i s = a + p. Planes are y
-// with zeros around it, beginning at the least i.
+// Input pixel h = q s + a (phase a) pairs with y[q + i] under tap u, where u + i s = a + p. Planes
+// are y padded with zeros, starting at the least i.
 inline std::ptrdiff_t LeastShift(const Conv2dShape& s, std::size_t kernel) {
   if (s.padding + 1 > kernel) {
     return static_cast<std::ptrdiff_t>(DivideUp(s.padding + 1 - kernel, s.stride));
@@ -69,7 +69,7 @@ inline std::ptrdiff_t LeastShift(const Conv2dShape& s, std::size_t kernel) {
   return -static_cast<std::ptrdiff_t>((kernel - 1 - s.padding) / s.stride);
 }
 
-// How many i there are.
+// The number of such i.
 inline std::size_t ShiftCount(const Conv2dShape& s, std::size_t kernel) {
   const auto last = static_cast<std::ptrdiff_t>((s.padding + s.stride - 1) / s.stride);
   return static_cast<std::size_t>(last - LeastShift(s, kernel)) + 1;
@@ -133,7 +133,7 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
   });
 }
 
-// Pixels of a work item out of `pixels`: `most`, the best size for one worker's caches. With
+// The pixels per work item out of `pixels`: `most`, the best size for one worker's caches. With
 // several workers about four items each, for load balance, unless those would be so small that
 // overhead dominates.
 inline std::size_t PiecePixels(std::size_t pixels, std::size_t most, const KernelContext& context) {
@@ -198,9 +198,9 @@ void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* 
 }
 
 // Weight gradient of a convolution as an implicit matrix product: rows are (input channel, tap),
-// columns the output channels, k runs over pixels and images. The rows' factor is read as it lies
-// in the padded planes of x; d_y is packed transposed. Work items own a block of the weights for a
-// fixed share of the batch; the shares are added in order.
+// columns the output channels, k runs over pixels and images. The rows' factor is read in place
+// from the padded planes of x; d_y is packed transposed. Work items own a block of the weights for
+// a fixed share of the batch; shares are added in order.
 
 constexpr std::size_t kWeightTaps = 400;     // rows of one work item, about
 constexpr std::size_t kWeightColumns = 128;  // output channels of one work item
@@ -221,7 +221,7 @@ struct WeightGradPlan {
   std::size_t blocks_count() const { return blocks.count() * column_blocks.count(); }
   std::size_t item_count() const { return blocks_count() * shares.count(); }
   std::size_t columns() const { return column_blocks.largest() * kTileColumns; }
-  // Floats of one item's sums [taps of the block][columns()], of packed d_y, of planes, of a
+  // Floats in one item's sums [taps of the block][columns()], packed d_y and planes, and per
   // worker.
   std::size_t sums_size() const { return blocks.largest() * s.kernel_area() * columns(); }
   std::size_t piece_pixels() const { return cut.images * cut.bands.largest() * s.out_width(); }
@@ -343,7 +343,7 @@ inline void RunWeightGradItem(const WeightGradPlan& plan, std::size_t index, flo
   }
 }
 
-// Adds the shares of one block in order and turns the sums into d_weight's layout.
+// Adds the shares of one block in order and rearranges the sums to d_weight's layout.
 inline void FinishWeightGrad(const WeightGradPlan& plan, std::size_t index, float* sums,
                              float* d_weight) {
   const WeightGradItem item(plan, index);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two-dimensional convolution and its two adjoints, which are each other's derivatives: whatever
-// order of derivative is asked for, it is one of these three again.
+// Two-dimensional convolution and its two adjoints, which are each other's derivatives: a
+// derivative of any order is again one of these three.
 //
 //   forward       y[n,o,i,j] = bias[o] + sum_{c,u,v} w[o,c,u,v] x[n,c,i s - p + u,j s - p + v]
 //
@@ -9,11 +9,11 @@
 //   weight grad   d_w[o,c,u,v] = sum_{n,i,j} d_y[n,o,i,j] x[n,c,i s - p + u,j s - p + v]
 //
 // with x zero outside the image, s the stride, p the padding. Like the field's "convolution" this
-// is a cross-correlation: kernels are not flipped. Tensors are dense: x [N,C,H,W], w [O,C,U,V],
-// y [N,O,H',W'].
+// is a cross-correlation: kernels are not flipped. Tensors are dense: x [N,C,H,W], w [O,C,U,V], y
+// [N,O,H',W'].
 //
-// Each shape goes the way that is fastest for it: a matrix product where the kernel is as large as
-// the image, Winograd's algorithm where it fits (winograd.h), else directly.
+// Each shape takes its fastest algorithm: a matrix product if the kernel is as large as the image,
+// Winograd's if it applies (winograd.h), else direct convolution.
 //
 // The bits of the results depend on shape and SIMD target, never on the number of workers.
 #pragma once
@@ -45,13 +45,13 @@ struct Conv2dShape {
   std::size_t in_pixels() const { return in_height * in_width; }
   std::size_t out_pixels() const { return out_height() * out_width(); }
   std::size_t kernel_area() const { return kernel_height * kernel_width; }
-  // Numbers in x, in w, in y.
+  // Number of elements in x, in w, in y.
   std::size_t in_size() const { return batch * in_channels * in_pixels(); }
   std::size_t weight_size() const { return out_channels * in_channels * kernel_area(); }
   std::size_t out_size() const { return batch * out_channels * out_pixels(); }
 
-  // Every extent but the batch is positive and the kernel fits into the padded image. The functions
-  // below require it.
+  // OK if every extent but the batch is positive and the kernel fits into the padded image, as the
+  // functions below require.
   Status Check() const;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar truth that conv2d.h is held to. T: float, double or std::complex<double>.
+// Scalar reference of conv2d.h. T: float, double or std::complex<double>.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ void ForEachConv2dTap(const Conv2dShape& s, const Visit& visit) {
   const auto row = [&](std::size_t o, std::size_t n, std::size_t i, std::size_t j, std::size_t c,
                        std::size_t u) {
     const std::size_t y_index = ((n * s.out_channels + o) * s.out_height() + i) * s.out_width() + j;
-    const std::size_t h = i * s.stride + u - s.padding;  // wraps below 0, and then is not < height
+    const std::size_t h = i * s.stride + u - s.padding;  // wraps below 0, to >= height
     for (std::size_t v = 0; v < s.kernel_width; ++v) {
       const std::size_t w = j * s.stride + v - s.padding;
       if (h >= s.in_height || w >= s.in_width) continue;

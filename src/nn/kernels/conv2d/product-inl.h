@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Convolution forward and input gradient as one implicit matrix product: rows are the channels of
 // the target, columns its pixels, k runs over source channels and kernel taps. The columns' factor
-// is read from padded planes of the source through a table of offsets, one a step of k.
+// is read from padded planes of the source through a table of offsets, one per step of k.
 //
 // With stride s the pixels of the input gradient fall into s x s phases, each with its own taps;
 // the forward pass has one phase of all taps.
@@ -24,10 +24,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// Padded copies of image channels in which a convolution needs no bounds and no stride: source
-// pixels are dealt out to step x step planes by their position modulo the step, so that the pixels
-// under one tap of the kernel lie side by side. A block of channels and image rows at a time is
-// copied, never a whole im2col matrix.
+// Padded copies of image channels, in which a convolution needs no bounds checks and no stride:
+// source pixels are distributed over step x step planes by their position modulo the step, so that
+// the pixels under one tap of the kernel are adjacent. Copies a block of channels and image rows at
+// a time, never a whole im2col matrix.
 
 // Plane (a, b) holds at (y, x) the source pixel in row y step + origin_row + a and column
 // x step + origin_column + b, or 0 outside the image.
@@ -35,7 +35,7 @@ struct PlaneGrid {
   std::size_t height, width;  // of the source
   std::size_t step;
   std::ptrdiff_t origin_row, origin_column;
-  std::size_t planes_down, planes_across;  // that are needed of step x step
+  std::size_t planes_down, planes_across;  // needed ones of step x step
   std::size_t rows, columns;               // of one plane
 
   std::size_t plane_size() const { return rows * columns; }
@@ -51,7 +51,7 @@ struct PlaneRowSpan {
   std::ptrdiff_t first, begin, end;
 
  private:
-  // How many entries of a row lie before source pixel `limit`.
+  // Number of entries of a row before source pixel `limit`.
   std::ptrdiff_t Before(const PlaneGrid& g, std::ptrdiff_t limit) const {
     if (first >= limit) return 0;
     const auto step = static_cast<std::ptrdiff_t>(g.step);
@@ -59,7 +59,7 @@ struct PlaneRowSpan {
   }
 };
 
-// out[x] = in[x] for x < count. Rows are short: a call of memmove for each costs more than they do.
+// out[x] = in[x] for x < count. Rows are short: a call of memmove would cost more than the copy.
 inline void CopyFloats(const float* in, std::size_t count, float* out) {
   const Tag d;
   if (count < kLanes) {
@@ -73,7 +73,7 @@ inline void CopyFloats(const float* in, std::size_t count, float* out) {
   hn::StoreU(hn::LoadU(d, in + last), d, out + last);
 }
 
-// out[x] = in[2 x] for x < count; reads nothing behind in[2 count - 2].
+// out[x] = in[2 x] for x < count; reads nothing past in[2 count - 2].
 inline void CopyEverySecond(const float* in, std::size_t count, float* out) {
   const Tag d;
   if (count <= kLanes) {
@@ -90,8 +90,8 @@ inline void CopyEverySecond(const float* in, std::size_t count, float* out) {
   hn::StoreU(even, d, out + last);
 }
 
-// Zeros before entry `begin` and from entry `end` on of a row of `count`, by vectors that may reach
-// into the entries between them: these are written afterwards.
+// Zeros entries before `begin` and from `end` on in a row of `count`, with vectors that may spill
+// into the entries between, which are written afterwards.
 inline void ClearRowEnds(std::size_t begin, std::size_t end, std::size_t count, float* out) {
   if (count >= kLanes && begin <= kLanes && count - end <= kLanes) {
     hn::StoreU(hn::Zero(Tag()), Tag(), out);
@@ -141,8 +141,8 @@ inline void CopyPlane(const PlaneGrid& g, const PlaneRowSpan& span, const float*
   }
 }
 
-// All planes of `channels` consecutive channels, the first plane row being `first_row` of the
-// planes of a whole image. out: channels x channel_size().
+// All planes of `channels` consecutive channels, starting at plane row `first_row` of the whole
+// image. out: channels x channel_size().
 inline void CopyPlanes(const PlaneGrid& g, const float* source, std::size_t channels,
                        std::size_t first_row, float* out) {
   const std::ptrdiff_t top = static_cast<std::ptrdiff_t>(first_row * g.step) + g.origin_row;
@@ -157,7 +157,7 @@ inline void CopyPlanes(const PlaneGrid& g, const float* source, std::size_t chan
   }
 }
 
-// How a batch of grids of rows x columns is cut into pieces of about `pixels`: bands of rows of one
+// Divides a batch of grids of rows x columns into pieces of about `pixels`: bands of rows of one
 // image, or groups of whole images.
 struct BatchCut {
   BatchCut(std::size_t batch_size, std::size_t grid_rows, std::size_t columns, std::size_t pixels)
@@ -186,9 +186,9 @@ struct BatchPiece {
 };
 
 constexpr std::size_t kConvDepth = 320;     // steps of k in one pass, about
-constexpr std::size_t kConvPixels = 512;    // of the target grid in one work item, about
-constexpr std::size_t kPhasePixels = 1024;  // the same of several phases, if there are items enough
-// Of an image gradient: fewer sums than FMA units keep busy, unless a tile has a third vector.
+constexpr std::size_t kConvPixels = 512;    // of the target grid per work item, about
+constexpr std::size_t kPhasePixels = 1024;  // for several phases, if there are enough items
+// For an image gradient: fewer sums than keep the FMA units busy, unless a tile has a third vector.
 constexpr std::size_t kFewRows = 4;
 
 // The taps of all phases, phase by phase: offsets into a source channel's planes and into its
@@ -223,7 +223,7 @@ struct ConvProduct {
   std::size_t tap_count() const { return taps.phase_begin[taps.phases]; }
 };
 
-// Extents derived from a product, and the memory that it works in.
+// Extents derived from a product, and its scratch memory.
 struct ConvWork {
   explicit ConvWork(const ConvProduct& p)
       : panels(p.rows, kTileRows),
@@ -235,7 +235,7 @@ struct ConvWork {
 
   Panels panels;            // of target channels
   Panels blocks;            // of source channels
-  std::size_t band_pixels;  // from one row of the phase buffer to the next
+  std::size_t band_pixels;  // stride between rows of the phase buffer
   std::size_t planes_size, phases_size;
   float* packed_weight = nullptr;
   std::size_t* offsets = nullptr;  // phase by phase: [block channel][tap]
@@ -257,7 +257,7 @@ inline void PackConvWeights(const ConvProduct& p, const ConvWork& work, std::siz
   }
 }
 
-// Where the panel's packed weights of one block and phase begin.
+// Address of the panel's packed weights of one block and phase.
 inline float* PackedConvWeights(const ConvProduct& p, const ConvWork& work, std::size_t panel,
                                 std::size_t block, std::size_t phase) {
   const std::size_t channels = work.blocks.size(block);
@@ -283,11 +283,11 @@ struct ConvPass {
   std::size_t block, phase;
   std::size_t rows;            // of the grid
   float* c = nullptr;          // pixel 0 of row 0 of channel 0
-  std::size_t ldc = 0;         // from one channel of c to the next
-  std::size_t row_stride = 0;  // from one grid row of c to the next
+  std::size_t ldc = 0;         // stride between channels of c
+  std::size_t row_stride = 0;  // stride between grid rows of c
 };
 
-// Vectors of pixels, side by side or at the end of one row and the beginning of the next.
+// Vectors of pixels, adjacent, or at the end of one row and the start of the next.
 template <std::size_t V>
 struct ConvColumns {
   ConvColumns(const ConvProduct& p, const ConvPass& pass, std::size_t first_vector)
@@ -315,7 +315,8 @@ void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPass& pas
   for (std::size_t vector = 0; vector < vectors; vector += V) {
     ConvColumns<V> columns(p, pass, vector);
     columns.source.offset = offsets;
-    // Changed in place: a copy, read in wider words than it was written in, waits for the writing.
+    // Modified in place: a copy, read in wider words than it was written in, would wait for the
+    // stores.
     TileTarget& target = columns.target;
     target.accumulate = pass.block > 0;
     for (std::size_t panel = 0; panel < work.panels.count(); ++panel) {
@@ -330,7 +331,7 @@ void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPass& pas
 }
 
 // All phases of one image's band for one block of source channels. phases: the buffer of this
-// image, or null where the only phase goes straight to the target.
+// image, or null if the only phase is written straight to the target.
 inline void RunConvPhases(const ConvProduct& p, const ConvWork& work, const BatchPiece& piece,
                           std::size_t image, ConvPass pass, float* phases) {
   for (pass.phase = 0; pass.phase < p.taps.phases; ++pass.phase) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three passes of winograd.h. Each takes some rows of tiles at a time: transform, one
-// product for each slot, transform back.
+// The three passes of winograd.h. Each processes some rows of tiles at a time: transform, one
+// product per slot, inverse transform.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_
@@ -22,23 +22,23 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// How a pass of winograd.h goes through the tiles: in portions, so that memory stays small.
-// If there are enough of them, each worker takes portions of its own, which stay in its caches and
-// need no synchronisation. Else all workers share each portion, in three loops.
+// A pass of winograd.h processes the tiles in portions, so that memory stays small.
+// If there are enough portions, each worker takes its own, which stay in its caches and need no
+// synchronisation. Else all workers share each portion, in three loops.
 
-// Transformed values of both sides in a portion that all workers share, about: 8 MB. A weight's
-// gradient is summed portion by portion, so its bits depend on this.
+// Transformed values of both sides in a portion shared by all workers, about: 8 MB. Weight
+// gradients are summed portion by portion, so their bits depend on this.
 constexpr std::size_t kSharedValues = std::size_t{1} << 21;
 // In a worker's own portion, about: 2 MB, the best of 1 to 8.
 constexpr std::size_t kOwnValues = std::size_t{1} << 19;
-// But so many tiles at least, since all weights are read again for each portion: with 38 and 19
-// tiles 256 to 512 channels took 1.14 and 1.5 times as long.
+// But at least this many tiles, since every portion reads all weights again: with 38 and 19 tiles
+// 256 to 512 channels took 1.14 and 1.5 times as long.
 constexpr std::size_t kOwnTiles = 64;
 constexpr std::size_t kFewWorkers = 4;
 
-// Rows of tiles, `unit` by `unit`, cut into portions.
+// The rows of tiles, in groups of `unit`, divided into portions.
 struct PortionCut {
-  bool own;  // a portion is one worker's; else all share it
+  bool own;  // each worker has its own portions; else all share each
   std::size_t unit;
   Panels units;
 };
@@ -52,9 +52,9 @@ inline PortionCut SharedPortions(const WinogradPlan& plan, std::size_t values = 
   return {false, 1, Panels(plan.tile_rows(), rows)};
 }
 
-// Workers' own if there are two at least for each, or one of many workers, for whom to begin loops
-// together costs more than to wait for the last; `unit` rows of tiles stay together. Portions that
-// are shared grow with the number of workers, as do their caches.
+// Each worker gets its own portions if there are at least two per worker, or one with many workers,
+// since starting loops together then costs more than waiting for the last; `unit` rows of tiles
+// stay together. Shared portions grow with the number of workers, as do their caches.
 inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
   const auto count = static_cast<std::size_t>(workers.count());
   const std::size_t units = plan.tile_rows() / unit;
@@ -84,8 +84,8 @@ struct Portions {
   TileRows largest;
 };
 
-// The scratch memory of a pass: packed weights (or sums), then for each worker (or once for all)
-// the values of both sides, then what each worker needs besides.
+// The scratch memory of a pass: packed weights (or sums), then per worker (or once for all) the
+// values of both sides, then each worker's other scratch.
 struct WinogradMemory {
   WinogradMemory(const Portions& portions, std::size_t weights_size, const KernelContext& context)
       : inputs_size(RoundUp(SlotLayoutSize(portions.input, portions.largest), kAlignment)),
@@ -107,7 +107,7 @@ struct WinogradMemory {
     const std::size_t places = PlacesSize(plan, portions.largest) + PaddedRowsSize(plan);
     return RoundUp(std::max(places, TileRowQuadsSize(plan)), kAlignment);
   }
-  // `owner`: the worker whose portion it is, 0 where all share it.
+  // `owner`: the worker that owns the portion, 0 if all share it.
   float* inputs(std::size_t owner) const { return values + owner * values_size; }
   float* outputs(std::size_t owner) const { return inputs(owner) + inputs_size; }
   float* places(std::size_t worker) const { return all_places + worker * places_size; }
@@ -116,8 +116,8 @@ struct WinogradMemory {
   float *weights, *values, *all_places;
 };
 
-// The loops of a portion: all workers share them, or its owner goes through them, with workers that
-// have no portion left.
+// The loops of a portion: shared by all workers, or run by its owner, helped by workers without
+// portions left.
 struct SharedLoops {
   const Workers& workers;
   static constexpr std::size_t owner = 0;
@@ -195,8 +195,8 @@ void WinogradForwardTarget(const Conv2dShape& s, const float* x, const float* we
   Convolve(WinogradPlan(s), {x, weight, bias, WeightsOf::kItself, y}, context);
 }
 
-// The convolution that leads from d_y to d_x, for a stride of 1: its tiles do not overlap, and
-// need not be whole images.
+// The convolution from d_y to d_x, for a stride of 1: its tiles do not overlap, and need not be
+// whole images.
 inline Conv2dShape TransposeOf(const Conv2dShape& s) {
   Conv2dShape t = s;
   t.in_channels = s.out_channels;
@@ -215,7 +215,7 @@ void WinogradInputGradTarget(const Conv2dShape& s, const float* d_y, const float
     return;
   }
   const WinogradPlan plan(s);
-  // Rows of tiles of one image add to the same pixels.
+  // Adjacent rows of tiles in one image add to the same pixels.
   const Portions portions(plan, OwnPortions(plan, plan.tiles_down, context.workers));
   const PackedWinogradWeights packed(portions.input, portions.output);
   const WinogradMemory memory(portions, packed.size(), context);
@@ -245,7 +245,7 @@ void WinogradInputGradTarget(const Conv2dShape& s, const float* d_y, const float
 void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float* d_y,
                               float* d_weight, const KernelContext& context) {
   const WinogradPlan plan(s);
-  const Portions portions(plan, SharedPortions(plan));  // which is the order of the sums
+  const Portions portions(plan, SharedPortions(plan));  // which fixes the order of the sums
   const std::size_t count = portions.cut.units.count();
   const std::size_t panels = DivideUp(s.out_channels, kTileColumns);
   const WinogradMemory memory(portions, portions.input.total() * panels * kTileColumns, context);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which transformed values a convolution by F(2 x 2, r x r) has, and where they lie.
+// The transformed values of a convolution by F(2 x 2, r x r), and their layout.
 //
-// Along an axis a tile of 2 outputs sees `span` = kernel + stride inputs: those of phase a are
-// a, a + stride, .. and give taps(a) + 1 transformed values, one for each point of evaluation, the
-// slots: 0, 1, infinity and, where there are 3 taps, -1. Whatever its phase, a slot's product goes
-// into the same sum: the output's transform is that of the slot.
+// Along an axis a tile of 2 outputs depends on `span` = kernel + stride inputs: those of phase a
+// are a, a + stride, .. and give taps(a) + 1 transformed values, one per evaluation point, the
+// slots: 0, 1, infinity and, with 3 taps, -1. A slot's products of all phases go into the same sum,
+// since the output's transform depends on the slot only.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@ struct WinogradPlan {
 
   std::size_t taps(std::size_t phase) const { return DivideUp(kernel - phase, stride); }
   std::size_t slots() const { return axis_slots * axis_slots; }
-  // Phases of one axis that have a slot: all, or the first ones, which have 3 taps.
+  // Phases of one axis that have a slot: all, or only the first ones, which have 3 taps.
   std::size_t axis_phases(std::size_t axis_slot) const {
     return axis_slot == 3 ? long_phases : stride;
   }
@@ -51,7 +51,8 @@ struct WinogradPlan {
 
   Conv2dShape s;
   std::size_t kernel, stride;
-  std::size_t span, step, overlap;  // inputs of a tile, to the next tile, that both see
+  std::size_t span, step, overlap;  // inputs of a tile; distance to the next tile; inputs shared
+                                    // with it
   std::size_t long_phases;          // phases of 3 taps; they come first
   std::size_t axis_slots;
   std::size_t tiles_down, tiles_across;  // of one image
@@ -71,8 +72,8 @@ struct WinogradSide {
   std::size_t total() const { return before(plan.slots()); }
 };
 
-// Some rows of tiles, which may be of several images, one behind the other. They are padded to
-// whole panels of columns.
+// Some rows of tiles, possibly of several images, concatenated and padded to whole panels of
+// columns.
 struct TileRows {
   TileRows(const WinogradPlan& plan, std::size_t first_row, std::size_t rows, std::size_t panel)
       : first(first_row),
@@ -85,7 +86,7 @@ struct TileRows {
   std::size_t pitch;  // between rows of values: not a power of 2, which would thrash caches
 };
 
-// What one row of tiles is: row `down` of the tiles of an image.
+// One row of tiles: row `down` of the tiles of an image.
 struct TileRow {
   TileRow(const WinogradPlan& plan, std::size_t index)
       : image(index / plan.tiles_down), down(index % plan.tiles_down) {}

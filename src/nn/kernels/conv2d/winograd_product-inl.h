@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The products of winograd.h, one for each slot, and the inverse transform of a weight's gradient.
+// The products of winograd.h, one per slot, and the inverse transform of the weight gradient.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
@@ -29,8 +29,8 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 constexpr std::size_t kRowLanes = RoundUp(kTileRows, kLanes);
 constexpr std::size_t kMostTaps = 25;  // of a kernel of 5 x 5
 
-// Whether the vectors of a step never end behind the step after it, which overwrites what is not
-// theirs: FillPhase counts on it. Of more channels no panel is smaller.
+// Whether the vectors of a step never reach past the next step, which overwrites their excess:
+// FillPhase relies on it. With more channels no panel is smaller.
 constexpr bool StepsEndInTheNext() {
   for (std::size_t n = kLeastWinogradChannels; n < kLeastWinogradChannels + 4 * kTileRows; ++n) {
     if (2 * (n / DivideUp(n, kTileRows)) < kRowLanes) return false;
@@ -74,12 +74,12 @@ HWY_INLINE void ForSlots(std::size_t ra, std::size_t rb, const F& f) {
   }
 }
 
-// Whose weights a convolution is given: its own, [O,C,U,V], or those of the one that it is the
-// transpose of, [C,O,U,V] with kernels turned by 180 degrees.
+// The weights passed to a convolution: its own, [O,C,U,V], or those of the one that it transposes,
+// [C,O,U,V] with kernels rotated by 180 degrees.
 enum class WeightsOf { kItself, kTranspose };
 
-// The row factor of each slot's product: `rows` by `depth`, one of them the input's side. A group
-// of rows is a phase where the input's side is the rows.
+// The row factor of each slot's product: `rows` by `depth`, one of which is the input side. If the
+// input side is the rows, a group of rows is a phase.
 struct PackedWinogradWeights {
   PackedWinogradWeights(const WinogradSide& rows_side, const WinogradSide& depth_side,
                         WeightsOf weights_of = WeightsOf::kItself)
@@ -97,11 +97,11 @@ struct PackedWinogradWeights {
   }
   std::size_t size() const { return total; }
   std::size_t panel_count(std::size_t slot) const { return rows.groups(slot) * panels.count(); }
-  // A vector's store may run over the end of its row.
+  // A vector store may run past the end of its row.
   std::size_t panel_size(std::size_t slot) const {
     return depth.size(slot) * kTileRows + kRowLanes;
   }
-  // Panel `index` of all groups: where it lies, its rows among those of the slot.
+  // Address of panel `index` of all groups, and its rows among those of the slot.
   const float* Panel(const float* packed, std::size_t slot, std::size_t index) const {
     return packed + base[slot] + index * panel_size(slot);
   }
@@ -124,20 +124,20 @@ struct PackedWinogradWeights {
 
  private:
   // Their taps stay in L1, and each slot is written in runs of some lines: 8 took a fifth longer,
-  // 64 no less.
+  // 64 the same.
   static constexpr std::size_t kStepsAtATime = 32;
-  // Floats between asking for a line and writing it; 48 and 192 are no better.
+  // Floats between prefetching a line and writing it; 48 and 192 are no better.
   static constexpr std::size_t kAhead = 96;
 
-  // Some steps of one panel; of one phase (a, b).
+  // Some steps of one panel, for one phase (a, b).
   struct Strip {
     std::size_t panel, k, steps;
     std::size_t a, b;
   };
   using Taps = float[kMostTaps * kRowLanes];  // of one step
 
-  // Taps of some steps, side by side, then their phases: a vector that is loaded at once from
-  // numbers stored one by one waits for them.
+  // Gathers the taps of some steps, then transforms their phases: a vector load of numbers just
+  // stored one by one would wait for the stores.
   void FillPanel(const float* weight, std::size_t panel, float* packed) const {
     const std::size_t area = plan.kernel * plan.kernel;
     const bool by_rows = rows.input == (of == WeightsOf::kTranspose);  // else by steps
@@ -166,8 +166,8 @@ struct PackedWinogradWeights {
     SlotTargets to;
     ForSlots(ra, rb,
              [&](std::size_t i, std::size_t j) { to.data[i][j] = packed + At(strip, i, j); });
-    // What a store writes beyond its row, the next step overwrites; behind the last step lies the
-    // next phase, which may be there already.
+    // What a store writes past its row, the next step overwrites; after the last step comes the
+    // next phase, which may be written already.
     const bool ends = strip.k + strip.steps == depth.channels();
     for (std::size_t k = 0; k + ends < strip.steps; ++k) {
       ForTaps<TransformWeights>(ra, rb, plan, taps[k] + first, to);
@@ -185,13 +185,12 @@ struct PackedWinogradWeights {
              [&](std::size_t i, std::size_t j) { std::copy_n(lanes[i][j], count, to.data[i][j]); });
   }
 
-  // Where taps in reverse order have the value that they have for slot i in theirs: at 0 and
-  // infinity each has the other's.
+  // The slot at which reversed taps have the value that taps have at slot i: 0 and infinity swap.
   std::size_t SlotOf(std::size_t i) const {
     return of == WeightsOf::kTranspose && i % 2 == 0 ? 2 - i : i;
   }
 
-  // Where the strip's values of slot (i, j) lie.
+  // Offset of the strip's values of slot (i, j).
   std::size_t At(const Strip& strip, std::size_t i, std::size_t j) const {
     const std::size_t slot = SlotOf(i) * plan.axis_slots + SlotOf(j);
     const std::size_t phase = plan.phase_index(slot, strip.a, strip.b);
@@ -203,11 +202,11 @@ struct PackedWinogradWeights {
 };
 
 constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half of L1
-constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
-constexpr std::size_t kSlotColumnPanels = 16;  // in one work item: 256 tiles
+constexpr std::size_t kSlotRowPanels = 21;     // per work item: 126 rows
+constexpr std::size_t kSlotColumnPanels = 16;  // per work item: 256 tiles
 
 constexpr int kFewCorrelationWorkers = 4;
-constexpr std::size_t kManySlotRowPanels = 7;  // in one work item of more workers: 42 rows
+constexpr std::size_t kManySlotRowPanels = 7;  // per work item with more workers: 42 rows
 
 // ---- Forward and input gradient: out[slot] = weights[slot] in[slot] ----
 
@@ -298,7 +297,8 @@ struct WinogradCorrelation {
     return (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
   }
 
-  // Work items: some rows of a slot with all panels or, for many workers, fewer rows with one.
+  // Work items: some rows of a slot with all panels or, with many workers, fewer rows with one
+  // panel.
   void Multiply(const Workers& workers) const {
     const bool many = workers.count() > kFewCorrelationWorkers;
     const std::size_t item_rows = (many ? kManySlotRowPanels : kSlotRowPanels) * kTileRows;
@@ -339,15 +339,15 @@ struct WinogradCorrelation {
   }
 };
 
-// Work items: a few rows of tiles of one panel of output channels, as layers of few channels have
-// one panel, which would be the work of one worker.
+// Work items: a few rows of tiles of one panel of output channels, since layers with few channels
+// have a single panel, which would keep only one worker busy.
 constexpr std::size_t kOutputRows = 8;
 
 inline std::size_t OutputItems(const WinogradCorrelation& product) {
   return product.panels * DivideUp(product.rows.count, kOutputRows);
 }
 
-// The values of one item. memory: of one row of tiles, all channels.
+// The values of one item. memory: for one row of tiles, all channels.
 inline void TransformOutputRows(const WinogradCorrelation& product, const float* d_y,
                                 std::size_t item, float* memory) {
   const WinogradPlan& plan = product.input.plan;
@@ -406,10 +406,10 @@ inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t pa
   return from;
 }
 
-// Input channels of one work item.
+// Input channels per work item.
 constexpr std::size_t kFinishedChannels = 8;
 
-// Of some input channels.
+// Finishes some input channels.
 inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t panel,
                              Panels::Range some, float* d_weight) {
   const WinogradPlan& plan = product.input.plan;

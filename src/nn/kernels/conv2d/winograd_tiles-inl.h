@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between images and transformed values. Images are first dealt out to one array for each place
-// of a tile, with the tiles side by side, so that the transforms are arithmetic on whole vectors
-// whatever the size of an image.
+// Converts between images and transformed values. Images are first split into one array per place
+// in a tile, with adjacent tiles adjacent, so that the transforms are arithmetic on whole vectors
+// whatever the image size.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_TILES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_TILES_INL_H_
@@ -25,7 +25,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 
 constexpr std::size_t kMaxSlots = 16;
 
-// Where the values of each slot of one side lie: value `index` of panel `panel` of tiles.
+// The layout of one side's values per slot: value `index` of panel `panel` of tiles.
 struct SlotLayout {
   std::array<std::size_t, kMaxSlots> base{}, panel_stride{};
   std::size_t index_stride = 0;
@@ -56,7 +56,7 @@ inline SlotLayout RowLayout(const WinogradSide& side, const TileRows& rows) {
   return layout;
 }
 
-// Enough for either.
+// Enough for either layout.
 inline std::size_t SlotLayoutSize(const WinogradSide& side, const TileRows& rows) {
   return side.total() * rows.pitch + side.plan.slots() * kTileColumns;
 }
@@ -64,7 +64,7 @@ inline std::size_t SlotLayoutSize(const WinogradSide& side, const TileRows& rows
 // ---- Inputs: tiles of span x span at distance `step` ----
 
 // Memory of one worker: [span * span][pitch] for the places of a tile, and the image rows that a
-// tile sees, padded.
+// tile reads, padded.
 inline std::size_t PlacesSize(const WinogradPlan& plan, const TileRows& rows) {
   return plan.span * plan.span * rows.pitch;
 }
@@ -75,7 +75,7 @@ inline std::size_t PaddedRowsSize(const WinogradPlan& plan) {
   return plan.span * PaddedPitch(plan);
 }
 
-// Those of the image rows that a row of tiles sees that are in the image: row i is `first` + i.
+// The image rows read by a row of tiles that are inside the image: row i is `first` + i.
 struct SeenRows {
   SeenRows(const WinogradPlan& plan, const TileRow& row)
       : first(static_cast<std::ptrdiff_t>(row.down * plan.step) -
@@ -111,14 +111,13 @@ inline void PrefetchRows(const WinogradPlan& plan, std::size_t index, const floa
   PrefetchNumbers(first, std::min(plan.step, s.in_height - top) * s.in_width);
 }
 
-// All places of channel c of the input. What a row writes beyond its tiles, the next one
-// overwrites.
+// All places of channel c of the input. What a row writes past its tiles, the next one overwrites.
 inline void GatherInput(const WinogradPlan& plan, const TileRows& rows, const float* x,
                         std::size_t c, float* places, float* padded) {
   const Conv2dShape& s = plan.s;
   const std::size_t pitch = PaddedPitch(plan);
   std::fill_n(padded, PaddedRowsSize(plan), 0.0f);
-  // What a tile sees of a row: not more than the row, not more than the padded one has.
+  // The part of a row that tiles read: at most the row, at most the padded row.
   const std::size_t seen =
       std::min(s.in_width, plan.step * (plan.tiles_across - 1) + plan.span - s.padding);
   for (std::size_t r = 0; r < rows.count; ++r) {
@@ -126,7 +125,7 @@ inline void GatherInput(const WinogradPlan& plan, const TileRows& rows, const fl
     const SeenRows in_image(plan, row);
     const float* channel = x + (row.image * s.in_channels + c) * s.in_pixels();
     PrefetchRows(plan, rows.first + r + 2, x, c);
-    // All rows are padded before any is dealt, so that loads do not stall on recent stores.
+    // Pads all rows before splitting any, so that loads do not stall on recent stores.
     CopyStrip(channel + in_image[in_image.begin] * s.in_width, s.in_width, seen,
               in_image.end - in_image.begin, padded + in_image.begin * pitch + s.padding, pitch);
     for (std::size_t i = 0; i < plan.span; ++i) {
@@ -146,7 +145,7 @@ inline void GatherInput(const WinogradPlan& plan, const TileRows& rows, const fl
   }
 }
 
-// One channel's pass between places and transformed values, or back.
+// One channel's pass between places and transformed values, in either direction.
 struct ChannelPass {
   const WinogradPlan& plan;
   const TileRows& rows;
@@ -154,8 +153,8 @@ struct ChannelPass {
   std::size_t channel;
 };
 
-// Where the values of phase (a, b) lie: place and slot (i, j) of the first panel, and how far it is
-// to the slot's next panel.
+// Addresses of the values of phase (a, b): place and slot (i, j) of the first panel, and the
+// distance to the slot's next panel.
 struct PhaseAddress {
   PhaseAddress(const ChannelPass& pass, std::size_t a, std::size_t b) {
     const WinogradPlan& plan = pass.plan;
@@ -237,8 +236,8 @@ inline void SumRow(const WinogradPlan& plan, const float* places, std::size_t pi
   plan.step == 2 ? SumRow<2>(places, row, padded) : SumRow<4>(places, row, padded);
 }
 
-// Adds up the places of one channel of one row of tiles. Rows of the image that the tiles above
-// have a share in were written by them.
+// Sums the places of one channel of one row of tiles. Image rows shared with the tiles above were
+// already written by them.
 inline void ScatterTileRow(const WinogradPlan& plan, const TileRow& row, const float* places,
                            std::size_t pitch, float* channel, float* padded) {
   const Conv2dShape& s = plan.s;
@@ -246,7 +245,7 @@ inline void ScatterTileRow(const WinogradPlan& plan, const TileRow& row, const f
   const std::size_t padded_pitch = PaddedPitch(plan);
   // Of the padded row.
   const std::size_t width = std::min(s.in_width, plan.step * (plan.tiles_across + 1) - s.padding);
-  // All rows before any goes to the image, so that loads do not stall on recent stores.
+  // Sums all rows before writing any to the image, so that loads do not stall on recent stores.
   for (std::size_t i = in_image.begin; i < in_image.end; ++i) {
     SumRow(plan, places + i * plan.span * pitch, pitch, padded + i * padded_pitch);
   }
@@ -270,7 +269,7 @@ inline void ScatterInputGrad(const WinogradPlan& plan, const TileRows& rows, con
     float* channel = d_x + (row.image * s.in_channels + c) * s.in_pixels();
     ScatterTileRow(plan, row, places + r * plan.tiles_across, rows.pitch, channel, padded);
     if (row.down + 1 < plan.tiles_down) continue;
-    // No output sees the rows below the last tiles.
+    // No output depends on the rows below the last tiles.
     const std::size_t end =
         std::min(s.in_height, plan.step * plan.tiles_down + plan.overlap - s.padding);
     std::fill(channel + end * s.in_width, channel + s.in_pixels(), 0.0f);
@@ -341,7 +340,7 @@ HWY_INLINE void TransformOutputGrad(const TileRows& rows, const SlotLayout& layo
     for (std::size_t slot = 0; slot < kSlots * kSlots; ++slot) {
       float* to = values + layout.At(slot, o, t / kTileColumns) + t % kTileColumns;
       hn::StoreU(out[slot / kSlots][slot % kSlots], Tag(), to);
-      PrefetchLineToWrite(to + kTileColumns);  // where the next channel's will lie
+      PrefetchLineToWrite(to + kTileColumns);  // address of the next channel's
     }
   }
 }

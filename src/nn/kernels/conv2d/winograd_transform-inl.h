@@ -25,7 +25,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// Between one image row and the places of its tiles, a vector of tiles at a time, for
+// Converts between an image row and the places of its tiles, a vector of tiles at a time, for
 // winograd_tiles-inl.h.
 
 // Vectors for rows of `tiles`: short ones for short rows.
@@ -35,8 +35,7 @@ HWY_INLINE void ForRowLanes(std::size_t tiles, const Body& body) {
   body(Tag());
 }
 
-// places[j][t] = padded[t step + j] for whole vectors of tiles: up to kLanes - 1 more than there
-// are.
+// places[j][t] = padded[t step + j] for whole vectors of tiles: up to kLanes - 1 excess tiles.
 template <std::size_t kSpan, std::size_t kStep>
 HWY_INLINE void DealRow(const float* padded, std::size_t tiles, std::size_t pitch, float* places) {
   ForRowLanes(tiles, [&](auto d) HWY_ATTR {
@@ -59,7 +58,7 @@ HWY_INLINE void DealRow(const float* padded, std::size_t tiles, std::size_t pitc
 
 struct RowOfTiles {
   std::size_t tiles, pitch;
-  std::size_t overlap;  // pixels that a tile and the next one both see
+  std::size_t overlap;  // pixels shared by adjacent tiles
 };
 
 // The inverse: places summed where tiles overlap, as a padded image row.
@@ -72,7 +71,7 @@ HWY_INLINE void SumRow(const float* places, const RowOfTiles& row, float* padded
       V v[4];
       for (std::size_t j = 0; j < kStep; ++j) v[j] = hn::LoadU(d, places + j * pitch + t);
       for (std::size_t j = 0; j < row.overlap; ++j) {
-        // What the tile to the left adds; the first one has none.
+        // The contribution of the tile to the left; the first has none.
         const V left = hn::LoadU(d, places + (kStep + j) * pitch + t - 1);
         const V sum = hn::Add(v[j], left);
         v[j] = t > 0 ? sum : hn::IfThenElse(hn::FirstN(d, 1), v[j], sum);
