@@ -14,9 +14,34 @@
 
 #include "base/aligned.h"
 #include "base/clocks.h"
+#include "base/worker_groups.h"
 
 namespace tilegrad {
 namespace {
+
+// The time of one of the strand's own loops.
+struct Taken {
+  double seconds = 0;
+  // Of a grouped loop: what its slowest group does, which starts that much later.
+  LoopForecast slowest = {};
+};
+
+// Of the group that ends last. Groups share the memory bandwidth.
+LoopForecast ForecastGroups(const LoopRecord& loop, const LoopMachine& machine) {
+  const std::size_t groups = loop.tasks.size();
+  LoopForecast slowest;
+  for (std::size_t g = 0; g < groups; ++g) {
+    const auto first = [&](std::size_t of) {
+      return WorkerGroups::FirstOf(of, machine.workers, groups);
+    };
+    LoopMachine part = machine;
+    part.workers = std::max(1, static_cast<int>(first(g + 1) - first(g)));
+    part.bytes_per_second *= static_cast<double>(part.workers) / machine.workers;
+    LoopForecast own = Forecast(loop.tasks[g], part);
+    if (own.seconds >= slowest.seconds) slowest = std::move(own);
+  }
+  return slowest;
+}
 
 // Executes a strand on simulated workers.
 class Simulation {
@@ -26,8 +51,8 @@ class Simulation {
     for (std::size_t w = stacks_.size(); w-- > 1;) idle_.push_back(w);
   }
 
-  // Returns the seconds that each of the strand's own loops takes.
-  std::vector<double> Run(const Strand& strand) {
+  // Returns the time of each of the strand's own loops.
+  std::vector<Taken> Run(const Strand& strand) {
     Begin(strand, nullptr, 0, 0.0);
     while (!events_.empty()) {
       const auto [time, worker] = events_.top();
@@ -81,15 +106,26 @@ class Simulation {
   void Open(std::size_t worker, double time) {
     Frame& frame = stacks_[worker].back();
     const LoopRecord& record = frame.strand.loops[frame.stretch];
+    if (record.grouped) return RunGroups(record, worker, time);
     OpenLoop& loop = loops_.emplace_back(OpenLoop{record, worker, time, taken_.size()});
     loop.awaited = record.helpers == 0;
-    if (frame.of == nullptr) taken_.push_back(0);
+    if (frame.of == nullptr) taken_.emplace_back();
     WakeOthers(time, frame.of == nullptr);
     if (loop.awaited) {
       frame.inner = &loop;
     } else {
       events_.emplace(time + frame.strand.stretches[++frame.stretch], worker);
     }
+  }
+
+  // No worker joins loops of another group: each group is a machine of its own.
+  void RunGroups(const LoopRecord& record, std::size_t worker, double time) {
+    Frame& frame = stacks_[worker].back();
+    LoopForecast slowest = ForecastGroups(record, machine_);
+    const double seconds =
+        std::bit_width(record.tasks.size() - 1) * machine_.start_seconds + slowest.seconds;
+    if (frame.of == nullptr) taken_.push_back({seconds, std::move(slowest)});
+    events_.emplace(time + seconds + frame.strand.stretches[++frame.stretch], worker);
   }
 
   // After each start time twice as many take part; workers already awake join at once.
@@ -149,7 +185,7 @@ class Simulation {
     loop.left = true;
     if (machine_.bytes_per_second > 0)
       time = std::max(time, loop.begin + loop.record.bytes / machine_.bytes_per_second);
-    if (frame->of == nullptr) taken_[loop.place] = time - loop.begin;
+    if (frame->of == nullptr) taken_[loop.place].seconds = time - loop.begin;
     frame->inner = nullptr;
     const bool ended = frame->stretch == frame->strand.loops.size();  // a side loop was left
     events_.emplace(ended ? time : time + frame->strand.stretches[++frame->stretch], worker);
@@ -161,7 +197,7 @@ class Simulation {
   std::deque<OpenLoop> loops_;              // in the order in which they were opened
   std::vector<std::size_t> idle_;
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
-  std::vector<double> taken_;
+  std::vector<Taken> taken_;
 };
 
 std::string NameOf(const LoopSite& site) {
@@ -175,11 +211,17 @@ std::string NameOf(const LoopSite& site) {
 class Places {
  public:
   explicit Places(int workers) : workers_(workers) {}
-  void Add(const std::string& place, double work, double taken) {
+  void Add(const std::string& place, double work, double taken, int times = 1) {
     HeldBack& sum = places_[place];
-    ++sum.times;
+    sum.times += times;
     sum.work += work;
     sum.taken += taken;
+  }
+  // A grouped loop: the slowest group's places, as if the others were as slow.
+  void AddGroups(const std::string& place, std::size_t groups, const Taken& taken) {
+    Add(place, 0, taken.seconds - taken.slowest.seconds);
+    for (const HeldBack& inner : taken.slowest.places)
+      Add(inner.place, static_cast<double>(groups) * inner.work, inner.taken, inner.times);
   }
   LoopForecast Sorted() {
     LoopForecast out;
@@ -242,14 +284,20 @@ double MeasureMemory(const Workers& workers) {
 }  // namespace
 
 LoopForecast Forecast(const Strand& strand, const LoopMachine& machine) {
-  const std::vector<double> taken = Simulation(machine).Run(strand);
+  const std::vector<Taken> taken = Simulation(machine).Run(strand);
   Places places(machine.workers);
   std::string before = "begin";
   for (std::size_t i = 0; i < strand.stretches.size(); ++i) {
     const bool last = i == strand.loops.size();
     std::string next = last ? "end" : NameOf(strand.loops[i].site);
     places.Add(before + " .. " + next, strand.stretches[i], strand.stretches[i]);
-    if (!last) places.Add(next, WorkOf(strand.loops[i]), taken[i]);
+    if (last) break;
+    const LoopRecord& loop = strand.loops[i];
+    if (loop.grouped) {
+      places.AddGroups(next, loop.tasks.size(), taken[i]);
+    } else {
+      places.Add(next, WorkOf(loop), taken[i].seconds);
+    }
     before = std::move(next);
   }
   return places.Sorted();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Predicts how long a recorded strand of work would take on many workers, by greedy scheduling: an
 // idle worker takes the next task of the oldest loop that has one; a SideLoop begun within a strand
-// ends with it. R. Graham, Bounds on multiprocessing timing anomalies, 1969: at most
-// work / workers + the longest chain of tasks.
+// ends with it; each group of a WorkerGroups schedules its own loops. R. Graham, Bounds on
+// multiprocessing timing anomalies, 1969: at most work / workers + the longest chain of tasks.
 #pragma once
 
 #include <string>
@@ -22,7 +22,8 @@ struct LoopMachine {
   double bytes_per_second = 0;
 };
 
-// One place in the program: all runs of one loop, or all stretches between two loops.
+// One place in the program: all runs of one loop, or all stretches between two loops. Of loops
+// within groups, those of the slowest group count, their work once per group.
 struct HeldBack {
   std::string place;  // "nn/optim.cc:76"; of stretches "nn/optim.cc:76 .. nn/optim.cc:242"
   int times = 0;

@@ -31,8 +31,12 @@ void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> t
     if (n == 1) task(0, 0);
     return;
   }
-  events_.push_back({n, site, bytes, helpers});
-  for (std::size_t i = 0; i < n; ++i) {
+  RunTasks({n, site, bytes, helpers}, task);
+}
+
+void LoopTrace::RunTasks(const Event& loop, FunctionRef<void(std::size_t, std::size_t)> task) {
+  events_.push_back(loop);
+  for (std::size_t i = 0; i < loop.tasks; ++i) {
     task(i, 0);
     events_.push_back({});
   }
@@ -58,7 +62,7 @@ class LoopTrace::Reader {
  private:
   LoopRecord ReadLoop() {
     const Event& begin = events_[next_++];
-    LoopRecord loop{begin.site, begin.bytes, {}, begin.helpers};
+    LoopRecord loop{begin.site, begin.bytes, {}, begin.helpers, begin.grouped};
     for (std::size_t i = 0; i < begin.tasks; ++i) {
       loop.tasks.push_back(ReadStrand());
       ++next_;  // its end

@@ -27,6 +27,8 @@ struct LoopRecord {
   std::vector<Strand> tasks;
   // > 0: a SideLoop, with this many workers taking part until the strand that began it ends.
   std::size_t helpers = 0;
+  // Its tasks are those of a WorkerGroups: each runs its own loops on a group of the workers.
+  bool grouped = false;
 };
 
 // Seconds of all stretches, those of tasks included.
@@ -45,16 +47,19 @@ class LoopTrace {
  private:
   friend class Workers;
   friend class SideLoop;
+  friend class WorkerGroups;
   struct Event {            // a loop begins, or a task of the innermost open loop ends
     std::size_t tasks = 0;  // of the loop that begins
     LoopSite site{};
     double bytes = 0;
     std::size_t helpers = 0;
+    bool grouped = false;
     double at = ThreadSeconds();
   };
   class Reader;
   void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
            std::size_t helpers = 0);
+  void RunTasks(const Event& loop, FunctionRef<void(std::size_t, std::size_t)> task);
   void NoteTraffic(double bytes) { traffic_ = bytes; }
 
   std::vector<Event> events_;

@@ -15,6 +15,7 @@ namespace tilegrad {
 
 class LoopTrace;
 class SideLoop;
+class WorkerGroups;
 
 // The source location of a loop: its name in a LoopTrace.
 struct LoopSite {
@@ -93,6 +94,7 @@ class Workers {
 
  private:
   friend class SideLoop;
+  friend class WorkerGroups;
   struct Impl;
   bool HasArena() const;  // oneTBB's, usable by this process
 

@@ -26,13 +26,74 @@ Tensor Converted(Tensor tensor, std::span<const From> values, const Workers& wor
 
 }  // namespace
 
-Context::Context(const Workers& workers, DType dtype)
-    : workers_(workers), dtype_(dtype), pool_(MemoryPool::Make()), step_memory_(MakeStepMemory()) {
+Context::Lane::Lane(const Workers& w)
+    : workers(&w), pool(MemoryPool::Make()), step_memory(MakeStepMemory()) {}
+
+Context::Context(const Workers& workers, DType dtype) : dtype_(dtype) {
   assert(dtype == DType::kF32 || dtype == DType::kF64);
+  lanes_.push_back(std::make_unique<Lane>(workers));
+}
+
+void Context::MakeLanes(std::size_t most) {
+  assert(!groups_);
+  if (most <= 1 || workers().count() == 1) return;
+  groups_.emplace(workers(), most);
+  for (std::size_t i = 0; i < groups_->count(); ++i)
+    lanes_.push_back(std::make_unique<Lane>(groups_->group(i)));
+}
+
+namespace {
+
+// Which lane of which context a thread is in.
+struct Entered {
+  const Context* context = nullptr;
+  std::size_t lane = 0;
+};
+thread_local Entered t_entered;
+
+// For a scope.
+class Entering {
+ public:
+  explicit Entering(const Entered& now) : before_(std::exchange(t_entered, now)) {}
+  ~Entering() { t_entered = before_; }
+  Entering(const Entering&) = delete;
+  Entering& operator=(const Entering&) = delete;
+
+ private:
+  Entered before_;
+};
+
+}  // namespace
+
+std::size_t Context::lane() const { return t_entered.context == this ? t_entered.lane : 0; }
+
+void Context::ForEachLane(FunctionRef<void(std::size_t)> task, LoopSite site) {
+  if (!groups_) return task(0);
+  const Lane& outside = here();
+  const auto run = [&](std::size_t i) {
+    const Entering entering({this, i + 1});
+    here().recording = outside.recording;
+    here().order = std::max(here().order, outside.order);  // above that of parameters
+    task(i);
+  };
+  groups_->For(run, site);
+}
+
+void Context::CopyForLanes(const std::vector<NamedTensor>& tensors) {
+  for (std::size_t i = 1; i < lanes_.size(); ++i) {
+    for (const NamedTensor& t : tensors)
+      lanes_[i]->copies.push_back({t.value.raw(), Copy(t.value)});
+  }
+}
+
+Tensor Context::InLane(const Tensor& tensor) const {
+  const std::vector<LaneCopy>& copies = here().copies;
+  const auto found = std::ranges::find(copies, tensor.raw(), &LaneCopy::of);
+  return found == copies.end() ? tensor : found->tensor;
 }
 
 Tensor Context::Empty(const Shape& shape, DType dtype) const {
-  return {pool_->Allocate(static_cast<std::size_t>(shape.elements()) * BytesOf(dtype)), shape,
+  return {here().pool->Allocate(static_cast<std::size_t>(shape.elements()) * BytesOf(dtype)), shape,
           dtype};
 }
 
@@ -45,11 +106,11 @@ Tensor Context::Full(const Shape& shape, double value) const {
 }
 
 Tensor Context::From(const Shape& shape, std::span<const float> values) const {
-  return Converted(Empty(shape), values, workers_);
+  return Converted(Empty(shape), values, workers());
 }
 
 Tensor Context::From(const Shape& shape, std::span<const double> values) const {
-  return Converted(Empty(shape), values, workers_);
+  return Converted(Empty(shape), values, workers());
 }
 
 Tensor Context::Indices(std::span<const std::int32_t> values) const {
@@ -60,16 +121,16 @@ Tensor Context::Indices(std::span<const std::int32_t> values) const {
 
 Tensor Context::Copy(const Tensor& tensor) const {
   Tensor copy = Empty(tensor.shape(), tensor.dtype());
-  ForChunks(&workers_, tensor.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
+  ForChunks(&workers(), tensor.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
     std::memcpy(copy.raw() + begin, tensor.raw() + begin, end - begin);
   });
   return copy;
 }
 
 void Context::Fail(Status status) {
-  if (status_.ok()) status_ = std::move(status);
+  if (here().status.ok()) here().status = std::move(status);
 }
 
-Status Context::TakeStatus() { return std::exchange(status_, Status()); }
+Status Context::TakeStatus() { return std::exchange(here().status, Status()); }
 
 }  // namespace tilegrad::nn

@@ -5,9 +5,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "base/parallel.h"
+#include "base/worker_groups.h"
 #include "nn/kernels/kernel_context.h"
 #include "nn/memory.h"
 #include "nn/tensor.h"
@@ -15,7 +18,10 @@
 
 namespace tilegrad::nn {
 
-// Not thread-safe: use from one thread at a time (operations themselves run on all workers).
+// Used by one thread at a time (operations themselves run on all workers), except for its lanes: in
+// these, several threads compute side by side with the same parameters, each on a group of the
+// workers and with its own memory, errors and recording. Var and Tensor need not know: the context
+// answers a thread for the thread's lane.
 //
 // Errors: an operation with operands that do not match records the reason here and returns an
 // invalid Var; operations on invalid Vars return invalid Vars. So formulas need no error handling:
@@ -28,9 +34,26 @@ class Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
-  const Workers& workers() const { return workers_; }
-  KernelContext kernels() { return {workers_, scratch_}; }
+  const Workers& workers() const { return *here().workers; }
+  KernelContext kernels() { return {workers(), here().scratch}; }
   DType dtype() const { return dtype_; }
+
+  // Divides the workers into min(most, workers().count()) groups, each of a lane; with one there
+  // are no lanes. Once, before any PerLane is made.
+  void MakeLanes(std::size_t most);
+  // As many as groups: 1 without lanes.
+  std::size_t lanes() const { return groups_ ? groups_->count() : 1; }
+  // Calls task(i) for each lane, i in [0, lanes()), side by side and within that lane; without
+  // lanes task(0), where it is. What a lane allocates may leave it, graphs and StepVectors may not.
+  void ForEachLane(FunctionRef<void(std::size_t i)> task, LoopSite site = LoopSite::Here());
+  // The lane that the calling thread is in: i + 1, or 0 outside of lanes.
+  std::size_t lane() const;
+  // Of its workers, the number of the first among all.
+  std::size_t first_worker() const { return lane() == 0 ? 0 : groups_->first(lane() - 1); }
+  // Lanes have copies of these, of any contents: what every lane writes.
+  void CopyForLanes(const std::vector<NamedTensor>& tensors);
+  // In a lane its copy of a tensor, if it has one; else the tensor.
+  Tensor InLane(const Tensor& tensor) const;
 
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
   Tensor Empty(const Shape& shape) const { return Empty(shape, dtype_); }
@@ -42,30 +65,43 @@ class Context {
   Tensor Indices(std::span<const std::int32_t> values) const;  // [n] of kI32
   Tensor Copy(const Tensor& tensor) const;                     // with its own storage
 
-  MemoryPool& memory() const { return *pool_; }
+  MemoryPool& memory() const { return *here().pool; }
   // For the small objects of a step (memory.h).
   template <class T>
   StepAllocator<T> allocator() const {
-    return StepAllocator<T>(step_memory_);
+    return StepAllocator<T>(here().step_memory);
   }
 
-  const Status& status() const { return status_; }
+  const Status& status() const { return here().status; }
   void Fail(Status status);  // keeps the first error
   Status TakeStatus();       // returns the error, if any, and clears it
 
-  bool recording() const { return recording_; }
-  void set_recording(bool on) { recording_ = on; }
-  std::uint64_t NextOrder() { return ++order_; }  // creation order of graph nodes
+  bool recording() const { return here().recording; }
+  void set_recording(bool on) { here().recording = on; }
+  std::uint64_t NextOrder() { return ++here().order; }  // creation order of graph nodes
 
  private:
-  const Workers& workers_;
+  struct LaneCopy {
+    const std::byte* of;  // the storage
+    Tensor tensor;
+  };
+  // What computations of one thread need.
+  struct Lane {
+    explicit Lane(const Workers& workers);
+    const Workers* workers;
+    std::shared_ptr<MemoryPool> pool;
+    std::shared_ptr<std::pmr::memory_resource> step_memory;
+    KernelScratch scratch;
+    Status status;
+    bool recording = true;
+    std::uint64_t order = 0;
+    std::vector<LaneCopy> copies;
+  };
+  Lane& here() const { return *lanes_[lane()]; }
+
   DType dtype_;
-  std::shared_ptr<MemoryPool> pool_;
-  std::shared_ptr<std::pmr::memory_resource> step_memory_;
-  KernelScratch scratch_;
-  Status status_;
-  bool recording_ = true;
-  std::uint64_t order_ = 0;
+  std::optional<WorkerGroups> groups_;
+  std::vector<std::unique_ptr<Lane>> lanes_;  // the first: outside of lanes
 };
 
 // Sets whether operations record their derivatives, for a scope.
@@ -81,6 +117,24 @@ class RecordingScope {
  private:
   Context& context_;
   bool before_;
+};
+
+// One T per lane of a context and one for use outside lanes, each constructed from the workers
+// there at its first use: what a computation keeps between calls, such as a renderer.
+template <class T>
+class PerLane {
+ public:
+  explicit PerLane(const Context& context)
+      : context_(context), all_(context.lanes() == 1 ? 1 : context.lanes() + 1) {}
+  T& Here() {
+    std::unique_ptr<T>& here = all_[context_.lane()];
+    if (!here) here = std::make_unique<T>(context_.workers());
+    return *here;
+  }
+
+ private:
+  const Context& context_;
+  std::vector<std::unique_ptr<T>> all_;
 };
 
 // Evaluation without a backward pass: { NoGrad off(context); ... }

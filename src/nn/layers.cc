@@ -107,7 +107,10 @@ BatchNorm::BatchNorm(Context& context, std::int64_t channels, const BatchNormOpt
 
 Var BatchNorm::Forward(const Var& x, Mode mode) {
   if (mode == Mode::kEval) {
-    return BatchNormEval(x, weight, bias, {running_mean, running_variance}, options_);
+    const Context& context = weight.context();
+    return BatchNormEval(x, weight, bias,
+                         {context.InLane(running_mean), context.InLane(running_variance)},
+                         options_);
   }
   const BatchNormResult batch = BatchNormTrain(x, weight, bias, options_);
   if (batch.y.valid()) Track(batch, x.shape().elements() / weight.shape().elements());
@@ -117,14 +120,16 @@ Var BatchNorm::Forward(const Var& x, Mode mode) {
 void BatchNorm::Track(const BatchNormResult& batch, std::int64_t count) {
   const auto n = static_cast<double>(count);
   const double unbiased = n / (n - 1.0);
+  Tensor means = weight.context().InLane(running_mean);
+  Tensor variances = weight.context().InLane(running_variance);
   WithFloatType(running_mean.dtype(), [&]<class T>(T) {
     const auto track = [](T& running, T value, double factor) {
       running = static_cast<T>((1.0 - kMomentum) * static_cast<double>(running) +
                                kMomentum * factor * static_cast<double>(value));
     };
-    for (std::size_t c = 0; c < running_mean.elements(); ++c) {
-      track(running_mean.data<T>()[c], batch.mean.data<T>()[c], 1.0);
-      track(running_variance.data<T>()[c], batch.variance.data<T>()[c], unbiased);
+    for (std::size_t c = 0; c < means.elements(); ++c) {
+      track(means.data<T>()[c], batch.mean.data<T>()[c], 1.0);
+      track(variances.data<T>()[c], batch.variance.data<T>()[c], unbiased);
     }
   });
 }

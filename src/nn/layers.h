@@ -89,7 +89,7 @@ class Conv2dLayer : public Module {
 };
 
 // For [n, c] and [n, c, h, w]. Running statistics as in PyTorch: new = (1 - momentum) old +
-// momentum batch, with the unbiased variance.
+// momentum batch, with the unbiased variance; within a lane, those of the lane's copy, if any.
 class BatchNorm : public Module {
  public:
   BatchNorm(Context& context, std::int64_t channels, const BatchNormOptions& options = {});

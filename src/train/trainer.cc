@@ -21,9 +21,15 @@ constexpr std::int64_t kGather = -2;  // the order to bring moments to rank 0
 constexpr double kNoLoss = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kBeforeTerms = 3;  // numbers: loss, images, stream seconds
 
-// An update by portions of the batch, on one process or many ranks: the same bits.
+// An update by portions of the batch, on one process or many ranks: the same bits. Portions of a
+// process are computed side by side by the lanes of its context.
 class PortionedUpdate {
  public:
+  struct Parts {
+    nn::Context& context;
+    Task& task;
+    ProcessGroup* group;  // of all ranks, or null
+  };
   // `group`: of all ranks, or null. InvalidArgument where the task or the number of ranks do not
   // allow so many portions.
   static Result<std::unique_ptr<PortionedUpdate>> Make(nn::Context& context, Task& task,
@@ -40,7 +46,7 @@ class PortionedUpdate {
     const GradientSums::Shape shape{.portions = portions, .ranks = ranks};
     auto sums = std::make_unique<GradientSums>(context, shape, std::move(statistics));
     return std::unique_ptr<PortionedUpdate>(
-        new PortionedUpdate(task, group, shape, std::move(sums)));
+        new PortionedUpdate({context, task, group}, shape, std::move(sums)));
   }
 
   // Task::Backward of this rank's portions, the means of all, Task::Update. `values` are those of
@@ -63,13 +69,24 @@ class PortionedUpdate {
   void GatherMoments() { sums_->share()->GatherMoments(); }
 
  private:
-  PortionedUpdate(Task& task, ProcessGroup* group, const GradientSums::Shape& shape,
+  // What a lane's portions have come to.
+  struct LaneWork {
+    Status status;
+    std::vector<StepValues> values;  // of its portions
+  };
+
+  PortionedUpdate(const Parts& parts, const GradientSums::Shape& shape,
                   std::unique_ptr<GradientSums> sums)
-      : task_(task),
-        group_(group),
+      : context_(parts.context),
+        task_(parts.task),
+        group_(parts.group),
         portions_(shape.portions),
         sums_(std::move(sums)),
-        value_sums_(shape.portions, shape.ranks) {}
+        value_sums_(shape.portions, shape.ranks),
+        work_(sums_->lanes().size()) {
+    for (std::size_t i = 0; i < work_.size(); ++i)
+      work_[i].values.resize(sums_->lanes()[i]->portions().size());
+  }
 
   Status Update(UpdateIndex at, StepValues* values) {
     WeightShare* const share = sums_->share();
@@ -83,35 +100,51 @@ class PortionedUpdate {
     return {};
   }
 
-  Status Backward(UpdateIndex at) {
-    at.listener = sums_.get();
-    const std::optional<BatchIndex> following = at.next;
-    for (std::size_t i = 0; i < sums_->portions().size(); ++i) {
-      at.portion = {sums_->portions()[i], portions_};
-      at.next = NextAfter(i, at.step, following);
-      portion_.Clear();
-      portion_.loss = kNoLoss;
-      sums_->BeginPortion(i);
-      TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion_));
-      sums_->EndPortion(gradients);
-      AddValues();
+  Status Backward(const UpdateIndex& at) {
+    context_.ForEachLane([&](std::size_t i) {
+      work_[i].status = BackwardOf(*sums_->lanes()[i], at, &work_[i].values);
+    });
+    for (const LaneWork& work : work_) TILEGRAD_TRY(work.status);
+    for (const LaneWork& work : work_) {
+      for (const StepValues& values : work.values) AddValues(values);
     }
     return {};
   }
 
-  // The batch after this rank's portion number i of a step: its next one, or its first one of the
-  // following step.
-  std::optional<BatchIndex> NextAfter(std::size_t i, std::int64_t step,
-                                      std::optional<BatchIndex> following) const {
-    const auto& own = sums_->portions();
-    if (i + 1 < own.size()) return BatchIndex{step, {own[i + 1], portions_}};
-    if (following) following->portion = {own[0], portions_};
-    return following;
+  // Of all portions of a lane.
+  Status BackwardOf(GradientSums::Lane& lane, UpdateIndex at, std::vector<StepValues>* values) {
+    at.listener = &lane;
+    const std::optional<BatchIndex> following = at.next;
+    for (std::size_t i = 0; i < lane.portions().size(); ++i) {
+      at.portion = {lane.portions()[i], portions_};
+      at.next = NextAfter(lane, i, {at.step, following});
+      StepValues& portion = values->at(i);
+      portion.Clear();
+      portion.loss = kNoLoss;
+      lane.BeginPortion(i);
+      TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion));
+      lane.EndPortion(gradients);
+    }
+    return {};
   }
 
-  void AddValues() {
-    numbers_ = {portion_.loss, static_cast<double>(portion_.images), portion_.stream_seconds};
-    for (const LossTerm& term : portion_.terms) numbers_.push_back(term.value);
+  struct Following {
+    std::int64_t step;               // the current one
+    std::optional<BatchIndex> next;  // of the following step
+  };
+  // The batch after a lane's portion number i of a step: its next one, or its first one of the
+  // following step.
+  std::optional<BatchIndex> NextAfter(const GradientSums::Lane& lane, std::size_t i,
+                                      Following following) const {
+    const auto& own = lane.portions();
+    if (i + 1 < own.size()) return BatchIndex{following.step, {own[i + 1], portions_}};
+    if (following.next) following.next->portion = {own[0], portions_};
+    return following.next;
+  }
+
+  void AddValues(const StepValues& of) {
+    numbers_ = {of.loss, static_cast<double>(of.images), of.stream_seconds};
+    for (const LossTerm& term : of.terms) numbers_.push_back(term.value);
     value_sums_.Add(numbers_);
   }
 
@@ -136,21 +169,23 @@ class PortionedUpdate {
     if (std::isfinite(sums[0])) values->loss = sums[0] / count;
     values->images += static_cast<std::int64_t>(sums[1]);
     values->stream_seconds += sums[2];
-    for (std::size_t i = 0; i < portion_.terms.size(); ++i) {
-      values->terms.push_back(portion_.terms[i]);
+    const StepValues& last = work_.back().values.back();
+    for (std::size_t i = 0; i < last.terms.size(); ++i) {
+      values->terms.push_back(last.terms[i]);
       values->terms.back().value = sums[kBeforeTerms + i] / count;
     }
-    values->also.insert(values->also.end(), portion_.also.begin(), portion_.also.end());
+    values->also.insert(values->also.end(), last.also.begin(), last.also.end());
   }
 
+  nn::Context& context_;
   Task& task_;
   ProcessGroup* group_;
   std::int64_t portions_;
   std::unique_ptr<GradientSums> sums_;
   ValueSums value_sums_;
   Status group_error_;           // of another rank, in the middle of an update
-  StepValues portion_;           // of the last portion
-  std::vector<double> numbers_;  // of it: loss, images, stream seconds, terms
+  std::vector<LaneWork> work_;   // of each lane
+  std::vector<double> numbers_;  // of a portion: loss, images, stream seconds, terms
 };
 
 class Training : public RunWork {
@@ -189,6 +224,8 @@ class Training : public RunWork {
 
   // Data, networks and all else; on every rank.
   Status Start(nn::Context& context, const ProgressSink& progress, const StopFlag& stop) {
+    context.MakeLanes(GradientSums::MostLanes(
+        {config_.schedule.portions, job_.group ? &job_.group->ranks() : nullptr}));
     TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
     TILEGRAD_TRY(context.TakeStatus());
     if (!job_.group && config_.schedule.portions == 1) return {};

@@ -95,6 +95,27 @@ TEST(LoopForecast, HelpersOfASideLoopMissInOthers) {
   EXPECT_DOUBLE_EQ(Makespan(strand, 5), 1 + 1);
 }
 
+// Four loops of 1 + 4 tasks + 1 in groups. The workers of one do not help another's.
+TEST(LoopForecast, GroupsRunTheirOwnLoops) {
+  const Strand small{{1, 1}, {Loop({1, 1, 1, 1})}}, large{{1, 1}, {Loop({2, 2, 2, 2})}};
+  LoopRecord groups{{"c/src/d.cc", 1}, 0, {small, large}};
+  groups.grouped = true;
+  const Strand strand{{3, 4}, {groups}};
+  EXPECT_DOUBLE_EQ(Makespan(strand, 2), 3 + (1 + 8 + 1) + 4);
+  EXPECT_DOUBLE_EQ(Makespan(strand, 4), 3 + (1 + 4 + 1) + 4);
+  EXPECT_DOUBLE_EQ(Makespan(strand, 8), 3 + (1 + 2 + 1) + 4);
+  // A group begins half a second later, and its second worker half a second after it has a loop.
+  EXPECT_DOUBLE_EQ(Makespan(strand, 4, 0.5), 3 + 0.5 + (1 + 4.5 + 1) + 4);
+  const LoopForecast forecast = Forecast(strand, {4, 0.5, 0});
+  double taken = 0;
+  for (const HeldBack& place : forecast.places) taken += place.taken;
+  EXPECT_DOUBLE_EQ(taken, forecast.seconds);
+  const auto inner = std::ranges::find(forecast.places, "b.cc:7", &HeldBack::place);
+  ASSERT_NE(inner, forecast.places.end());
+  EXPECT_DOUBLE_EQ(inner->work, 2 * 8);
+  EXPECT_DOUBLE_EQ(inner->wasted, 4.5 - 16.0 / 4);
+}
+
 TEST(LoopForecast, WastedTimeIsWhatIsMissingToAnEvenShare) {
   const Strand strand{{1, 2, 3}, {Loop({4, 4}), Loop({4, 1})}};
   const LoopForecast forecast = Forecast(strand, {2, 0, 0});

@@ -61,6 +61,31 @@ TEST_P(Allocation, NoneInAnEncoder) {
   EXPECT_EQ(AllocationsOfTraining(context, net, {3, 4, 16, 16}), 0);
 }
 
+// Lanes share weights; memory and statistics are their own.
+TEST_P(Allocation, NoneInLanes) {
+  const Workers workers(GetParam());
+  Context context(workers);
+  context.MakeLanes(2);
+  Rng rng(1);
+  Sequential net;
+  net.Add<Conv2dLayer>("conv", context, ConvShape{3, 8, 3}, rng);
+  net.Add<BatchNorm>("norm", context, 8, BatchNormOptions{.relu = true});
+  context.CopyForLanes(Buffers(net));
+  std::vector<Var> parameters;
+  for (const NamedVar& p : Parameters(net)) parameters.push_back(p.value);
+  const auto step = [&](std::uint64_t number) {
+    context.ForEachLane([&](std::size_t i) {
+      Rng of_lane(number, i);
+      Tensor image = context.Empty({3, 3, 16, 16});
+      FillUniform(image, of_lane, 0, 1);
+      const Var loss = Mean(Square(net.Forward(Constant(context, image), Mode::kTrain)));
+      EXPECT_EQ(Gradients(loss, parameters).size(), parameters.size());
+      EXPECT_TRUE(context.TakeStatus().ok());
+    });
+  };
+  EXPECT_EQ(AllocationsLater(step), 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Workers, Allocation, testing::Range(1, kThreadSanitizer ? 2 : 3));
 
 }  // namespace tilegrad::nn::allocation_test

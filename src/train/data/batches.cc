@@ -75,6 +75,7 @@ const std::vector<int>& BatchOrder::Permutation(std::int64_t epoch) {
 }
 
 std::vector<Sample> BatchOrder::Batch(const Slots& slots, int views) {
+  const std::scoped_lock lock(mutex_);
   std::vector<Sample> batch;
   for (std::int64_t i = 0; i < slots.count; ++i) {
     const std::int64_t position = slots.first + i;

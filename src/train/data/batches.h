@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -65,7 +66,7 @@ class BatchOrder {
   // `mirrored`: share of the samples that are mirrored, [0, 1].
   BatchOrder(int models, int views, std::uint64_t seed, double mirrored = 0)
       : models_(models), views_(views), seed_(seed), mirrored_(mirrored) {}
-  // `views` is at most the number of views there are.
+  // `views` is at most the number of views there are. Thread-safe.
   std::vector<Sample> Batch(const Slots& slots, int views);
   // The whole batch of a step.
   std::vector<Sample> Batch(std::int64_t step, int size, int views) {
@@ -77,6 +78,7 @@ class BatchOrder {
   int models_, views_;
   std::uint64_t seed_;
   double mirrored_;
+  std::mutex mutex_;  // of all below
   std::int64_t cached_epoch_ = -1;
   std::vector<int> permutation_;
 };

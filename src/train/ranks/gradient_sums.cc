@@ -9,11 +9,18 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kGrain = 32768;  // numbers to a task
+constexpr std::size_t kGrain = 32768;      // numbers to a task
+constexpr std::size_t kAddedGrain = 4096;  // of each lane: all of them stay in a cache
 
 void Resize(std::vector<AlignedVector<float>>* all, std::size_t numbers) {
   for (auto& one : *all) one.resize(std::max(one.size(), numbers));
 }
+
+int RankOf(const GradientSums::Shape& shape) { return shape.ranks ? shape.ranks->rank() : 0; }
+int RanksOf(const GradientSums::Shape& shape) { return shape.ranks ? shape.ranks->size() : 1; }
+
+const nn::Shape& ShapeOf(const nn::Var& parameter) { return parameter.shape(); }
+nn::Shape ShapeOf(const nn::Gradient& gradient) { return gradient.shape(); }
 
 }  // namespace
 
@@ -23,123 +30,192 @@ GradientSums::GradientSums(nn::Context& context, const Shape& shape,
   for (const nn::NamedTensor& t : statistics_) statistics_numbers_ += t.value.elements();
   before_.resize(statistics_numbers_);
   after_.resize(statistics_numbers_);
-  const int ranks = shape.ranks ? shape.ranks->size() : 1;
-  const int rank = shape.ranks ? shape.ranks->rank() : 0;
-  const std::vector<Subtree> all = SubtreesOf(ranks, shape.portions);
-  std::size_t levels = 0;
-  for (const Subtree& s : all) {
-    if (s.owner != rank) continue;
-    levels = std::max(levels, ClimbOf(s.count - 1));
-    for (std::int64_t p = s.first; p < s.first + s.count; ++p) {
-      portions_.push_back(p);
-      subtree_of_.push_back(own_.size());
-    }
-    own_.push_back(s);
-  }
-  levels_.resize(levels);
-  sums_.resize(own_.size());
-  if (ranks <= 1) return;
-  exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
+  context.CopyForLanes(statistics_);
+  const auto lanes = static_cast<int>(context.lanes());
+  MakeLanes(SubtreesOf(RanksOf(shape) * lanes, shape.portions));
+  if (RanksOf(shape) == 1) return;
+  exchange_ = std::make_unique<Exchange>(*shape.ranks, SubtreesOf(RanksOf(shape), shape.portions));
   share_ = std::make_unique<WeightShare>(*shape.ranks, context.workers(), *exchange_);
 }
 
-void GradientSums::CopyStatistics(float* to) {
-  for (const nn::NamedTensor& t : statistics_)
-    to = std::copy_n(t.value.data<float>(), t.value.elements(), to);
+GradientSums::~GradientSums() = default;
+
+std::size_t GradientSums::MostLanes(const Shape& shape) {
+  return static_cast<std::size_t>(std::max<std::int64_t>(1, shape.portions / RanksOf(shape)));
 }
 
-void GradientSums::SetStatistics(const float* from) {
-  for (nn::NamedTensor& t : statistics_) {
-    std::copy_n(from, t.value.elements(), t.value.data<float>());
-    from += t.value.elements();
+// `subtrees`: as if each lane of each rank were a rank. Those of one rank lie within the rank's
+// own subtrees, which are the largest that its portions fill.
+void GradientSums::MakeLanes(std::vector<Subtree> subtrees) {
+  const auto lanes = static_cast<int>(context_.lanes());
+  std::erase_if(subtrees, [&](const Subtree& s) { return s.owner / lanes != RankOf(shape_); });
+  std::vector<std::vector<Subtree>> of_lane(context_.lanes());
+  for (const Subtree& s : subtrees) {
+    const auto lane = static_cast<std::size_t>(s.owner % lanes);
+    subtrees_.push_back({lane, of_lane[lane].size()});
+    of_lane[lane].push_back(s);
+  }
+  for (auto& own : of_lane) lanes_.push_back(std::make_unique<Lane>(*this, std::move(own)));
+  std::vector<Subtree> open;
+  FoldSubtrees(subtrees, &open, [this](std::size_t left, std::size_t right) {
+    additions_.push_back({left, right});
+  });
+  for (const Subtree& s : open) own_.push_back(static_cast<std::size_t>(s.owner));
+}
+
+void GradientSums::CopyStatistics(float* to) const {
+  for (const nn::NamedTensor& t : statistics_) {
+    const nn::Tensor here = context_.InLane(t.value);
+    to = std::copy_n(here.data<float>(), here.elements(), to);
+  }
+}
+
+void GradientSums::SetStatistics(const float* from) const {
+  for (const nn::NamedTensor& t : statistics_) {
+    nn::Tensor here = context_.InLane(t.value);
+    std::copy_n(from, here.elements(), here.data<float>());
+    from += here.elements();
   }
 }
 
 void GradientSums::BeginUpdate() {
   CopyStatistics(before_.data());
   laid_out_ = false;
+  exchanging_ = false;
 }
 
 void GradientSums::GiveUp() { SetStatistics(before_.data()); }
 
-void GradientSums::BeginPortion(std::size_t i) {
-  at_ = i;
-  told_ = false;
-  if (i > 0) SetStatistics(before_.data());
-}
-
-// Once an update, when it is known which parameters it moves.
+// Once an update, by the lane that first knows which parameters it moves.
 template <class Things>
 void GradientSums::LayOut(const Things& things) {
+  const std::scoped_lock lock(mutex_);
   if (laid_out_) return;
-  means_ = nn::StepVector<nn::Gradient>(context_.allocator<nn::Gradient>());
   sizes_.clear();
+  shapes_.clear();
   for (const auto& thing : things) {
-    means_.emplace_back(nn::Constant(context_, context_.Empty(thing.shape())));
-    sizes_.push_back(static_cast<std::size_t>(thing.shape().elements()));
+    shapes_.push_back(ShapeOf(thing));
+    sizes_.push_back(static_cast<std::size_t>(shapes_.back().elements()));
   }
   layout_.Reset(sizes_, statistics_numbers_, shape_.bucket);
   ready_.assign(layout_.buckets(), 0);
-  Resize(&levels_, layout_.total());
-  Resize(&sums_, layout_.total());
   laid_out_ = true;
-  if (!exchange_) return;
+}
+
+float* GradientSums::SumOf(std::size_t subtree) const {
+  const Place& place = subtrees_[subtree];
+  return lanes_[place.lane]->sums_[place.subtree].data();
+}
+
+void GradientSums::BeginExchange() {
+  if (exchanging_) return;
+  exchanging_ = true;
   total_.resize(std::max(total_.size(), layout_.total()));
   Exchange::Job job{&layout_, {}, total_.data(), 1 / static_cast<float>(shape_.portions)};
-  for (auto& sum : sums_) job.own.push_back(sum.data());
+  for (const std::size_t subtree : own_) job.own.push_back(SumOf(subtree));
   exchange_->Begin(job);
 }
 
-void GradientSums::Begin(std::span<const nn::Var> parameters) {
+GradientSums::Lane::Lane(GradientSums& all, std::vector<Subtree> subtrees)
+    : all_(all), subtrees_(std::move(subtrees)), sums_(subtrees_.size()) {
+  std::size_t levels = 0;
+  for (std::size_t i = 0; i < subtrees_.size(); ++i) {
+    const Subtree& s = subtrees_[i];
+    levels = std::max(levels, ClimbOf(s.count - 1));
+    for (std::int64_t p = s.first; p < s.first + s.count; ++p) {
+      portions_.push_back(p);
+      subtree_of_.push_back(i);
+    }
+  }
+  levels_.resize(levels);
+  after_.resize(all.statistics_numbers_);
+}
+
+void GradientSums::Lane::BeginPortion(std::size_t i) {
+  at_ = i;
+  told_ = false;
+  all_.SetStatistics(all_.before_.data());
+}
+
+template <class Things>
+void GradientSums::Lane::LayOut(const Things& things) {
+  all_.LayOut(things);
+  Resize(&levels_, all_.layout_.total());
+  Resize(&sums_, all_.layout_.total());
+}
+
+void GradientSums::Lane::Begin(std::span<const nn::Var> parameters) {
   told_ = true;
   LayOut(parameters);
 }
 
-void GradientSums::Ready(std::size_t i, const nn::Gradient& gradient) {
+void GradientSums::Lane::Ready(std::size_t i, const nn::Gradient& gradient) {
   const nn::Var value = gradient.Value();
   if (!value.valid()) return;  // the context knows why
-  Add(value.value().data<float>(), layout_.parameter(i));
-  PartIsReady(layout_.parameter(i));
+  Add(value.value().data<float>(), all_.layout_.parameter(i));
+  PartIsReady(all_.layout_.parameter(i));
 }
 
 // The portion's numbers, and those of its left neighbours in the tree, to the place of their sum.
-void GradientSums::Add(const float* from, const Range& range) {
-  const Subtree& subtree = own_[subtree_of_[at_]];
+void GradientSums::Lane::Add(const float* from, const Range& range) {
+  const Subtree& subtree = subtrees_[subtree_of_[at_]];
   const std::int64_t leaf = portions_[at_] - subtree.first;
   const std::size_t climb = ClimbOf(leaf);
   AlignedVector<float>& place =
       leaf + 1 == subtree.count ? sums_[subtree_of_[at_]] : levels_[climb];
   float* to = place.data() + range.begin;
-  context_.workers().ForRanges(range.size(), kGrain,
-                               [&](std::size_t begin, std::size_t end, std::size_t) {
-                                 std::copy(from + begin, from + end, to + begin);
-                                 for (std::size_t level = 0; level < climb; ++level) {
-                                   const float* left = levels_[level].data() + range.begin;
-                                   for (std::size_t i = begin; i < end; ++i)
-                                     to[i] = left[i] + to[i];
-                                 }
-                               });
+  const auto add = [&](std::size_t begin, std::size_t end, std::size_t) {
+    std::copy(from + begin, from + end, to + begin);
+    for (std::size_t level = 0; level < climb; ++level) {
+      const float* left = levels_[level].data() + range.begin;
+      for (std::size_t i = begin; i < end; ++i) to[i] = left[i] + to[i];
+    }
+  };
+  const Workers& workers = all_.context_.workers();
+  workers.NoteTraffic(static_cast<double>((2 + climb) * range.size() * sizeof(float)));
+  workers.ForRanges(range.size(), kGrain, add);
 }
 
-void GradientSums::PartIsReady(const Range& part) {
-  if (!IsLastPortion() || !exchange_) return;
-  const Range held = layout_.BucketsOf(part);
+// Sums of several lanes are not final before they are added.
+void GradientSums::Lane::PartIsReady(const Range& part) {
+  if (!all_.exchange_ || all_.lanes_.size() > 1 || at_ + 1 < portions_.size()) return;
+  all_.BeginExchange();
+  const Range held = all_.layout_.BucketsOf(part);
   for (std::size_t b = held.begin; b < held.end; ++b) {
-    if (++ready_[b] == layout_.parts(b)) exchange_->Start(b);
+    if (++all_.ready_[b] == all_.layout_.parts(b)) all_.exchange_->Start(b);
   }
 }
 
-void GradientSums::EndPortion(std::span<const nn::Gradient> gradients) {
+void GradientSums::Lane::EndPortion(std::span<const nn::Gradient> gradients) {
   if (!told_) {
     LayOut(gradients);
     for (std::size_t i = gradients.size(); i-- > 0;) Ready(i, gradients[i]);
   }
-  CopyStatistics(after_.data());
-  Add(after_.data(), layout_.tail());
-  PartIsReady(layout_.tail());
+  all_.CopyStatistics(after_.data());
+  Add(after_.data(), all_.layout_.tail());
+  PartIsReady(all_.layout_.tail());
+}
+
+void GradientSums::AddLanes() {
+  if (lanes_.size() == 1) return;
+  const std::size_t bytes = layout_.total() * sizeof(float);
+  context_.workers().NoteTraffic(static_cast<double>((additions_.size() + own_.size()) * bytes));
+  const auto add = [this](std::size_t begin, std::size_t end, std::size_t) {
+    for (const Addition& addition : additions_) {
+      float* const to = SumOf(addition.left);
+      const float* const from = SumOf(addition.right);
+      for (std::size_t i = begin; i < end; ++i) to[i] += from[i];
+    }
+  };
+  context_.workers().ForRanges(layout_.total(), kAddedGrain, add);
+  if (!exchange_) return;
+  BeginExchange();
+  for (std::size_t b = 0; b < layout_.buckets(); ++b) exchange_->Start(b);
 }
 
 bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
+  AddLanes();
+  MakeMeans();
   const auto start = std::chrono::steady_clock::now();
   if (exchange_ && !exchange_->Wait(meanwhile)) return false;
   seconds_waited_ = SecondsSince(start);
@@ -149,6 +225,12 @@ bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
     TakeTotals();
   }
   return true;
+}
+
+void GradientSums::MakeMeans() {
+  means_ = nn::StepVector<nn::Gradient>(context_.allocator<nn::Gradient>());
+  for (const nn::Shape& shape : shapes_)
+    means_.emplace_back(nn::Constant(context_, context_.Empty(shape)));
 }
 
 void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
@@ -162,7 +244,7 @@ void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
 
 void GradientSums::TakeTotals() {
   const float scale = 1 / static_cast<float>(shape_.portions);
-  const float* totals = sums_[0].data();
+  const float* totals = SumOf(own_[0]);
   for (std::size_t i = 0; i < means_.size(); ++i) {
     const Range range = layout_.parameter(i);
     nn::Tensor mean = means_[i].Value().value();

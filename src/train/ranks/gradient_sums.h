@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -18,9 +19,11 @@
 
 namespace tilegrad::train {
 
-// Means of gradients and running statistics: those of this process are summed as they come, those
-// of other ranks meanwhile.
-class GradientSums : public nn::GradientListener {
+// Means of gradients and running statistics. The portions of this process are shared by the lanes
+// of its context as those of a run are by ranks: each lane sums its own as they come, then the
+// sums of lanes are added, in the order of the tree. Those of other ranks travel meanwhile: during
+// the last portion's backward pass where there is one lane, else once lanes have ended.
+class GradientSums {
  public:
   struct Shape {
     std::int64_t portions = 1;
@@ -29,19 +32,48 @@ class GradientSums : public nn::GradientListener {
   };
   // `statistics` are changed by each portion (nn::Buffers); all tensors are of kF32.
   GradientSums(nn::Context& context, const Shape& shape, std::vector<nn::NamedTensor> statistics);
+  ~GradientSums();
+  GradientSums(const GradientSums&) = delete;
+  GradientSums& operator=(const GradientSums&) = delete;
 
-  // Of this process, ascending. Every update takes all of them in this order: BeginPortion, a
-  // backward pass that this listens to, EndPortion; then Finish.
-  const std::vector<std::int64_t>& portions() const { return portions_; }
+  // How many lanes can have portions of this rank.
+  static std::size_t MostLanes(const Shape& shape);
+
+  // The portions of a lane, and their sums.
+  class Lane : public nn::GradientListener {
+   public:
+    Lane(GradientSums& all, std::vector<Subtree> subtrees);
+    // Ascending. Every update takes all of them in this order, within the lane: BeginPortion, a
+    // backward pass that this listens to, EndPortion.
+    const std::vector<std::int64_t>& portions() const { return portions_; }
+    void BeginPortion(std::size_t i);  // of portions(): statistics are as the update found them
+    void Begin(std::span<const nn::Var> parameters) override;
+    void Ready(std::size_t i, const nn::Gradient& gradient) override;
+    // Adds the statistics, and `gradients` if Ready did not receive them.
+    void EndPortion(std::span<const nn::Gradient> gradients);
+
+   private:
+    friend class GradientSums;
+    template <class Things>
+    void LayOut(const Things& things);
+    void Add(const float* from, const Range& range);
+    void PartIsReady(const Range& part);
+
+    GradientSums& all_;
+    std::vector<Subtree> subtrees_;
+    std::vector<std::int64_t> portions_;
+    std::vector<std::size_t> subtree_of_;              // of each of portions_
+    std::vector<AlignedVector<float>> levels_, sums_;  // of incomplete subtrees; of subtrees_
+    AlignedVector<float> after_;                       // statistics of a portion
+    std::size_t at_ = 0;                               // which of portions_
+    bool told_ = false;                                // of the gradients of this portion
+  };
+  // One for each lane of the context.
+  std::span<const std::unique_ptr<Lane>> lanes() const { return lanes_; }
 
   void BeginUpdate();
-  void BeginPortion(std::size_t i);  // of portions(): the statistics are as the update found them
-  void Begin(std::span<const nn::Var> parameters) override;
-  void Ready(std::size_t i, const nn::Gradient& gradient) override;
-  // Adds the statistics, and `gradients` if Ready did not receive them.
-  void EndPortion(std::span<const nn::Gradient> gradients);
-  // Waits for the other ranks; then means() are those of all portions, and so are the statistics.
-  // False if `meanwhile`, called periodically, returns false first.
+  // When all lanes have ended. Waits for the other ranks; then means() are those of all portions,
+  // and so are the statistics. False if `meanwhile`, called periodically, returns false first.
   bool Finish(const std::function<bool()>& meanwhile);
   // Null, or what an optimiser's step has to be given after each Finish. Then the means are those
   // of its pieces alone, and the statistics come when it has finished.
@@ -54,33 +86,44 @@ class GradientSums : public nn::GradientListener {
   std::size_t numbers() const { return layout_.total(); }    // that each portion has
 
  private:
+  void MakeLanes(std::vector<Subtree> subtrees);
   template <class Things>
   void LayOut(const Things& things);
-  void Add(const float* from, const Range& range);
-  void PartIsReady(const Range& part);
+  void MakeMeans();
+  float* SumOf(std::size_t subtree) const;
+  void AddLanes();
+  void BeginExchange();
   void TakeTotals();
   void TakeOwn(const std::function<bool()>& meanwhile);
   void TakeStatistics(const float* totals, float scale);
-  bool IsLastPortion() const { return at_ + 1 == portions_.size(); }
-  void CopyStatistics(float* to);
-  void SetStatistics(const float* from);
+  void CopyStatistics(float* to) const;
+  void SetStatistics(const float* from) const;
 
   nn::Context& context_;
   const Shape shape_;
   std::vector<nn::NamedTensor> statistics_;
   std::size_t statistics_numbers_ = 0;
 
-  std::vector<Subtree> own_;
-  std::vector<std::int64_t> portions_;
-  std::vector<std::size_t> subtree_of_;  // of each of portions_, in own_
+  std::vector<std::unique_ptr<Lane>> lanes_;
+  struct Place {
+    std::size_t lane, subtree;  // of the lane
+  };
+  std::vector<Place> subtrees_;  // of all lanes, in order
+  struct Addition {
+    std::size_t left, right;  // of subtrees_: the sum goes to the left one
+  };
+  std::vector<Addition> additions_;  // that make sums of this process's subtrees
+  std::vector<std::size_t> own_;     // of subtrees_: where those sums are then
 
+  std::mutex mutex_;  // of laid_out_, and while it is false of what LayOut sets
+  bool laid_out_ = false;
+  std::vector<nn::Shape> shapes_;  // of parameters
+  std::vector<std::size_t> sizes_;
   BucketLayout layout_;
-  bool laid_out_ = false, told_ = false;             // in this update; in this portion
-  std::vector<std::size_t> sizes_, ready_;           // of parameters; ready parts of each bucket
-  std::vector<AlignedVector<float>> levels_, sums_;  // of incomplete subtrees; of own_
-  AlignedVector<float> total_, before_, after_;      // of all; statistics
+  std::vector<std::size_t> ready_;  // ready parts of each bucket
+  bool exchanging_ = false;
+  AlignedVector<float> total_, before_, after_;  // of all; statistics
   nn::StepVector<nn::Gradient> means_;
-  std::size_t at_ = 0;  // which of portions_
   double seconds_waited_ = 0;
   std::unique_ptr<Exchange> exchange_;  // with other ranks
   std::unique_ptr<WeightShare> share_;

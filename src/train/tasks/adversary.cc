@@ -45,8 +45,8 @@ ConfigFields FieldsOf(AdversaryConfig* c) {
 }
 
 Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, PenaltyPlace place,
-                     std::uint64_t seed)
-    : context_(context), config_(config) {
+                     const Schedule& schedule)
+    : context_(context), config_(config), kept_(static_cast<std::size_t>(schedule.portions)) {
   if (!config.HasCritic()) return;
   const LearnedCritic::Job job{
       .role = kAdversaryRole,
@@ -55,7 +55,7 @@ Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, Penalt
       .optimizer = {.learning_rate = config.learning_rate,
                     .beta1 = config.beta1,
                     .beta2 = config.beta2},
-      .seed = seed,
+      .seed = static_cast<std::uint64_t>(schedule.seed),
       .weights = kCriticWeightStream,
       .interpolates = kPenaltyStream};
   critic_.emplace(context, job);
@@ -63,9 +63,9 @@ Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, Penalt
 
 Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
                                                    const AdversaryConfig& config,
-                                                   std::uint64_t seed) {
+                                                   const Schedule& schedule) {
   TILEGRAD_ASSIGN(const PenaltyPlace place, PenaltyPlaceOf(config.place));
-  auto out = std::unique_ptr<Adversary>(new Adversary(context, config, place, seed));
+  auto out = std::unique_ptr<Adversary>(new Adversary(context, config, place, schedule));
   if (config.perceptual == 0) return out;
   if (config.network_file.empty()) {
     return InvalidArgument(
@@ -79,7 +79,6 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
 
 void Adversary::AddLosses(const Pictures& pictures, LossSum* sum) {
   const auto& [rendered, truth, portion] = pictures;
-  kept_.resize(static_cast<std::size_t>(portion.count));
   kept_[static_cast<std::size_t>(portion.index)] = {truth, rendered.value()};
   if (config_.weight > 0) critic_->AddGeneratorLoss(config_.weight, rendered, sum);
   if (config_.features > 0) {

@@ -15,6 +15,7 @@
 #include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"
 #include "train/run/portion.h"
+#include "train/run/run.h"
 #include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
@@ -41,7 +42,8 @@ class Adversary {
  public:
   // Errors: an unknown word, an unreadable perceptual network.
   static Result<std::unique_ptr<Adversary>> Make(nn::Context& context,
-                                                 const AdversaryConfig& config, std::uint64_t seed);
+                                                 const AdversaryConfig& config,
+                                                 const Schedule& schedule);
 
   struct Pictures {
     nn::Var rendered;      // [n, 3, size, size]
@@ -78,7 +80,7 @@ class Adversary {
 
  private:
   Adversary(nn::Context& context, const AdversaryConfig& config, PenaltyPlace place,
-            std::uint64_t seed);
+            const Schedule& schedule);
 
   nn::Context& context_;
   AdversaryConfig config_;

@@ -61,7 +61,7 @@ struct UpdateIndex {
   Portion portion{};                         // of the batch
   nn::GradientListener* listener = nullptr;  // for nn::Gradients
   nn::UpdateShare* share = nullptr;          // for nn::Adam::Step
-  // The batch that this process uses after this one, if the run has one more: Backward may prefetch
+  // The batch that this lane uses after this one, if the run has one more: Backward may prefetch
   // it.
   std::optional<BatchIndex> next = std::nullopt;
 };
@@ -184,7 +184,8 @@ class Task {
   // The gradients, for the parameters of this update, of the mean loss over `at.portion` of the
   // batch. Sets values->loss and images, and appends terms. A loss or gradient that is not finite
   // is an error. Changes no state that later steps see, except Statistics(). Whatever an update
-  // keeps for the step's next one, it keeps per portion.
+  // keeps for the step's next one, it keeps per portion. The lanes of TaskStart::context call it
+  // side by side, each for other portions: keep whatever else a call needs in nn::PerLane.
   virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
                                                         StepValues* values) = 0;
   // Waits for whatever Backward has started for UpdateIndex::next.

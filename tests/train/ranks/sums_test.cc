@@ -80,11 +80,13 @@ TEST(ValueSums, AreThoseOfTheTree) {
 
 // A network with a statistic, and a batch of random numbers for each portion.
 struct Problem {
-  Workers workers{1};
+  Workers workers;
   nn::Context context{workers};
   nn::Sequential net;
 
-  Problem() {
+  // Portions are shared by as many lanes as `shape` and the workers allow.
+  explicit Problem(const GradientSums::Shape& shape = {}, int count = 1) : workers(count) {
+    context.MakeLanes(GradientSums::MostLanes(shape));
     Rng rng(3);
     net.Add<nn::LinearLayer>("first", context, nn::LinearShape{.in = 5, .out = 7}, rng);
     net.Add<nn::BatchNorm>("norm", context, 7, nn::BatchNormOptions{.relu = true});
@@ -101,6 +103,19 @@ struct Problem {
     for (const nn::NamedVar& p : nn::Parameters(net)) out.push_back(p.value);
     return out;
   }
+  // All portions of the process.
+  void Run(GradientSums* sums, std::span<const nn::Var> parameters, bool listening = true) {
+    sums->BeginUpdate();
+    context.ForEachLane([&](std::size_t l) {
+      GradientSums::Lane& lane = *sums->lanes()[l];
+      for (std::size_t i = 0; i < lane.portions().size(); ++i) {
+        lane.BeginPortion(i);
+        const nn::Var loss = Loss(lane.portions()[i]);
+        lane.EndPortion(nn::Gradients(loss, parameters, listening ? &lane : nullptr));
+      }
+      EXPECT_TRUE(context.TakeStatus().ok());
+    });
+  }
 };
 
 // Gradients and statistics after two updates, in one row.
@@ -110,18 +125,14 @@ void Append(const nn::Tensor& t, Bits* out) {
   out->insert(out->end(), t.data<float>(), t.data<float>() + t.elements());
 }
 
-Bits MeansOf(std::int64_t portions, bool listening) {
-  Problem p;
-  GradientSums sums(p.context, {portions, nullptr, /*bucket=*/10}, nn::Buffers(p.net));
+Bits MeansOf(std::int64_t portions, bool listening, int workers = 1) {
+  const GradientSums::Shape shape{portions, nullptr, /*bucket=*/10};
+  Problem p(shape, workers);
+  GradientSums sums(p.context, shape, nn::Buffers(p.net));
   const std::vector<nn::Var> parameters = p.Parameters();
   Bits out;
   for (int update = 0; update < 2; ++update) {
-    sums.BeginUpdate();
-    for (std::size_t i = 0; i < sums.portions().size(); ++i) {
-      sums.BeginPortion(i);
-      const nn::Var loss = p.Loss(sums.portions()[i]);
-      sums.EndPortion(nn::Gradients(loss, parameters, listening ? &sums : nullptr));
-    }
+    p.Run(&sums, parameters, listening);
     EXPECT_TRUE(sums.Finish(nullptr));
     for (const nn::Gradient& g : sums.means()) Append(g.Value().value(), &out);
   }
@@ -135,17 +146,22 @@ TEST(GradientSums, HaveTheSameBitsWhoeverTellsOfThem) {
     EXPECT_EQ(MeansOf(portions, false), MeansOf(portions, true));
 }
 
+TEST(GradientSums, HaveTheSameBitsOnAnyNumberOfLanes) {
+  for (const std::int64_t portions : {1, 2, 4, 16}) {
+    const Bits want = MeansOf(portions, true);
+    for (const int workers : {2, 3, 5, 16})
+      EXPECT_EQ(MeansOf(portions, true, workers), want) << portions << " on " << workers;
+  }
+}
+
 // Weights and statistics of every rank, and the moments that rank 0 gathers, after three updates.
-Bits TrainedOn(std::int64_t portions, Transport* ranks) {
-  Problem p;
+Bits TrainedOn(std::int64_t portions, Transport* ranks, int workers = 1) {
+  const GradientSums::Shape shape{portions, ranks, /*bucket=*/10};
+  Problem p(shape, workers);
   nn::Adam adam(p.context, nn::Parameters(p.net), {.weight_decay = 0.01});
-  GradientSums sums(p.context, {portions, ranks, /*bucket=*/10}, nn::Buffers(p.net));
+  GradientSums sums(p.context, shape, nn::Buffers(p.net));
   for (int update = 0; update < 3; ++update) {
-    sums.BeginUpdate();
-    for (std::size_t i = 0; i < sums.portions().size(); ++i) {
-      sums.BeginPortion(i);
-      sums.EndPortion(nn::Gradients(p.Loss(sums.portions()[i]), adam.parameters(), &sums));
-    }
+    p.Run(&sums, adam.parameters());
     EXPECT_TRUE(sums.Finish(nullptr));
     EXPECT_TRUE(adam.Step(sums.means(), sums.share()).ok());
   }
@@ -166,7 +182,7 @@ TEST(WeightShare, EndsInTheSameBits) {
     for (const int size : {2, 3, 5, 8}) {
       if (size > portions) continue;
       OnRanks(size, [&](Transport& ranks) {
-        const Bits got = TrainedOn(portions, &ranks);
+        const Bits got = TrainedOn(portions, &ranks, /*workers=*/1 + ranks.rank() % 3);
         EXPECT_EQ(got.size() == want.size(), ranks.rank() == 0);
         EXPECT_TRUE(std::equal(got.begin(), got.end(), want.begin()))
             << portions << " on rank " << ranks.rank() << " of " << size;
@@ -206,7 +222,7 @@ TEST(GradientSums, GivingUpLeavesTheStatisticsAsTheyWere) {
   for (const nn::NamedTensor& t : nn::Buffers(p.net)) Append(t.value, &before);
   GradientSums sums(p.context, {2, nullptr}, nn::Buffers(p.net));
   sums.BeginUpdate();
-  sums.BeginPortion(0);
+  sums.lanes()[0]->BeginPortion(0);
   (void)p.Loss(0);
   sums.GiveUp();
   for (const nn::NamedTensor& t : nn::Buffers(p.net)) Append(t.value, &after);

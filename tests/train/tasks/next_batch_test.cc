@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <memory>
 #include <numeric>
 #include <vector>
@@ -36,7 +37,8 @@ Batch Want(std::int64_t first) {
 TEST(NextBatch, IsTheSameForAnyNumberOfWorkers) {
   for (const int count : {1, 2, 16}) {
     const Workers workers(count);
-    NextBatch<Batch> batches(workers);
+    const nn::Context context(workers);
+    NextBatch<Batch> batches(context);
     std::vector<BatchIndex> begun;
     for (std::int64_t step = 0; step < 30; ++step) {
       UpdateIndex at{step};
@@ -49,7 +51,8 @@ TEST(NextBatch, IsTheSameForAnyNumberOfWorkers) {
 
 TEST(NextBatch, FollowsPortionsAndStartsAnewAfterAJump) {
   const Workers workers(2);
-  NextBatch<Batch> batches(workers);
+  const nn::Context context(workers);
+  NextBatch<Batch> batches(context);
   std::vector<BatchIndex> begun;
   const auto take = [&](std::int64_t step, std::int64_t portion, const BatchIndex& next) {
     UpdateIndex at{step};
@@ -69,7 +72,8 @@ TEST(NextBatch, FollowsPortionsAndStartsAnewAfterAJump) {
 
 TEST(NextBatch, TellsWhyThereIsNone) {
   const Workers workers(2);
-  NextBatch<Batch> batches(workers);
+  const nn::Context context(workers);
+  NextBatch<Batch> batches(context);
   UpdateIndex at{0};
   at.next = BatchIndex{1};
   const auto make = [](const BatchIndex& of) {
@@ -82,6 +86,35 @@ TEST(NextBatch, TellsWhyThereIsNone) {
   EXPECT_TRUE(batches.Take(at, make).ok());
   at = {1};
   ExpectMessage(batches.Take(at, make).status(), "step 1");
+}
+
+// Lanes make batches side by side, each with scratch of its own, and nothing beforehand.
+TEST(NextBatch, ALaneMakesItsOwn) {
+  const Workers workers(5);
+  nn::Context context(workers);
+  context.MakeLanes(2);
+  NextBatch<Batch> batches(context);
+  std::vector<std::atomic<int>> in_lane(SideLoop::LanesOf(workers));
+  std::atomic<int> begun = 0, overlaps = 0;
+  const auto make = [&](const BatchIndex& of) {
+    ++begun;
+    const auto batch = std::make_shared<Batch>(40);
+    return BatchWork<Batch>{batch->size(),
+                            [&, batch, of](std::size_t i, std::size_t lane) {
+                              overlaps += in_lane[lane]++ > 0;
+                              (*batch)[i] = of.portion.index;
+                              --in_lane[lane];
+                            },
+                            [batch] { return Result<Batch>(*batch); }};
+  };
+  context.ForEachLane([&](std::size_t i) {
+    UpdateIndex at{3};
+    at.portion = {static_cast<std::int64_t>(i), 2};
+    at.next = BatchIndex{4, at.portion};
+    EXPECT_EQ(*Ok(batches.Take(at, make)), Batch(40, at.portion.index));
+  });
+  EXPECT_EQ(begun, 2);
+  EXPECT_EQ(overlaps, 0);
 }
 
 }  // namespace tilegrad::train::next_batch_test

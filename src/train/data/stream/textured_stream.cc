@@ -2,6 +2,7 @@
 #include "train/data/stream/textured_stream.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -84,7 +85,7 @@ struct TexturedStream::Worker {
   std::vector<Scene> scenes, shown;  // without light, and as they are drawn
   std::vector<TexturedView> drawn;   // of SetUp, which passes them over
   std::vector<float> rgba;
-  double seconds = 0;
+  std::atomic<double> seconds = 0;
 
   void DrawColors(const Scene& scene, const Recolor& recolor);
   void SetViews(const Job& job, std::span<const TexturedView> views);
@@ -257,7 +258,7 @@ Status TexturedStream::Change(std::size_t worker, std::span<const TexturedView> 
 
 double TexturedStream::TakeSeconds() {
   double sum = 0;
-  for (const auto& worker : workers_) sum += std::exchange(worker->seconds, 0);
+  for (const auto& worker : workers_) sum += worker->seconds.exchange(0);
   return sum;
 }
 

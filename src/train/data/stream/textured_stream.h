@@ -85,7 +85,7 @@ class TexturedStream {
   // Other cameras and lights for Again, as many as there were.
   Status Change(std::size_t worker, std::span<const TexturedView> views);
 
-  // Of processor time that Render has taken since the last call. Between batches only.
+  // Of processor time that Render has taken since the last call.
   double TakeSeconds();
   // Rows of objects from models that are spread over all, to look at.
   Result<ImageU8> Sheet(int objects, int views);

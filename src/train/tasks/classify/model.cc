@@ -379,7 +379,7 @@ LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
                              std::span<const Sample> batch, std::span<const Shift> shifts) {
   return *MakeNow(
       LabelledWork(context, data, {batch.begin(), batch.end()}, {shifts.begin(), shifts.end()}),
-      context.workers());
+      context);
 }
 
 nn::Tensor ColorsOf(nn::Context& context, std::span<const std::uint8_t> images, int size) {

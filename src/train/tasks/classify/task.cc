@@ -121,7 +121,7 @@ Status ClassifyTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(LoadPictures(start));
   lesson_.source = dataset_->info().source;
   lesson_.objects = train_.images.models;
-  batches_.emplace(context_->workers());
+  batches_.emplace(*context_);
   order_.emplace(train_.images.models, train_.images.views, seed(), config_.mirrored);
   network_.emplace(*context_, config_.network,
                    static_cast<std::int64_t>(dataset_->info().classes.size()), seed());

@@ -40,7 +40,9 @@ GanLearner::GanLearner(nn::Context& context, const Job& job, const Sources& sour
       shape_(context, generator_.shape(), config_.optimizer, config_.StageSteps(true)),
       texture_(context, generator_.texture(), config_.optimizer, config_.StageSteps(false)),
       silhouettes_(context, JobOf(config_, GanCritic::kSilhouettes)),
-      pictures_(context, JobOf(config_, GanCritic::kPictures)) {
+      pictures_(context, JobOf(config_, GanCritic::kPictures)),
+      real_(static_cast<std::size_t>(config_.schedule.portions)),
+      fake_(static_cast<std::size_t>(config_.schedule.portions)) {
   if (config_.critic.texture_weight > 0)
     maps_.emplace(context, JobOf(config_, GanCritic::kTextures));
   scores_ = context.Zeros({kScores});
@@ -99,7 +101,6 @@ Status GanLearner::DrawReal(const UpdateIndex& at, int round) {
   };
   TILEGRAD_ASSIGN(ObjectViews views, round > 0 ? sources_.pictures->Draw({number, count})
                                                : sources_.pictures->Take(at, batch_of));
-  real_.resize(static_cast<std::size_t>(at.portion.count));
   Seen& real = real_[static_cast<std::size_t>(at.portion.index)];
   real = {};
   if (StageOf(at.step) == GanStage::kShape) {
@@ -114,7 +115,6 @@ Status GanLearner::DrawReal(const UpdateIndex& at, int round) {
 GeneratedObjects GanLearner::Draw(const UpdateIndex& at, int round) {
   const nn::Tensor noise = step_.Noise(kNoiseStream, NumberOf(at, round), CountOf(at));
   GeneratedObjects out = step_.Draw(generator_, noise, StageOf(at.step), nn::Mode::kTrain);
-  fake_.resize(static_cast<std::size_t>(at.portion.count));
   fake_[static_cast<std::size_t>(at.portion.index)] = {out.cover.value(), out.colors.value(),
                                                        out.maps.value()};
   return out;

@@ -104,7 +104,7 @@ RealPictures::RealPictures(nn::Context& context, const Job& job, MeshCache meshe
       stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes,
               SideLoop::LanesOf(context.workers())),
       order_(static_cast<int>(meshes.size()), 1, job.seed),
-      next_(context.workers()) {
+      next_(context) {
   for (const Camera& camera : PrimaryCameras(job.camera, job.views)) views_.push_back({camera, {}});
 }
 
@@ -123,7 +123,7 @@ BatchWork<ObjectViews> RealPictures::Work(const Batch& batch) {
 }
 
 Result<ObjectViews> RealPictures::Draw(const Batch& batch) {
-  return MakeNow(Work(batch), context_.workers());
+  return MakeNow(Work(batch), context_);
 }
 
 Result<std::span<const float>> RealPictures::DrawOne(int model, std::uint64_t position,

@@ -13,7 +13,7 @@ GanStep::GanStep(nn::Context& context, const GanConfig& config, const CameraRule
       config_(config),
       size_(rule.lens.width),
       cameras_(PrimaryCameras(rule, config.views)),
-      renderer_(context.workers()) {
+      renderer_(context) {
   for (Camera& camera : cameras_)
     camera = ScaledCamera(camera, static_cast<float>(config.stream.draw.samples));
 }
@@ -35,7 +35,7 @@ RenderedImages GanStep::Render(const SphereModel& sphere, const SceneVars& scene
   job.cameras.reserve(meshes * cameras_.size());
   for (std::size_t b = 0; b < meshes; ++b)
     job.cameras.insert(job.cameras.end(), cameras_.begin(), cameras_.end());
-  return RenderScenes(renderer_, scenes, std::move(job));
+  return RenderScenes(renderer_.Here(), scenes, std::move(job));
 }
 
 // Each pixel the mean of its samples, the views of an object as channels.

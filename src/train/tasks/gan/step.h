@@ -59,7 +59,7 @@ class GanStep {
   GanConfig config_;
   int size_;
   std::vector<Camera> cameras_;  // supersampled: `samples` pixels a side of each pixel
-  SceneRenderer renderer_;
+  nn::PerLane<SceneRenderer> renderer_;
 };
 
 }  // namespace tilegrad::train

@@ -21,8 +21,8 @@ PhotographStep::PhotographStep(nn::Context& context, const PhotographsConfig& co
       network_(context, config.network, start, static_cast<int>(config.size),
                static_cast<std::uint64_t>(config.schedule.seed)),
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
-      renderer_(context.workers()),
-      color_renderer_(context.workers()) {
+      renderer_(context),
+      color_renderer_(context) {
   const nn::NoGrad off(context);
   const nn::Var mean = network_.MeanShape();
   std::vector<double> positions;
@@ -53,11 +53,11 @@ RenderedImages PhotographStep::Draw(const Prediction& predicted, const Photograp
   SceneVars scenes{.positions = predicted.positions, .textures = predicted.textures};
   if (config_.camera == "predicted")
     scenes.cameras = PinholeCameras(predicted.cameras, static_cast<int>(config_.size));
-  RenderedImages images = RenderScenes(renderer_, scenes, JobAt(batch, step));
+  RenderedImages images = RenderScenes(renderer_.Here(), scenes, JobAt(batch, step));
   if (config_.loss.color_moves) return images;
   scenes.positions = nn::Detach(scenes.positions);
   if (scenes.cameras.valid()) scenes.cameras = nn::Detach(scenes.cameras);
-  images.colors = RenderScenes(color_renderer_, scenes, JobAt(batch, step)).colors;
+  images.colors = RenderScenes(color_renderer_.Here(), scenes, JobAt(batch, step)).colors;
   return images;
 }
 
@@ -251,7 +251,7 @@ BatchWork<PhotographBatch> PhotographWork(nn::Context& context, const Photograph
 PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
                                   const PhotoStore& store, const std::vector<int>& photographs,
                                   std::int64_t first) {
-  return *MakeNow(PhotographWork(context, config, store, {photographs, first}), context.workers());
+  return *MakeNow(PhotographWork(context, config, store, {photographs, first}), context);
 }
 
 }  // namespace tilegrad::train

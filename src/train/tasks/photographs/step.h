@@ -75,7 +75,7 @@ class PhotographStep {
   PhotographNetwork network_;
   LearnedWeights weights_;
   std::vector<WeighedEdge> edges_;  // of the initial mean shape
-  SceneRenderer renderer_, color_renderer_;
+  nn::PerLane<SceneRenderer> renderer_, color_renderer_;
   Adversary* adversary_ = nullptr;
 };
 

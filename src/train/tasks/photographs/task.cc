@@ -77,14 +77,13 @@ Status PhotographsTask::Start(const TaskStart& start) {
                                   config_.crop, image_size(), workers, start.progress, start.stop));
   lesson_.source = set_.source;
   lesson_.objects = train_->count();
-  batches_.emplace(workers);
+  batches_.emplace(*context_);
   order_.emplace(static_cast<int>(train.size()), 1,
                  static_cast<std::uint64_t>(start.schedule.seed));
   step_.emplace(*context_, config_,
                 PhotographStart{set_.mean_keypoints, set_.keypoint_names.size()});
   TILEGRAD_TRY(context_->TakeStatus());
-  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary,
-                                              static_cast<std::uint64_t>(start.schedule.seed)));
+  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, start.schedule));
   step_->SetAdversary(adversary_.get());
   return {};
 }

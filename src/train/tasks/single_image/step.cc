@@ -30,9 +30,9 @@ ImageLosses::ImageLosses(nn::Context& context, const SingleImageConfig& config,
     : config_(config),
       image_size_(image_size),
       sphere_(sphere),
-      renderer_(context.workers()),
+      renderer_(context),
       rival_(RivalOptions(config.render.rule, config.rivals).value()),
-      rival_renderer_(context.workers()) {}
+      rival_renderer_(context) {}
 
 bool ImageLosses::HasColor() const {
   return !rival_ || (rival_->rule == rivals::Rule::kSoftRas ? config_.rivals.softras_color
@@ -46,7 +46,7 @@ RenderedImages ImageLosses::DrawOurs(const Prediction& meshes, const BatchTensor
   job.cameras = batch.cameras;
   job.views =
       static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
-  return RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
+  return RenderScenes(renderer_.Here(), {.positions = meshes.positions, .colors = meshes.colors},
                       std::move(job));
 }
 
@@ -56,8 +56,8 @@ RenderedImages ImageLosses::Draw(const Prediction& meshes, const BatchTensors& b
   RivalJob job{sphere_.faces(), batch.cameras, image_size_, *rival_};
   job.options.softras.sigma = SoftRasSigmaAt(
       config_.rivals, static_cast<double>(step) / static_cast<double>(config_.schedule.steps));
-  return RenderRival(rival_renderer_, meshes.positions, HasColor() ? meshes.colors : nn::Var(),
-                     std::move(job));
+  return RenderRival(rival_renderer_.Here(), meshes.positions,
+                     HasColor() ? meshes.colors : nn::Var(), std::move(job));
 }
 
 nn::Var ImageLosses::Total(const Prediction& meshes, const BatchTensors& batch, std::int64_t step,
@@ -167,7 +167,7 @@ struct Gathering {
 
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch) {
-  return *MakeNow(GatherWork(context, store, batch, {}), context.workers());
+  return *MakeNow(GatherWork(context, store, batch, {}), context);
 }
 
 BatchWork<BatchTensors> GatherWork(nn::Context& context, const ImageStore& store,

@@ -54,7 +54,7 @@ class ImageLosses {
   nn::Var Total(const Prediction& meshes, const BatchTensors& batch, std::int64_t step,
                 StepValues* values);
 
-  SceneRenderer& renderer() { return renderer_; }
+  SceneRenderer& renderer() { return renderer_.Here(); }
   // Uses our renderer, whichever one trains.
   RenderedImages DrawOurs(const Prediction& meshes, const BatchTensors& batch, std::int64_t step);
 
@@ -67,9 +67,9 @@ class ImageLosses {
   SingleImageConfig config_;
   int image_size_;
   const SphereModel& sphere_;
-  SceneRenderer renderer_;
+  nn::PerLane<SceneRenderer> renderer_;
   std::optional<rivals::Options> rival_;  // instead of ours
-  RivalRenderer rival_renderer_;
+  nn::PerLane<RivalRenderer> rival_renderer_;
 };
 
 // Network, optimiser and renderer of a run.

@@ -74,7 +74,7 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
-  batches_.emplace(context_->workers());
+  batches_.emplace(*context_);
   TILEGRAD_TRY(LoadMeshes(start));
   lesson_.source = dataset_->info().source;
   lesson_.half_extent = dataset_->info().camera.half_extent;

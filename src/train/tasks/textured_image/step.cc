@@ -72,9 +72,9 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
       network_(context, NetworkOf(config), LightHeadOf(config.light), image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
-      renderer_(context.workers()),
+      renderer_(context),
       light_targets_(context, config.light),
-      rival_renderer_(context.workers()) {}
+      rival_renderer_(context) {}
 
 RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
   const double sharpness = SharpnessAt(config_.render, config_.schedule.steps, step);
@@ -103,7 +103,7 @@ RenderedImages TexturedStep::DrawN3mr(const Prediction& objects, const nn::Var& 
                .cameras = batch.cameras,
                .size = image_size_,
                .options = {.rule = rivals::Rule::kN3mr}};
-  return RenderTextured(rival_renderer_, positions, cubes, std::move(job));
+  return RenderTextured(rival_renderer_.Here(), positions, cubes, std::move(job));
 }
 
 TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step) {
@@ -120,7 +120,7 @@ TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step
     out.images = DrawN3mr(out.objects, scenes.light_directions, batch);
     return out;
   }
-  out.images = RenderScenes(renderer_, scenes, JobAt(batch, step));
+  out.images = RenderScenes(renderer_.Here(), scenes, JobAt(batch, step));
   return out;
 }
 
@@ -287,7 +287,7 @@ BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream
 
 Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
                                   const std::vector<Sample>& models, std::int64_t first) {
-  return MakeNow(RenderWork(context, stream, size, models, first), context.workers());
+  return MakeNow(RenderWork(context, stream, size, models, first), context);
 }
 
 namespace {
@@ -320,7 +320,7 @@ void Write(const FoundLight& found, const TargetRow<T>& row) {
 }  // namespace
 
 LightTargets::LightTargets(nn::Context& context, const LightConfig& config)
-    : context_(context), search_(config), renderer_(context.workers()) {}
+    : context_(context), search_(config), renderer_(context) {}
 
 nn::Tensor LightTargets::Find(const Prediction& objects, const TexturedBatch& batch,
                               RenderJob job) {
@@ -329,11 +329,12 @@ nn::Tensor LightTargets::Find(const Prediction& objects, const TexturedBatch& ba
   const std::size_t size = static_cast<std::size_t>(job.options.width), pixels = size * size;
   const SceneVars scenes{.positions = nn::Constant(context_, objects.positions.value()),
                          .textures = nn::Constant(context_, objects.textures.value())};
-  if (!RenderScenes(renderer_, scenes, std::move(job)).colors.valid()) return {};
+  SceneRenderer& renderer = renderer_.Here();
+  if (!RenderScenes(renderer, scenes, std::move(job)).colors.valid()) return {};
   const nn::Tensor said = PredictedLights(objects).value();
   nn::Tensor out = context_.Empty(said.shape(), said.dtype());
   nn::WithFloatType(out.dtype(), [&]<class T>(T) {
-    const ImagesT<T>& drawn = FrameOf(renderer_, T{}).images();
+    const ImagesT<T>& drawn = FrameOf(renderer, T{}).images();
     const std::span<const T> picture = batch.truth_colors.template span<T>();
     const std::span<const T> cover = batch.truth_alpha.template span<T>();
     context_.workers().For(batch.views.size(), [&](std::size_t m, std::size_t) {

@@ -72,7 +72,7 @@ class LightTargets {
  private:
   nn::Context& context_;
   LightSearch search_;
-  SceneRenderer renderer_;
+  nn::PerLane<SceneRenderer> renderer_;
 };
 
 // The inputs of the losses and of image critics.
@@ -114,9 +114,9 @@ class TexturedStep {
   int image_size_;
   TextureNetwork network_;
   LearnedWeights weights_;
-  SceneRenderer renderer_;
+  nn::PerLane<SceneRenderer> renderer_;
   LightTargets light_targets_;
-  RivalRenderer rival_renderer_;  // if the rule is N3MR's
+  nn::PerLane<RivalRenderer> rival_renderer_;  // if the rule is N3MR's
   Adversary* adversary_ = nullptr;
 };
 

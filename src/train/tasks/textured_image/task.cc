@@ -74,13 +74,13 @@ Status TexturedImageTask::Start(const TaskStart& start) {
                                      workers, start.progress, start.stop));
   held_out_.emplace(std::move(held_out));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
-  batches_.emplace(workers);
+  batches_.emplace(*context_);
   stream_.emplace(TexturedStream::Job{config_.stream, config_.light, dataset_->info().camera,
                                       image_size(), seed},
                   std::move(meshes), SideLoop::LanesOf(workers));
   order_.emplace(static_cast<int>(train.size()), 1, seed);
   step_.emplace(*context_, config_, image_size());
-  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, seed));
+  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, start.schedule));
   step_->SetAdversary(adversary_.get());
   return {};
 }

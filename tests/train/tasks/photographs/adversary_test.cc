@@ -102,7 +102,7 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
   const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop);
   nn::Context context(workers_, nn::DType::kF64);
   PhotographStep step(context, config, {set.mean_keypoints, 15});
-  const auto adversary = Adversary::Make(context, config.adversary, 5).value();
+  const auto adversary = Adversary::Make(context, config.adversary, {.seed = 5}).value();
   step.SetAdversary(adversary.get());
   const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
   std::vector<nn::Var> vars;

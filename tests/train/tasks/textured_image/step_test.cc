@@ -56,7 +56,7 @@ struct SmallProblem {
       : config(c), stream(JobOf(c), meshes, workers), step(context, c, kSize) {
     auto drawn = Ok(RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 6));
     batch = std::move(*drawn);
-    auto made = Ok(Adversary::Make(context, c.adversary, 5));
+    auto made = Ok(Adversary::Make(context, c.adversary, {.seed = 5}));
     adversary = std::move(*made);
     step.SetAdversary(adversary.get());
   }
@@ -202,13 +202,13 @@ TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
 TEST(Adversary, RefusesWordsAndMissingFiles) {
   const Workers workers(1);
   nn::Context context(workers);
-  EXPECT_NE(Adversary::Make(context, {.place = "there"}, 1).status().message().find("\"there\""),
+  EXPECT_NE(Adversary::Make(context, {.place = "there"}, {}).status().message().find("\"there\""),
             std::string::npos);
-  EXPECT_NE(Adversary::Make(context, {.perceptual = 1}, 1).status().message().find("network_file"),
+  EXPECT_NE(Adversary::Make(context, {.perceptual = 1}, {}).status().message().find("network_file"),
             std::string::npos);
   AdversaryConfig absent{.perceptual = 1};
   absent.network_file = "/no/such/run";
-  EXPECT_FALSE(Adversary::Make(context, absent, 1).ok());
+  EXPECT_FALSE(Adversary::Make(context, absent, {}).ok());
 }
 
 TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {
