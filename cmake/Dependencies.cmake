@@ -11,8 +11,9 @@ if(TILEGRAD_PROGRAM)
   find_package(CLI11 REQUIRED)              # libcli11-dev
   find_package(tomlplusplus REQUIRED)       # libtomlplusplus-dev
   pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
+  pkg_check_modules(LIBDEFLATE REQUIRED IMPORTED_TARGET libdeflate)    # libdeflate-dev
   pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
-  find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
+  find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev; for tests
   pkg_check_modules(MATIO REQUIRED IMPORTED_TARGET matio)        # libmatio-dev
   pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)    # libopenexr-dev
   pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebpmux libwebp)    # libwebp-dev

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Streamed training from a synthetic set of ShapeNet's size beside training from a small part of it.
 
-    bench/train/large_set.py PROGRAM FOLDER [--models 44000] [--small 400] [--cache 140M] [--steps 20] [--turns 3] [--threads 2] [--set KEY=VALUE ...]
+    bench/train/large_set.py PROGRAM FOLDER [--models 44000] [--small 400] [--cache 104M] [--steps 20] [--turns 3] [--threads 2] [--set KEY=VALUE ...]
 
 Writes FOLDER/net in the layout of ShapeNetCore v1 (models of 2,000 faces, each with a shape and a texture of 256 x 256 of its own), makes a dataset
-of all and one of --small models, and trains configs/texture_quick.toml on both in turns, with a cache that holds all of the small one and
---small / --models of the large one. Prints peak memory, images a second, and processor time; then whether trainings on the large one come to the same
-bits with a smaller cache, one thread, and after a kill. What is there is taken again; remove FOLDER afterwards (44,000 models: 11 GB).
+of all and one of --small models, and trains configs/texture_quick.toml on both in turns, with a cache that just holds the training models of the
+small one: --small / --models of the large one's. Prints peak memory, images a second, and processor time; then whether trainings on the large one
+come to the same bits with a smaller cache, one thread, and after a kill. What is there is taken again; remove FOLDER afterwards (44,000 models: 11 GB).
 """
 import argparse
 import hashlib
@@ -189,7 +189,7 @@ def parse():
     parser.add_argument("folder", type=pathlib.Path)
     for name, value in {"models": 44000, "small": 400, "steps": 20, "turns": 3, "threads": 2}.items():
         parser.add_argument(f"--{name}", type=int, default=value)
-    parser.add_argument("--cache", default="140M")
+    parser.add_argument("--cache", default="104M")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE")
     return parser.parse_args()
 

@@ -21,8 +21,8 @@
 #include "io/image_file.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
+#include "scene/shrink_image.h"
 #include "train/data/dataset.h"
-#include "train/data/stream/textured_meshes.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train {

@@ -24,6 +24,7 @@ constexpr zip_uint64_t kMaxEntryBytes = zip_uint64_t{4} << 30;
 
 // Finds a file below `folder`, ignoring case component by component.
 std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name) {
+  if (Path exact = folder / name; PathExists(exact)) return exact;
   Path at = folder;
   for (const Path& part : Path(name)) {
     std::error_code error;

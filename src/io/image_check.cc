@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "io/image_readers.h"
+#include "io/png_chunks.h"
 
 namespace tilegrad::io {
 namespace {
@@ -29,7 +30,7 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
       return DataLoss("{}: truncated or corrupt PNG: the chunk at byte {} claims {} bytes", name,
                       at, length);
     }
-    const auto crc = crc32_z(0, &bytes[at + 4], length + 4);
+    const auto crc = libdeflate_crc32(0, &bytes[at + 4], length + 4);
     if (crc != BigEndian(bytes.subspan(at + 8 + length, 4)))
       return DataLoss("{}: corrupt PNG: the checksum of the chunk at byte {} is wrong", name, at);
     if (type == "IEND") return {};
@@ -228,21 +229,21 @@ Status CheckImageSize(std::int64_t width, std::int64_t height, const std::string
 }
 
 std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
-  constexpr std::size_t kFrame = 12, kFull = 3 * 256;
+  constexpr std::size_t kFull = 3 * 256;
   if (!IsPng(bytes)) return std::nullopt;
-  for (std::size_t at = kPngSignature.size();;) {  // CheckPng has seen an end
-    const std::size_t length = BigEndian(bytes.subspan(at, 4));
-    const std::string_view type(reinterpret_cast<const char*>(&bytes[at + 4]), 4);
-    if (type == "IEND" || (type == "PLTE" && length >= kFull)) return std::nullopt;
-    if (type == "PLTE") {
-      Bytes out(bytes.begin(), bytes.end());
-      out.insert(out.begin() + static_cast<std::ptrdiff_t>(at + 8 + length), kFull - length, 0);
-      out[at + 2] = kFull >> 8;
-      out[at + 3] = kFull & 0xff;  // stb_image ignores checksums
-      return out;
-    }
-    at += kFrame + length;
+  PngChunk chunk;
+  for (PngChunks chunks(bytes); chunks.Next(chunk);) {
+    if (chunk.type != "PLTE") continue;
+    if (chunk.data.size() >= kFull) return std::nullopt;
+    const auto at = chunk.data.data() - bytes.data();
+    const auto end = at + std::ssize(chunk.data);
+    Bytes out(bytes.begin(), bytes.end());
+    out.insert(out.begin() + end, kFull - chunk.data.size(), 0);
+    out[static_cast<std::size_t>(at) - 6] = kFull >> 8;
+    out[static_cast<std::size_t>(at) - 5] = kFull & 0xff;  // stb_image ignores checksums
+    return out;
   }
+  return std::nullopt;
 }
 
 Status CheckRawPixels(ByteSpan bytes, int width, int height, const std::string& name) {

@@ -14,6 +14,8 @@
 #include "base/text.h"
 #include "io/guarded_process.h"
 #include "io/image_readers.h"
+#include "io/png_chunks.h"
+#include "io/png_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -98,13 +100,9 @@ int OrientationOfJpeg(ByteSpan bytes) {
 }
 
 int OrientationOfPng(ByteSpan bytes) {
-  constexpr std::size_t kSignature = 8, kFrame = 12;
-  for (std::size_t at = kSignature; at + kFrame <= bytes.size();) {
-    const std::size_t length = BigEndian(bytes.subspan(at, 4));
-    const ByteSpan type = bytes.subspan(at + 4, 4);
-    if (Is(type, "eXIf")) return OrientationOfTiff(Part(bytes, at + 8, length));
-    if (Is(type, "IEND")) return 1;
-    at += kFrame + length;
+  PngChunk chunk;
+  for (PngChunks chunks(bytes); chunks.Next(chunk);) {
+    if (chunk.type == "eXIf") return OrientationOfTiff(chunk.data);
   }
   return 1;
 }
@@ -150,6 +148,9 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   }
   TILEGRAD_TRY(CheckRawPixels(bytes, width, height, name));
   TILEGRAD_TRY(ReadBudget::Take(unpacked, name));
+  if (IsPng(bytes)) {
+    if (auto image = DecodePlainPng(bytes)) return std::move(*image);
+  }
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
   if (!pixels && std::string_view(stbi_failure_reason()) == "outofmem") {

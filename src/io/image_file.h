@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files. Reads PNG, JPEG, BMP, TGA (stb_image), WebP (libwebp), binary PGM and PPM, SGI;
-// writes PNG.
+// Image files. Reads PNG (libdeflate, stb_image), JPEG, BMP, TGA (stb_image), WebP (libwebp),
+// binary PGM and PPM, SGI; writes PNG.
 #pragma once
 
 #include <span>

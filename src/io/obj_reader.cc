@@ -270,12 +270,21 @@ class ObjAssembly {
   Polygon polygon_;  // scratch
 };
 
+// Not by "\n#": each line has the first of both.
+bool HasColorComments(std::string_view text) {
+  constexpr std::string_view kBegins = "#MRGB ";
+  auto at = text.find(kBegins);
+  while (at != std::string_view::npos && (at == 0 || text[at - 1] != '\n'))
+    at = text.find(kBegins, at + 1);
+  return at != std::string_view::npos;
+}
+
 }  // namespace
 
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
   TILEGRAD_ASSIGN(ObjStatements statements, ParseObj(TextOf(file), source.Describe(name)));
-  if (TextOf(file).find("\n#MRGB ") != std::string_view::npos)
+  if (HasColorComments(TextOf(file)))
     statements.warnings.emplace_back("colours in comments (#MRGB, ZBrush's) are not read");
   return ObjAssembly(std::move(statements), source, name).Run();
 }

@@ -202,14 +202,15 @@ class ObjParser {
     std::string_view token = whole;
     ObjCorner corner = {-1, -1, -1};
     for (std::size_t kind = 0; kind < 3; ++kind) {
-      const auto slash = token.find('/');
+      std::size_t slash = 0;
+      while (slash < token.size() && token[slash] != '/') ++slash;
       const auto part = token.substr(0, slash);
       if (!part.empty() || kind == 0) {
-        std::int64_t index = 0;
-        if (!ParseNumber(part, index)) break;
+        std::int64_t index = ShortNumber(part);
+        if (index < 0 && !ParseNumber(part, index)) break;
         TILEGRAD_TRY(Index(kind, index, corner[kind]));
       }
-      if (slash == std::string_view::npos) {
+      if (slash == token.size()) {
         out.corners.push_back(corner);
         return {};
       }

@@ -101,4 +101,15 @@ bool ParseNumber(std::string_view token, T& value) {
   return true;
 }
 
+// The value of a token of 1 to 9 digits, as most indices are; -1: it is another.
+inline std::int32_t ShortNumber(std::string_view token) {
+  if (token.empty() || token.size() > 9) return -1;
+  std::int32_t value = 0;
+  for (const char c : token) {
+    if (c < '0' || c > '9') return -1;
+    value = 10 * value + (c - '0');
+  }
+  return value;
+}
+
 }  // namespace tilegrad::io

@@ -132,7 +132,9 @@ Status NormalizeToBox(Mesh& mesh, float half_extent) {
 }
 
 bool KeepFaces(const std::vector<char>& keep, Mesh* mesh) {
-  if (std::all_of(keep.begin(), keep.end(), [](char k) { return k == 0; })) return false;
+  const auto left_out = static_cast<std::size_t>(std::count(keep.begin(), keep.end(), 0));
+  if (left_out == keep.size()) return false;
+  if (left_out == 0) return true;
   Keep(&mesh->faces, keep, 1);
   Keep(&mesh->face_materials, keep, 1);
   Keep(&mesh->corner_uvs, keep, 3);

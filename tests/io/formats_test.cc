@@ -237,33 +237,6 @@ TEST_F(FormatsTest, TgaPixelsAreAllThere) {
   }
 }
 
-void AppendChunk(const std::string& type, const Bytes& data, Bytes* png) {
-  const auto big_endian = [png](std::uint64_t value) {
-    for (int i = 0; i < 4; ++i) png->push_back(static_cast<std::uint8_t>(value >> (24 - 8 * i)));
-  };
-  big_endian(data.size());
-  const std::size_t at = png->size();
-  png->insert(png->end(), type.begin(), type.end());
-  png->insert(png->end(), data.begin(), data.end());
-  big_endian(crc32(0, &(*png)[at], static_cast<uInt>(png->size() - at)));
-}
-
-// Colour 200 of a palette of two was whatever was in memory.
-TEST_F(FormatsTest, PngColoursBeyondThePaletteAreBlack) {
-  const Bytes row = {0, 1, 200, 0};  // no filter, three pixels
-  Bytes packed(64);
-  uLongf size = packed.size();
-  ASSERT_EQ(compress(packed.data(), &size, row.data(), row.size()), Z_OK);
-  packed.resize(size);
-  Bytes png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  AppendChunk("IHDR", {0, 0, 0, 3, 0, 0, 0, 1, 8, 3, 0, 0, 0}, &png);
-  AppendChunk("PLTE", {1, 2, 3, 4, 5, 6}, &png);
-  AppendChunk("IDAT", packed, &png);
-  AppendChunk("IEND", {}, &png);
-  const auto image = Ok(DecodeImage(png, "a.png"));
-  EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{4, 5, 6, 0, 0, 0, 1, 2, 3}));
-}
-
 TEST_F(FormatsTest, NpzRoundTrip) {
   const std::vector<float> f = {1.5f, -2, 3};
   const std::vector<std::uint8_t> u(24, 7);

@@ -201,7 +201,7 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
         "src/render/picture/"}},
       {std::regex("^(tiny_gltf|stb_.*)\\.h$"), {"src/io/"}},
       {std::regex("^assimp/.*"), {"src/io/"}},
-      {std::regex("^(zip|zlib)\\.h$"), {"src/io/"}},
+      {std::regex("^(zip|libdeflate)\\.h$"), {"src/io/"}},
       {std::regex("^matio\\.h$"), {"src/io/mat_"}},
       {std::regex("^Imf.*"), {"src/io/exr_"}},
       {std::regex("^webp/.*"), {"src/io/webp_", "src/io/image_readers.cc"}},

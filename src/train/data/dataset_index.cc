@@ -208,6 +208,7 @@ Result<std::vector<ModelInfo>> ReadModels(const Path& folder, const DatasetInfo&
   const std::string file = ModelsPath(folder).string();
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::vector<ModelInfo> models;
+  models.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')) + 1);
   std::set<std::pair<int, std::string>> seen;
   int line = 0;
   for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {

@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
-#include "train/data/stream/textured_meshes.h"
+#include "scene/shrink_image.h"
 #include "train/predictor.h"
 #include "train/report/html.h"
 #include "train/run/run_files.h"

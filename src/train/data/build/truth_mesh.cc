@@ -179,18 +179,18 @@ void ClusterFaces(std::size_t max_faces, Mesh* mesh) {
 }
 
 std::uint64_t GeometryFingerprint(const Mesh& mesh) {
+  std::vector<std::uint64_t> hashes(mesh.positions.size());
+  for (std::size_t v = 0; v < hashes.size(); ++v) {
+    for (int i = 0; i < 3; ++i) {
+      const auto coordinate = std::lround(mesh.positions[v][i] * 1e4f);
+      hashes[v] = Mix64(hashes[v] ^ static_cast<std::uint64_t>(coordinate));
+    }
+  }
   std::uint64_t sum = 0;
   for (const Face& face : mesh.faces) {
     // A sum over corners, then over faces: no order matters.
     std::uint64_t corners = 0;
-    for (std::int32_t v : face) {
-      const glm::vec3 p = mesh.positions[static_cast<std::size_t>(v)];
-      std::uint64_t hash = 0;
-      for (int i = 0; i < 3; ++i) {
-        hash = Mix64(hash ^ static_cast<std::uint64_t>(std::lround(p[i] * 1e4f)));
-      }
-      corners += hash;
-    }
+    for (std::int32_t v : face) corners += hashes[static_cast<std::size_t>(v)];
     sum += Mix64(corners);
   }
   return sum == 0 ? 1 : sum;

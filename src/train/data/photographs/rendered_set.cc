@@ -11,6 +11,7 @@
 #include "render/picture/mesh_scene.h"
 #include "render/picture/picture.h"
 #include "scene/shapes.h"
+#include "scene/shrink_image.h"
 #include "train/data/photographs/cmr_writer.h"
 #include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/factorization.h"

@@ -24,12 +24,15 @@ class FileModels : public ModelSource {
   std::vector<std::string> credits() const override { return {"Models of the user."}; }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
-    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(entries_[entry].file)));
+    const Path file = files_.empty() ? entries_[entry].file : files_[entry];
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
     return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
   }
+  void ForgetEntries() override { files_ = TakeFiles(&entries_); }
 
  private:
   std::vector<SourceEntry> entries_;
+  std::vector<std::string> files_;  // in the place of entries_, if that is forgotten
   std::vector<IgnoredFile> ignored_;
 };
 

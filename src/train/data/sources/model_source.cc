@@ -46,6 +46,14 @@ std::string SafeFileName(const std::string& text) {
   return hidden ? "_" + out : out;
 }
 
+std::vector<std::string> TakeFiles(std::vector<SourceEntry>* entries) {
+  std::vector<std::string> files;
+  files.reserve(entries->size());
+  for (SourceEntry& entry : *entries) files.push_back(std::move(entry.file));
+  std::vector<SourceEntry>().swap(*entries);
+  return files;
+}
+
 void SortEntries(std::vector<SourceEntry>* entries) {
   const auto key = [](const SourceEntry& e) { return std::tie(e.class_name, e.id, e.file); };
   std::sort(entries->begin(), entries->end(),

@@ -47,6 +47,8 @@ class ModelSource {
   virtual const std::vector<SourceEntry>& entries() const = 0;  // sorted by class, then id
   // Thread-safe. Called in ascending order, give or take the number of workers.
   virtual Result<SourceModel> Load(std::size_t entry) const = 0;
+  // Nothing but Load and name is called from now on: sources of many models free the rest.
+  virtual void ForgetEntries() {}
   // The camera and sizes that the source dictates, where it holds images.
   virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
   virtual std::vector<IgnoredFile> ignored() const { return {}; }
@@ -113,6 +115,9 @@ Result<std::vector<Path>> ListFolder(const Path& folder);
 
 // Turns any text into a file name: letters, digits, '.', '-' and '_' stay, the rest becomes '_'.
 std::string SafeFileName(const std::string& text);
+
+// The files of entries, which are freed.
+std::vector<std::string> TakeFiles(std::vector<SourceEntry>* entries);
 
 // Sorts by class, then id, and makes ids unique in their class by appending "-2", "-3", ...
 void SortEntries(std::vector<SourceEntry>* entries);

@@ -50,9 +50,10 @@ class ShapeNet : public ModelSource {
   std::vector<IgnoredFile> ignored() const override { return ignored_; }
   std::string input() const override { return std::filesystem::absolute(folder_).string(); }
   std::uint64_t version() const override { return kRulesVersion; }
+  void ForgetEntries() override { files_ = TakeFiles(&entries_); }
 
   Result<SourceModel> Load(std::size_t entry) const override {
-    const Path file = entries_[entry].file;
+    const Path file = files_.empty() ? entries_[entry].file : files_[entry];
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
     if (!loaded.lost_appearance.empty())
       return loaded.lost_appearance.front().Within(file.string());
@@ -87,6 +88,7 @@ class ShapeNet : public ModelSource {
 
   const Path folder_;
   std::vector<SourceEntry> entries_;
+  std::vector<std::string> files_;  // in the place of entries_, if that is forgotten
   std::vector<IgnoredFile> ignored_;
 };
 

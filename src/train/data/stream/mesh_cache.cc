@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/stream/mesh_cache.h"
 
-#include <malloc.h>
-
 #include <condition_variable>
 #include <deque>
 #include <list>
@@ -10,6 +8,7 @@
 #include <new>
 #include <thread>
 
+#include "base/free_memory.h"
 #include "base/parallel.h"
 
 namespace tilegrad::train {
@@ -29,15 +28,7 @@ std::size_t BytesOf(const std::vector<T>& values) {
   return values.capacity() * sizeof(T);
 }
 
-constexpr std::size_t kMuch = std::size_t{32} << 20;
-
-// What one thread has read and another lets go stays with the first one's part of the heap, which
-// glibc would keep: in time as much as the meshes that are there.
-void ReturnFreeMemory() {
-#ifdef __GLIBC__
-  ::malloc_trim(0);
-#endif
-}
+constexpr std::size_t kMuch = std::size_t{8} << 20;
 
 }  // namespace
 
@@ -77,7 +68,7 @@ class MeshCache::State {
 
   void Expect(const std::vector<std::size_t>& indices) {
     const std::scoped_lock lock(mutex_);
-    if (!full_ && order_.size() == entries_.size()) return;  // all are there to stay
+    if (AllStay()) return;
     expected_.insert(expected_.end(), indices.begin(), indices.end());
     if (!reader_.joinable()) reader_ = std::thread([this] { ReadAhead(); });
     changed_.notify_all();
@@ -94,6 +85,8 @@ class MeshCache::State {
   }
 
  private:
+  bool AllStay() const { return !full_ && order_.size() == entries_.size(); }
+
   struct Entry {
     Held mesh;
     std::list<std::size_t>::iterator place;  // in order_, while the mesh is there
@@ -134,7 +127,8 @@ class MeshCache::State {
     auto held = std::make_shared<const TexturedMesh>(std::move(mesh));
     lock.lock();
     Keep(index, held);
-    const bool much_left = left_ > limit_ / 8 + kMuch;
+    // Meshes that left stay with the heap of the thread that read them, in time as much as is here.
+    const bool much_left = left_ > limit_ / 16 + kMuch;
     if (much_left) left_ = 0;
     lock.unlock();
     if (much_left) ReturnFreeMemory();
@@ -153,6 +147,7 @@ class MeshCache::State {
       oldest.reset();
       order_.pop_front();
     }
+    if (AllStay()) read_ = nullptr;  // and the list of files that it holds
   }
 
   void ReadAhead() {
@@ -172,7 +167,7 @@ class MeshCache::State {
   }
 
   const std::size_t limit_;
-  const Read read_;
+  Read read_;                 // until all are there to stay
   mutable std::mutex mutex_;  // of all below
   std::condition_variable changed_;
   std::vector<Entry> entries_;

@@ -31,6 +31,7 @@ class MeshCache {
  public:
   using Held = std::shared_ptr<const TexturedMesh>;
   // Called from several threads at once, one of them the cache's own; the same for the same index.
+  // Destroyed once all meshes are in memory and none had to leave.
   using Read = std::function<Result<TexturedMesh>(std::size_t index)>;
 
   // Of indices in [0, count). Above `bytes`, the meshes least recently used leave; beside them

@@ -2,13 +2,14 @@
 #include "train/data/stream/textured_meshes.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <map>
 #include <mutex>
+#include <tuple>
 
 #include "base/error.h"
+#include "base/free_memory.h"
 #include "base/read_budget.h"
+#include "scene/shrink_image.h"
 #include "scene/topology.h"
 #include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
@@ -41,33 +42,6 @@ Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetInfo& info, const s
   return std::unique_ptr<ModelSource>();
 }
 
-// The first of the pixels behind each of `to` ones along an axis of `from`; last, `from`.
-std::vector<int> Blocks(int from, int to) {
-  std::vector<int> first;
-  for (int i = 0; i <= to; ++i)
-    first.push_back(static_cast<int>(static_cast<std::int64_t>(i) * from / to));
-  return first;
-}
-
-struct PixelBlock {
-  int left, right, top, bottom;
-};
-
-void MeanOfBlock(const ImageU8& image, const PixelBlock& block, std::uint8_t* out) {
-  std::array<std::uint64_t, 4> sum = {};
-  const auto channels = static_cast<std::size_t>(image.channels);
-  for (int v = block.top; v < block.bottom; ++v) {
-    const std::uint8_t* at = image.at(block.left, v);
-    for (int u = block.left; u < block.right; ++u, at += channels) {
-      for (std::size_t c = 0; c < channels; ++c) sum[c] += at[c];
-    }
-  }
-  const auto count = static_cast<std::uint64_t>(block.bottom - block.top) *
-                     static_cast<std::uint64_t>(block.right - block.left);
-  for (std::size_t c = 0; c < channels; ++c)
-    out[c] = static_cast<std::uint8_t>((sum[c] + count / 2) / count);
-}
-
 class Loader {
  public:
   Loader(const Dataset& dataset, const TexturedMeshRequest& request, std::vector<int> models)
@@ -80,14 +54,11 @@ class Loader {
     if (request_.colored) return {};
     TILEGRAD_ASSIGN(source_, OpenSource(dataset_.info(), request_.folder));
     if (!source_) return {};
-    std::map<std::pair<std::string, std::string>, std::size_t> places;
-    for (std::size_t e = 0; e < source_->entries().size(); ++e)
-      places[{source_->entries()[e].class_name, source_->entries()[e].id}] = e;
     for (std::size_t i = 0; i < models_.size(); ++i) {
-      const auto at = places.find({ClassOf(models_[i]), InfoOf(models_[i]).id});
-      if (at == places.end()) return Changed(models_[i], "no longer exists");
-      entries_[i] = at->second;
+      entries_[i] = EntryOf(models_[i]);
+      if (entries_[i] == kNone) return Changed(models_[i], "no longer exists");
     }
+    source_->ForgetEntries();
     return {};
   }
 
@@ -110,8 +81,6 @@ class Loader {
       if (most > 0) ClusterFaces(most, &mesh);
       CentreUnusedVertices(&mesh);
     }
-    for (MeshTexture& texture : mesh.textures)
-      texture.image = ShrunkImage(texture.image, request_.max_texture);
     if (request_.crease <= 0) return TexturedMesh(std::move(mesh));
     SplitAtCreases(request_.crease, &mesh);
     return TexturedMesh(std::move(mesh), NormalSource::kSmooth);
@@ -123,6 +92,16 @@ class Loader {
   }
   const std::string& ClassOf(int model) const {
     return dataset_.info().classes[static_cast<std::size_t>(InfoOf(model).class_index)];
+  }
+  // Of the source's, which are sorted.
+  std::size_t EntryOf(int model) const {
+    const auto& all = source_->entries();
+    const auto wanted = std::tie(ClassOf(model), InfoOf(model).id);
+    const auto at = std::lower_bound(
+        all.begin(), all.end(), wanted,
+        [](const SourceEntry& e, const auto& key) { return std::tie(e.class_name, e.id) < key; });
+    const bool found = at != all.end() && std::tie(at->class_name, at->id) == wanted;
+    return found ? static_cast<std::size_t>(at - all.begin()) : kNone;
   }
   Status Changed(int model, const char* how) const {
     return InvalidArgument(
@@ -140,8 +119,10 @@ class Loader {
   // The dataset does not note which axis was up; its shape tells.
   Result<Mesh> FromSource(int model, std::size_t entry) const {
     TILEGRAD_ASSIGN(SourceModel loaded, source_->Load(entry));
-    const auto* given = std::get_if<Mesh>(&loaded.data);
+    auto* given = std::get_if<Mesh>(&loaded.data);
     if (given == nullptr) return Changed(model, "has no mesh");
+    for (MeshTexture& texture : given->textures)
+      texture.image = ShrunkImage(texture.image, request_.max_texture);
     DatasetInfo info = dataset_.info();
     for (const UpAxis up : {UpAxis::kY, UpAxis::kZ, UpAxis::kX}) {
       Mesh mesh = *given;
@@ -185,27 +166,8 @@ Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<i
   });
   if (stop) return Cancelled("stopped while loading meshes");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  ReturnFreeMemory();  // of lists of all files
   return meshes;
-}
-
-ImageU8 ShrunkImage(const ImageU8& image, int side) {
-  const int longest = std::max(image.width, image.height);
-  if (longest <= side) return image;
-  const auto shorter = [&](int n) {
-    return std::max(1, static_cast<int>(static_cast<std::int64_t>(n) * side / longest));
-  };
-  ImageU8 out(shorter(image.width), shorter(image.height), image.channels);
-  const std::vector<int> rows = Blocks(image.height, out.height),
-                         columns = Blocks(image.width, out.width);
-  for (int y = 0; y < out.height; ++y) {
-    const auto row = static_cast<std::size_t>(y);
-    for (int x = 0; x < out.width; ++x) {
-      const auto column = static_cast<std::size_t>(x);
-      const PixelBlock block{columns[column], columns[column + 1], rows[row], rows[row + 1]};
-      MeanOfBlock(image, block, out.at(x, y));
-    }
-  }
-  return out;
 }
 
 }  // namespace tilegrad::train

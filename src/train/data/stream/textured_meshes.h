@@ -36,8 +36,4 @@ Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<i
                                      const TexturedMeshRequest& request, const Workers& workers,
                                      const ProgressSink& progress, const StopFlag& stop);
 
-// The mean of the pixels behind each of an image that has at most `side` pixels a side; the same
-// image if it has them already.
-ImageU8 ShrunkImage(const ImageU8& image, int side);
-
 }  // namespace tilegrad::train

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/rng.h"
+#include "scene/shrink_image.h"
 #include "train/predictor.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/object_pictures.h"

@@ -8,8 +8,8 @@
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
 #include "scene/light_frame.h"
+#include "scene/shrink_image.h"
 #include "train/data/stream/average_samples.h"
-#include "train/data/stream/textured_meshes.h"
 
 namespace tilegrad::train {
 namespace {

@@ -334,6 +334,20 @@ TEST(MeshCache, AMeshThatIsHeldStaysThoughItsPlaceIsGone) {
   EXPECT_EQ(held->mesh().faces.size(), 12u);
 }
 
+// Readers hold lists of files.
+TEST(MeshCache, LetsItsReaderGoOnceAllAreThereToStay) {
+  Source source;
+  for (const std::size_t room : {kCount - 1, kCount}) {
+    const auto list = std::make_shared<int>(0);
+    const std::size_t bytes = TexturedMesh(Box(glm::vec3(0), glm::vec3(1))).bytes();
+    const MeshCache cache(kCount, room * bytes,
+                          [list, &source](std::size_t i) { return source.Read(i); });
+    for (std::size_t i = 0; i < kCount; ++i) EXPECT_TRUE(cache.Get(i).ok());
+    EXPECT_EQ(list.use_count(), room == kCount ? 1 : 2);
+    EXPECT_NE(WidthOf(cache, 1), WidthOf(cache, 2));
+  }
+}
+
 TEST(MeshCache, ReadsAheadWhatIsExpected) {
   Source source;
   const MeshCache cache = source.CacheOf(3);

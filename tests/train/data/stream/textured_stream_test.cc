@@ -250,16 +250,6 @@ TEST(TexturedStream, CreasesDecideWhatIsSmooth) {
   EXPECT_GT(round, 1.3 * static_cast<double>(flat));
 }
 
-TEST(ShrunkImage, IsTheMeanOfWhatIsBehind) {
-  ImageU8 image(4, 2, 1);
-  image.pixels = {10, 20, 1, 1, 30, 40, 1, 3};
-  const ImageU8 small = ShrunkImage(image, 2);
-  ASSERT_EQ(small.width, 2);
-  ASSERT_EQ(small.height, 1);
-  EXPECT_EQ(small.pixels, (std::vector<std::uint8_t>{25, 2}));
-  EXPECT_EQ(ShrunkImage(image, 4).pixels, image.pixels);
-}
-
 class TexturedMeshes : public TempFolderTest {
  protected:
   TexturedMeshes() {
