@@ -191,7 +191,8 @@ void Adam::AddProduct(Slot& slot, const Gradient& product) {
   gradient.ldb = gradient.n;
   const Numbers all{0, slot.parameter.value.value().elements()};
   if (all.end == 0) return;
-  products_.push_back({gradient, Problem<float>(slot, all)});
+  products_.push_back(
+      {gradient, Problem<float>(slot, all), static_cast<std::size_t>(product.portions())});
 }
 
 void Adam::UpdateProducts() {

@@ -24,8 +24,18 @@ Var Parameter(Context& context, Tensor value) {
   return Var(context, std::move(value), MakeNode(context, {"parameter"}, {}));
 }
 
+// Of portions [first, first + count).
+Var Gradient::SumOf(std::int64_t first, std::int64_t count) const {
+  if (count > 1) return Add(SumOf(first, count / 2), SumOf(first + count / 2, count / 2));
+  const std::int64_t steps = first_.shape()[0] / portions_, begin = first * steps;
+  return Matmul(Slice(first_, 0, begin, begin + steps), Slice(second_, 0, begin, begin + steps),
+                {.transpose_a = true});
+}
+
 Var Gradient::Value() const {
-  return is_product() ? Matmul(first_, second_, {.transpose_a = true}) : first_;
+  if (!is_product()) return first_;
+  if (portions_ == 1) return Matmul(first_, second_, {.transpose_a = true});
+  return Scale(SumOf(0, portions_), 1 / static_cast<double>(portions_));
 }
 
 Var Adjoint::Product(std::size_t input, const Var& a, const Var& b) const {

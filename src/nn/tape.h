@@ -74,17 +74,20 @@ StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
 // A gradient for optimisers: a value, or a product a^T b of matrices [k, m] and [k, n], not yet
 // computed. A linear layer's weight has such a gradient (a: the adjoint of the layer's output, b:
 // its input): Adam computes it block by block and uses each block at once, so that the whole, as
-// large as the weight, is never in memory.
+// large as the weight, is never in memory. Or the mean of such products over portions of the k
+// rows, a power of two of them, summed in the order of one binary tree.
 class Gradient {
  public:
   Gradient() = default;  // invalid
   explicit Gradient(Var value) : first_(std::move(value)) {}
-  Gradient(const Var& a, const Var& b) : first_(Detach(a)), second_(Detach(b)) {}
+  Gradient(const Var& a, const Var& b, std::int64_t portions = 1)
+      : first_(Detach(a)), second_(Detach(b)), portions_(portions) {}
 
   bool valid() const { return first_.valid(); }
   bool is_product() const { return second_.valid(); }
   const Var& a() const { return first_; }  // of a product, like b()
   const Var& b() const { return second_; }
+  std::int64_t portions() const { return portions_; }
   Shape shape() const {
     return is_product() ? Shape{first_.shape()[1], second_.shape()[1]} : first_.shape();
   }
@@ -92,7 +95,9 @@ class Gradient {
   Var Value() const;  // computes a product at every call
 
  private:
+  Var SumOf(std::int64_t first, std::int64_t count) const;
   Var first_, second_;
+  std::int64_t portions_ = 1;
 };
 
 // Receives each gradient as soon as it is final, while those of earlier layers are still pending,

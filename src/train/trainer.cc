@@ -113,7 +113,7 @@ class PortionedUpdate {
 
   // Of all portions of a lane.
   Status BackwardOf(GradientSums::Lane& lane, UpdateIndex at, std::vector<StepValues>* values) {
-    at.listener = &lane;
+    at.listener = lane.listener();
     const std::optional<BatchIndex> following = at.next;
     for (std::size_t i = 0; i < lane.portions().size(); ++i) {
       at.portion = {lane.portions()[i], portions_};
@@ -124,6 +124,7 @@ class PortionedUpdate {
       lane.BeginPortion(i);
       TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion));
       lane.EndPortion(gradients);
+      TILEGRAD_TRY(context_.TakeStatus());
     }
     return {};
   }

@@ -118,6 +118,11 @@ TEST_F(KillResume, TwoKillsWithTheRulesOfOthers) {
   }
 }
 
+TEST_F(KillResume, TwoKillsWithPortionsSideBySide) {
+  settings_ = {"--set", "schedule.portions=4"};
+  CheckKills(2);
+}
+
 TEST_F(KillResume, TwoKillsWithTexturesAndLight) {
   Write("tiny.toml", kTinyTextured);
   CheckKills(2);

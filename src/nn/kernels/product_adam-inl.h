@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -46,11 +47,11 @@ inline GemmItems UpdateItemsFor(const GemmProblem<float>& p, std::size_t workers
 }
 
 struct ProductAdamPlan {
-  ProductAdamPlan(const GemmProblem<float>& product, const AdamProblem<float>& problem,
-                  std::size_t workers)
-      : gemm(product, UpdateItemsFor(product, workers)),
-        adam(problem),
-        rule(problem.coefficients) {}
+  ProductAdamPlan(const ProductAdamProblem& problem, std::size_t workers)
+      : gemm(problem.product, UpdateItemsFor(problem.product, workers)),
+        adam(problem.adam),
+        rule(problem.adam.coefficients),
+        portions(problem.portions) {}
 
   // Stride between rows of a group: one extra line, so that they do not share cache sets.
   std::size_t group_ld() const { return gemm.column_blocks.largest() * kTileColumns + kLineFloats; }
@@ -66,6 +67,7 @@ struct ProductAdamPlan {
   GemmPlan gemm;
   AdamProblem<float> adam;
   AdamRule rule;
+  std::size_t portions;
 };
 
 // Adam over some rows and columns of the gradient, in small portions: the multiplication calls it
@@ -122,6 +124,45 @@ class GroupUpdater {
   const float* gradient_ = nullptr;
 };
 
+constexpr std::size_t kTileFloats = kTileRows * kTileColumns;
+// Levels of the tree over portions, from single ones to all of them.
+constexpr std::size_t kMostTreeLevels =
+    static_cast<std::size_t>(std::bit_width(kMostProductAdamSteps));
+
+inline HWY_NOINLINE void MultiplyPortion(const float* packed_a, std::size_t rows,
+                                         const float* packed_b, std::size_t steps, float* tile) {
+  PackedRowsTile(packed_a, rows, PackedColumns{packed_b}, steps,
+                 TileTarget{.c = tile,
+                            .ldc = kTileColumns,
+                            .offset = {0, kLanes},
+                            .count = {kLanes, kTileColumns - kLanes}});
+}
+
+// A tile of the mean over portions: `rows` rows of kTileColumns floats, `ld` apart in `out`. Each
+// portion's product is added to the sums of its left neighbours in the tree, smaller ones first.
+inline HWY_NOINLINE void MeanTile(const ProductAdamPlan& plan, const float* packed_a,
+                                  std::size_t rows, const float* packed_b, float* out) {
+  const DF d;
+  HWY_ALIGN float levels[kMostTreeLevels * kTileFloats];
+  const std::size_t steps = plan.gemm.p.k / plan.portions, floats = rows * kTileColumns;
+  float* sum = levels;
+  for (std::size_t portion = 0; portion < plan.portions; ++portion) {
+    const auto climb = static_cast<std::size_t>(std::countr_one(portion));
+    sum = levels + climb * kTileFloats;
+    MultiplyPortion(packed_a + portion * steps * rows, rows,
+                    packed_b + portion * steps * kTileColumns, steps, sum);
+    for (const float* left = levels; left < sum; left += kTileFloats) {
+      for (std::size_t i = 0; i < floats; i += kLanes)
+        hn::Store(hn::Add(hn::Load(d, left + i), hn::Load(d, sum + i)), d, sum + i);
+    }
+  }
+  const VF share = hn::Set(d, 1 / static_cast<float>(plan.portions));
+  for (std::size_t r = 0; r < rows; ++r, sum += kTileColumns, out += plan.group_ld()) {
+    for (std::size_t i = 0; i < kTileColumns; i += kLanes)
+      hn::StoreU(hn::Mul(hn::Load(d, sum + i), share), d, out + i);
+  }
+}
+
 // Multiplies row panels [first, end) with the packed columns into `group`, interleaved with Adam
 // over `before`.
 inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Range panels,
@@ -135,10 +176,15 @@ inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Rang
   out.ldc = plan.group_ld();
   for (std::size_t j = 0; j < block.panels(); ++j) {
     for (std::size_t panel = panels.begin; panel < panels.end; ++panel) {
-      const std::size_t row = rows.begin(panel);
-      PackedRowsTile(packed_a + row * block.steps, rows.size(panel),
-                     PackedColumns{columns.panel(j)}, block.steps,
-                     TargetOf(out, row - rows.begin(panels.begin), j * kTileColumns, true));
+      const std::size_t row = rows.begin(panel), group_row = row - rows.begin(panels.begin);
+      if (plan.portions > 1) {
+        MeanTile(plan, packed_a + row * block.steps, rows.size(panel), columns.panel(j),
+                 group + group_row * out.ldc + j * kTileColumns);
+      } else {
+        PackedRowsTile(packed_a + row * block.steps, rows.size(panel),
+                       PackedColumns{columns.panel(j)}, block.steps,
+                       TargetOf(out, group_row, j * kTileColumns, true));
+      }
       before.Run();
     }
   }
@@ -170,7 +216,7 @@ struct ProductAdamPlans {
   ProductAdamPlans(std::span<const ProductAdamProblem> problems, std::size_t workers)
       : count(problems.size()) {
     for (std::size_t i = 0; i < count; ++i) {
-      const auto& plan = plans[i].emplace(problems[i].product, problems[i].adam, workers);
+      const auto& plan = plans[i].emplace(problems[i], workers);
       panels[i + 1] = panels[i] + plan.gemm.rows.count();
       items[i + 1] = items[i] + plan.gemm.items();
       packed[i + 1] = packed[i] + RoundUp(plan.gemm.packed_a_size(), kAlignment);

@@ -23,6 +23,10 @@ constexpr std::size_t kMostProductAdamSteps = 256;
 struct ProductAdamProblem {
   GemmProblem<float> product;
   AdamProblem<float> adam;
+  // A power of two that divides product.k. The gradient is the mean of as many products, each of
+  // the next product.k / portions steps, summed in the order of one binary tree: ((p0 + p1) +
+  // (p2 + p3)) + .. .
+  std::size_t portions = 1;
 };
 // Several matrices, none of them empty, at most kMostProductAdams: two loops in all.
 constexpr std::size_t kMostProductAdams = 16;

@@ -5,6 +5,8 @@
 #include <chrono>
 
 #include "base/clocks.h"
+#include "base/error.h"
+#include "nn/kernels/product_adam.h"
 
 namespace tilegrad::train {
 namespace {
@@ -93,13 +95,25 @@ void GradientSums::LayOut(const Things& things) {
   if (laid_out_) return;
   sizes_.clear();
   shapes_.clear();
+  rows_.clear();
+  stacks_.clear();
   for (const auto& thing : things) {
     shapes_.push_back(ShapeOf(thing));
-    sizes_.push_back(static_cast<std::size_t>(shapes_.back().elements()));
+    rows_.push_back(RowsOf(thing));
+    const bool summed = rows_.back() == 0;
+    if (!summed) stacks_.push_back(shapes_.size() - 1);
+    sizes_.push_back(summed ? static_cast<std::size_t>(shapes_.back().elements()) : 0);
   }
   layout_.Reset(sizes_, statistics_numbers_, shape_.bucket);
   ready_.assign(layout_.buckets(), 0);
   laid_out_ = true;
+}
+
+std::int64_t GradientSums::RowsOf(const nn::Gradient& gradient) const {
+  if (exchange_ || !gradient.is_product() || gradient.portions() != 1) return 0;
+  const std::int64_t rows = gradient.a().shape()[0];
+  const bool few = shape_.portions * rows <= static_cast<std::int64_t>(nn::kMostProductAdamSteps);
+  return few && gradient.shape().elements() > 0 ? rows : 0;
 }
 
 float* GradientSums::SumOf(std::size_t subtree) const {
@@ -128,6 +142,7 @@ GradientSums::Lane::Lane(GradientSums& all, std::vector<Subtree> subtrees)
     }
   }
   levels_.resize(levels);
+  products_.resize(portions_.size());
   after_.resize(all.statistics_numbers_);
 }
 
@@ -186,10 +201,23 @@ void GradientSums::Lane::PartIsReady(const Range& part) {
   }
 }
 
+// All portions of an update have graphs of one form.
+void GradientSums::Lane::Take(std::size_t i, const nn::Gradient& gradient) {
+  const std::int64_t rows = all_.rows_[i];
+  if (all_.RowsOf(gradient) != rows) {
+    return all_.context_.Fail(
+        InternalError("gradient {} is a product of {} rows in one portion and of {} in another", i,
+                      rows, all_.RowsOf(gradient)));
+  }
+  if (rows == 0) return Ready(i, gradient);
+  products_[at_][i] = gradient;
+}
+
 void GradientSums::Lane::EndPortion(std::span<const nn::Gradient> gradients) {
   if (!told_) {
     LayOut(gradients);
-    for (std::size_t i = gradients.size(); i-- > 0;) Ready(i, gradients[i]);
+    products_[at_].resize(gradients.size());
+    for (std::size_t i = gradients.size(); i-- > 0;) Take(i, gradients[i]);
   }
   all_.CopyStatistics(after_.data());
   Add(after_.data(), all_.layout_.tail());
@@ -229,8 +257,44 @@ bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
 
 void GradientSums::MakeMeans() {
   means_ = nn::StepVector<nn::Gradient>(context_.allocator<nn::Gradient>());
-  for (const nn::Shape& shape : shapes_)
-    means_.emplace_back(nn::Constant(context_, context_.Empty(shape)));
+  for (std::size_t i = 0; i < shapes_.size(); ++i) {
+    const std::int64_t rows = shape_.portions * rows_[i];
+    const auto empty = [this](const nn::Shape& shape) {
+      return nn::Constant(context_, context_.Empty(shape));
+    };
+    if (rows == 0) {
+      means_.emplace_back(empty(shapes_[i]));
+    } else {
+      means_.emplace_back(empty({rows, shapes_[i][0]}), empty({rows, shapes_[i][1]}),
+                          shape_.portions);
+    }
+  }
+  StackProducts();
+}
+
+namespace {
+
+// Rows to where portion `portion` has its own.
+void CopyRows(const nn::Var& from, std::int64_t portion, nn::Tensor to) {
+  const nn::Tensor& rows = from.value();
+  std::copy_n(rows.data<float>(), rows.elements(),
+              to.data<float>() + static_cast<std::size_t>(portion) * rows.elements());
+}
+
+}  // namespace
+
+void GradientSums::StackProducts() {
+  for (const auto& lane : lanes_) {
+    const std::size_t own = lane->portions_.size();
+    context_.workers().For(own * stacks_.size(), [&](std::size_t task, std::size_t) {
+      const std::size_t i = stacks_[task / own];
+      nn::Gradient& product = lane->products_[task % own][i];
+      const std::int64_t portion = lane->portions_[task % own];
+      CopyRows(product.a(), portion, means_[i].a().value());
+      CopyRows(product.b(), portion, means_[i].b().value());
+    });
+    for (auto& products : lane->products_) products.clear();
+  }
 }
 
 void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
@@ -247,6 +311,7 @@ void GradientSums::TakeTotals() {
   const float* totals = SumOf(own_[0]);
   for (std::size_t i = 0; i < means_.size(); ++i) {
     const Range range = layout_.parameter(i);
+    if (range.size() == 0) continue;
     nn::Tensor mean = means_[i].Value().value();
     float* to = mean.data<float>();
     context_.workers().ForRanges(range.size(), kGrain,

@@ -22,7 +22,9 @@ namespace tilegrad::train {
 // Means of gradients and running statistics. The portions of this process are shared by the lanes
 // of its context as those of a run are by ranks: each lane sums its own as they come, then the
 // sums of lanes are added, in the order of the tree. Those of other ranks travel meanwhile: during
-// the last portion's backward pass where there is one lane, else once lanes have ended.
+// the last portion's backward pass where there is one lane, else once lanes have ended. Without
+// other ranks a gradient that is a product stays one: the factors of all portions are stacked, and
+// Adam sums products where it uses them.
 class GradientSums {
  public:
   struct Shape {
@@ -44,8 +46,10 @@ class GradientSums {
    public:
     Lane(GradientSums& all, std::vector<Subtree> subtrees);
     // Ascending. Every update takes all of them in this order, within the lane: BeginPortion, a
-    // backward pass that this listens to, EndPortion.
+    // backward pass that listener() listens to, EndPortion.
     const std::vector<std::int64_t>& portions() const { return portions_; }
+    // This with other ranks, else null: then nothing is gained by hearing of gradients early.
+    nn::GradientListener* listener() { return all_.exchange_ ? this : nullptr; }
     void BeginPortion(std::size_t i);  // of portions(): statistics are as the update found them
     void Begin(std::span<const nn::Var> parameters) override;
     void Ready(std::size_t i, const nn::Gradient& gradient) override;
@@ -56,6 +60,7 @@ class GradientSums {
     friend class GradientSums;
     template <class Things>
     void LayOut(const Things& things);
+    void Take(std::size_t i, const nn::Gradient& gradient);
     void Add(const float* from, const Range& range);
     void PartIsReady(const Range& part);
 
@@ -64,6 +69,7 @@ class GradientSums {
     std::vector<std::int64_t> portions_;
     std::vector<std::size_t> subtree_of_;              // of each of portions_
     std::vector<AlignedVector<float>> levels_, sums_;  // of incomplete subtrees; of subtrees_
+    std::vector<std::vector<nn::Gradient>> products_;  // of each of portions_, by parameter
     AlignedVector<float> after_;                       // statistics of a portion
     std::size_t at_ = 0;                               // which of portions_
     bool told_ = false;                                // of the gradients of this portion
@@ -89,7 +95,11 @@ class GradientSums {
   void MakeLanes(std::vector<Subtree> subtrees);
   template <class Things>
   void LayOut(const Things& things);
+  // The rows of a product that stays one, 0 of any other gradient.
+  std::int64_t RowsOf(const nn::Gradient& gradient) const;
+  std::int64_t RowsOf(const nn::Var& /*parameter*/) const { return 0; }
   void MakeMeans();
+  void StackProducts();
   float* SumOf(std::size_t subtree) const;
   void AddLanes();
   void BeginExchange();
@@ -117,8 +127,10 @@ class GradientSums {
 
   std::mutex mutex_;  // of laid_out_, and while it is false of what LayOut sets
   bool laid_out_ = false;
-  std::vector<nn::Shape> shapes_;  // of parameters
-  std::vector<std::size_t> sizes_;
+  std::vector<nn::Shape> shapes_;    // of parameters
+  std::vector<std::int64_t> rows_;   // RowsOf their gradients
+  std::vector<std::size_t> sizes_;   // numbers that are summed here
+  std::vector<std::size_t> stacks_;  // parameters with rows
   BucketLayout layout_;
   std::vector<std::size_t> ready_;  // ready parts of each bucket
   bool exchanging_ = false;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <string>
 
 #include "nn/kernels/adam.h"
@@ -209,6 +211,7 @@ TEST(Adam, EqualsReference) {
 struct Case {
   std::size_t m, n, k;
   bool transpose_a = true, transpose_b = false;
+  std::size_t portions = 1;
 };
 
 struct State {
@@ -232,11 +235,8 @@ class Step {
     const Workers workers(1);
     KernelScratch scratch;
     State state = start_;
-    std::vector<float> gradient(start_.p.size());
-    GemmProblem<float> product = Product();
-    product.c = gradient.data();
-    product.ldc = case_.n;
-    Gemm(product, {workers, scratch});
+    std::vector<float> gradient = SumOf(0, case_.portions, {workers, scratch});
+    for (float& g : gradient) g *= 1 / static_cast<float>(case_.portions);
     AdamProblem<float> adam = Problem(state);
     adam.gradient = gradient.data();
     AdamStep(adam, workers);
@@ -247,13 +247,33 @@ class Step {
     KernelScratch scratch;
     State state = start_;
     State other = start_;
-    const ProductAdamProblem both[] = {{Product(), Problem(other)}, {Product(), Problem(state)}};
+    const ProductAdamProblem both[] = {{Product(), Problem(other), case_.portions},
+                                       {Product(), Problem(state), case_.portions}};
     ProductAdamSteps(both, {workers, scratch});
     EXPECT_EQ(other.p, state.p);
     return state;
   }
 
  private:
+  // Of portions [first, first + count), a power of two.
+  std::vector<float> SumOf(std::size_t first, std::size_t count, const KernelContext& on) const {
+    if (count > 1) {
+      std::vector<float> left = SumOf(first, count / 2, on);
+      const std::vector<float> right = SumOf(first + count / 2, count / 2, on);
+      std::ranges::transform(left, right, left.begin(), std::plus());
+      return left;
+    }
+    std::vector<float> sum(start_.p.size());
+    GemmProblem<float> product = Product();
+    product.k /= case_.portions;
+    const std::size_t begin = first * product.k;
+    product.a += case_.transpose_a ? begin * product.lda : begin;
+    product.b += case_.transpose_b ? begin : begin * product.ldb;
+    product.c = sum.data();
+    product.ldc = case_.n;
+    Gemm(product, on);
+    return sum;
+  }
   GemmProblem<float> Product() const {
     GemmProblem<float> product;
     product.m = case_.m;
@@ -292,8 +312,21 @@ TEST(ProductAdam, BitsOfProductAndStep) {
   }
 }
 
+TEST(ProductAdam, BitsOfMeansOverPortions) {
+  for (const std::string target : EveryTarget()) {
+    for (const Case& c : {Case{1, 1, 2, true, false, 2}, Case{5, 3, 4, true, false, 4},
+                          Case{7, 33, 64, true, false, 64}, Case{64, 100, 256, true, false, 16},
+                          Case{13, 70, 24, true, false, 8}, Case{40, 50, 6, false, true, 2},
+                          Case{64, 64, 256, true, false, 256}, Case{30, 2070, 4, true, false, 4}}) {
+      const Step step(c);
+      EXPECT_EQ(step.Together(1), step.Apart()) << c.m << " " << c.n << " " << c.k;
+    }
+  }
+}
+
 TEST(ProductAdam, BitsDoNotDependOnWorkers) {
-  for (const Case& c : {Case{700, 1100, 40}, Case{100, 300, 9}}) {
+  for (const Case& c :
+       {Case{700, 1100, 40}, Case{100, 300, 9}, Case{700, 1100, 40, true, false, 8}}) {
     const Step step(c);
     const State apart = step.Apart();
     for (const int count : {1, 2, 7, 16}) EXPECT_EQ(step.Together(count), apart) << count;

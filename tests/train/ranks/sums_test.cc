@@ -161,7 +161,7 @@ Bits TrainedOn(std::int64_t portions, Transport* ranks, int workers = 1) {
   nn::Adam adam(p.context, nn::Parameters(p.net), {.weight_decay = 0.01});
   GradientSums sums(p.context, shape, nn::Buffers(p.net));
   for (int update = 0; update < 3; ++update) {
-    p.Run(&sums, adam.parameters());
+    p.Run(&sums, adam.parameters(), /*listening=*/ranks != nullptr);
     EXPECT_TRUE(sums.Finish(nullptr));
     EXPECT_TRUE(adam.Step(sums.means(), sums.share()).ok());
   }
