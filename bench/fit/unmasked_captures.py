@@ -15,9 +15,9 @@ row.json; then table.md. Captures whose row is there are not fitted again; --onl
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -29,20 +29,27 @@ import numpy as np
 from tilegrad.images import load_image, save_image
 
 LIBRARIES = pathlib.Path("/usr/share/sweethome3d/furniture")
-WIDTH, HEIGHT, FOV_Y, COUNT = 320, 240, 45.0, 24
+FOV_Y = 45.0
 CAPTURES = {"plain-bear": ("BlendSwap-CC-0", "blendswap-cc-0/teddyBear/teddyBear.obj"),
             "plain-chair": ("Scopia", "scopia/rattanArmchair/rattanArmchair.obj"),
             "table-shoes": ("Scopia", "scopia/sneakers/sneakers.obj"),
             "table-toaster": ("Scopia", "scopia/toaster/toaster.obj"),
             "room-toy": ("BlendSwap-CC-0", "blendswap-cc-0/woodToy/woodToy.obj"),
             "room-armchair": ("Scopia", "scopia/modern_armchair/modern_armchair.obj")}
-FIT = re.compile(r"fitted views: PSNR ([\d.]+) dB, silhouette IoU ([\d.]+) %")
 
 
-def camera(rng: Any, index: int) -> Any:
+@dataclasses.dataclass(frozen=True)
+class Shots:
+    """How many pictures, and their pixels."""
+    count: int = 24
+    width: int = 320
+    height: int = 240
+
+
+def camera(rng: Any, index: int, count: int) -> Any:
     """Camera to world, NeRF's axes: two rings around the object, by hand."""
-    ring, around = divmod(index, COUNT // 2)
-    azimuth = 2 * np.pi * (around + 0.5 * ring) / (COUNT // 2) + rng.normal(0, 0.04)
+    ring, around = divmod(index, count // 2)
+    azimuth = 2 * np.pi * (around + 0.5 * ring) / (count // 2) + rng.normal(0, 0.04)
     elevation = np.radians((18, 45)[ring]) + rng.normal(0, 0.04)
     eye = 1.75 * (1 + rng.normal(0, 0.03)) * np.array(
         [np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
@@ -176,15 +183,17 @@ def blurred(image: Any, sigma: float) -> Any:
     return image
 
 
-def make(program: str, capture: str, folder: pathlib.Path) -> None:
+def make(program: str, capture: str, folder: pathlib.Path, shots: Shots = Shots()) -> None:
     rng = np.random.default_rng(sorted(CAPTURES).index(capture))
     for name in ("images", "truth/images", "scene"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     scene = folder / "scene"
     feet = scaled(program, capture, scene)
-    focal = HEIGHT / 2 / np.tan(np.radians(FOV_Y) / 2)
-    frames = [{"file_path": f"images/{i:03}.png", "transform_matrix": camera(rng, i).tolist()} for i in range(COUNT)]
-    cameras = json.dumps({"fl_x": focal, "fl_y": focal, "w": WIDTH, "h": HEIGHT, "frames": frames}, indent=1)
+    focal = shots.height / 2 / np.tan(np.radians(FOV_Y) / 2)
+    frames = [{"file_path": f"images/{i:03}.png", "transform_matrix": camera(rng, i, shots.count).tolist()}
+              for i in range(shots.count)]
+    lens = {"fl_x": focal, "fl_y": focal, "w": shots.width, "h": shots.height}
+    cameras = json.dumps({**lens, "frames": frames}, indent=1)
     for place in (folder, folder / "truth", scene):
         (place / "transforms.json").write_text(cameras)
     behind = background(capture.split("-")[0], rng, feet, scene)
@@ -202,9 +211,13 @@ def iou(a: Any, b: Any) -> float:
     return float(np.sum(a & b) / np.sum(a | b))
 
 
-def silhouettes(program: str, fit: pathlib.Path, truth: list[Any], folder: pathlib.Path) -> float:
-    """Per cent, of a fit's mesh in the views' cameras against the true masks."""
-    run(program, "render", fit / "mesh.glb", "--cameras", folder / "transforms.json", "--out", fit / "shown", "--force")
+def true_masks(folder: pathlib.Path) -> list[Any]:
+    return [load_image(file)[..., 3] >= 128 for file in sorted((folder / "truth/images").glob("*.png"))]
+
+
+def silhouettes(program: str, fit: pathlib.Path, truth: list[Any], cameras: pathlib.Path) -> float:
+    """Per cent, of a fit's mesh in these cameras against the true masks."""
+    run(program, "render", fit / "mesh.glb", "--cameras", cameras, "--out", fit / "shown", "--force")
     shown = [load_image(file)[..., 3] >= 128 for file in sorted((fit / "shown").glob("*.png"))]
     return 100 * float(np.mean([iou(a, b) for a, b in zip(shown, truth)]))
 
@@ -212,12 +225,12 @@ def silhouettes(program: str, fit: pathlib.Path, truth: list[Any], folder: pathl
 def measure(program: str, folder: pathlib.Path, options: list[str]) -> dict[str, Any]:
     run(program, "fit", folder, "--out", folder / "fit", "--force", *options)
     run(program, "fit", folder / "truth", "--out", folder / "fit_truth", "--force", *options)
-    truth = [load_image(folder / f"truth/images/{i:03}.png")[..., 3] >= 128 for i in range(COUNT)]
-    masks = [load_image(folder / f"fit/masks/{i:03}.png.png")[..., 0] >= 128 for i in range(COUNT)]
+    truth, cameras = true_masks(folder), folder / "transforms.json"
+    masks = [load_image(file)[..., 0] >= 128 for file in sorted((folder / "fit/masks").glob("*.png"))]
     each = [100 * iou(a, b) for a, b in zip(masks, truth)]
     return {"capture": folder.name, "masks": float(np.mean(each)), "worst": min(each),
-            "fit": silhouettes(program, folder / "fit", truth, folder),
-            "fit_truth": silhouettes(program, folder / "fit_truth", truth, folder)}
+            "fit": silhouettes(program, folder / "fit", truth, cameras),
+            "fit_truth": silhouettes(program, folder / "fit_truth", truth, cameras)}
 
 
 def main() -> int:

@@ -48,11 +48,21 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
         100 * train::MeanIou(scores));
 }
 
-void PrintOutcome(const train::FitOutcome& o, const Path& out, std::int64_t steps) {
+// Where a wrong mask or camera would show.
+void PrintWorst(const train::FitInput& input, const std::vector<train::ViewScore>& scores) {
+  const auto worst = std::ranges::min_element(scores, {}, &train::ViewScore::iou);
+  if (worst == scores.end()) return;
+  Print("the worst of them: {}, silhouette IoU {:.1f} %\n",
+        input.names[static_cast<std::size_t>(worst->view)], 100 * worst->iou);
+}
+
+void PrintOutcome(const train::FitOutcome& o, const train::FitInput& input, const Path& out,
+                  std::int64_t steps) {
   const bool early = o.last_step < steps;
   Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
         FormatDuration(o.seconds), early ? ", stopped early (--stop-gain)" : "");
   PrintScores("fitted views", o.training);
+  PrintWorst(input, o.training);
   PrintScores("held-out views", o.held_out);
   if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
   if (o.camera_error_before && o.camera_error_after) {
@@ -95,9 +105,10 @@ void PrintDiagnosis(const std::vector<train::Finding>& findings) {
 }
 
 // `steps`: the most that it was given.
-void PrintFit(const train::FitOutcome& outcome, const Path& out, std::int64_t steps) {
+void PrintFit(const train::FitOutcome& outcome, const train::FitInput& input, const Path& out,
+              std::int64_t steps) {
   PrintFindings(outcome.findings, false);
-  PrintOutcome(outcome, out, steps);
+  PrintOutcome(outcome, input, out, steps);
   PrintJson(outcome, out);
 }
 
@@ -174,6 +185,12 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
     PrintNote("tilegrad: warning: {}\n", input.warnings[first + i]);
   }
   if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
+}
+
+// How sure the stages before the fit are, for people.
+void PrintNotes(const train::FitInput& input) {
+  if (CurrentVerbosity() != Verbosity::kFull) return;
+  for (const std::string& note : input.notes) PrintNote("tilegrad: {}\n", note);
 }
 
 using train::FitConfig;
@@ -312,9 +329,10 @@ Status RunClaimed(const FitOptions& options, train::FitJob* job, const Workers& 
   TILEGRAD_TRY(train::StartCameras({options.pictures.find_cameras, options.resume}, job, workers,
                                    progress, StopOnSignals()));
   PrintWarnings(job->input, warnings);
+  PrintNotes(job->input);
   job->begun = [&options] { return KeepGiven(options); };  // of more steps, if so
   TILEGRAD_ASSIGN(const auto outcome, train::RunFit(*job, workers, progress, StopOnSignals()));
-  PrintFit(outcome, options.out, options.config.steps);
+  PrintFit(outcome, job->input, options.out, options.config.steps);
   return {};
 }
 
@@ -403,6 +421,12 @@ void AddWhat(Command* command, FitOptions* o) {
                {OneOf{{"none", "lambert", "phong", "sh"}}});
   command->Add("--light-direction", &o->light_direction,
                "direction towards the light, world axes: x y z", {Numbers{3}});
+  command->Add("--cutout",
+               Choice<train::Cutout>(&o->config.cutout, {{"off", train::Cutout::kOff},
+                                                         {"auto", train::Cutout::kAuto},
+                                                         {"on", train::Cutout::kOn}}),
+               "for wire and thin leaves: a smooth surface whose texture has holes (alphaMode "
+               "MASK); auto: where masks have many narrow gaps");
   command->Add("--filter", &o->filter, "texture lookup: bilinear or trilinear",
                {OneOf{{"bilinear", "trilinear"}}});
   command->Add("--truth", &o->truth, "ground-truth mesh to score against (3D IoU)");

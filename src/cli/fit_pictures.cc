@@ -50,8 +50,9 @@ Status TryColmap(const FitPictures& pictures, const Path& folder, const Watch& w
     PrintNote("tilegrad: warning: {}\n", found.status().message());
     return {};
   }
-  PrintNote("tilegrad: COLMAP placed {} of {} images{}{}\n", found->placed.size(),
+  PrintNote("tilegrad: COLMAP placed {} of {} images{}{}{}\n", found->placed.size(),
             found->placed.size() + found->missing.size(),
+            found->error ? fmt::format(", to {:.2f} pixels", *found->error) : "",
             found->missing.empty() ? "" : "; take more from between these and the others: ",
             fmt::join(found->missing, " "));
   return {};

@@ -115,6 +115,7 @@ Result<ColmapOutcome> OutcomeOf(const Path& folder, const std::vector<std::strin
     std::erase(out.missing, view.name);
     out.placed.push_back(view.name);
   }
+  out.error = io::ColmapPointError(model->folder);
   return out;
 }
 
@@ -138,8 +139,8 @@ Result<ColmapOutcome> RunColmap(const Path& folder, const WarningSink& tell, con
   const Path work = folder / "colmap";
   const Pictures pictures = PicturesOf(folder);
   TILEGRAD_TRY(MakeFolder(work / "sparse"));
-  TILEGRAD_TRY(
-      WriteTextAtomic(work / "pictures.txt", fmt::format("{}\n", fmt::join(pictures.names, "\n"))));
+  TILEGRAD_TRY(WriteTextAtomic(folder / kColmapPictures,
+                               fmt::format("{}\n", fmt::join(pictures.names, "\n"))));
   const std::vector<Command> commands = CommandsFor(work, pictures.folder);
   for (std::size_t i = 0; i < commands.size(); ++i) {
     if (tell) tell(fmt::format("{}", fmt::join(commands[i], " ")));

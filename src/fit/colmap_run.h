@@ -2,6 +2,7 @@
 // Cameras of pictures that came without, by COLMAP where it is installed: a program of its own.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,12 +11,16 @@
 
 namespace tilegrad::train {
 
+// Of a folder where it was run.
+inline constexpr const char* kColmapPictures = "colmap/pictures.txt";
+
 // Whether COLMAP is worth a try: it is on the PATH, the folder holds at least three pictures and
 // no cameras, and nobody has tried before (<folder>/colmap).
 bool MayRunColmap(const Path& folder);
 
 struct ColmapOutcome {
   std::vector<std::string> placed, missing;  // names of pictures
+  std::optional<double> error;               // of the points that it placed them by, pixels
   bool useful() const { return placed.size() >= 2 * missing.size() && !placed.empty(); }
 };
 

@@ -30,6 +30,7 @@ constexpr std::size_t kFirstRates = 8;
 constexpr std::array kMaterials = {"unlit", "lambert", "phong"};
 constexpr std::array kLightings = {"none", "lambert", "phong", "sh"};
 constexpr std::array kStarts = {"auto", "hull", "sphere"};
+constexpr std::array kCutouts = {"off", "auto", "on"};
 constexpr std::array kFilters = {"nearest", "bilinear", "trilinear"};
 
 template <class Names, class Value>
@@ -129,6 +130,7 @@ std::string DescribeConfig(const FitConfig& config) {
   };
   line("parameters", names);
   if (c.material != MaterialKind::kUnlit) line("material", NameIn(kMaterials, c.material));
+  if (c.cutout != Cutout::kAuto) line("cutout", NameIn(kCutouts, c.cutout));
   line("lighting", NameIn(kLightings, c.lighting));
   line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
   line("start", NameIn(kStarts, c.start));

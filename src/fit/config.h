@@ -23,6 +23,10 @@ inline constexpr int kLeastHullViews = 4;
 // everywhere, and highlights.
 enum class MaterialKind { kUnlit, kLambert, kPhong };
 
+// Whether the texture is cut out, for wire and thin leaves (cutout.h). kAuto: where a fit
+// starts from a hull whose masks have many narrow gaps.
+enum class Cutout { kOff, kAuto, kOn };
+
 struct FitConfig {
   ParameterSet parameters;  // none: positions, and the texture or colours that the start has
   MaterialKind material = MaterialKind::kUnlit;
@@ -36,6 +40,7 @@ struct FitConfig {
   int template_level = 4;      // subdivisions of the icosahedron: 4 has 2,562 vertices
   bool vertex_colors = false;  // instead of a texture
   int texture_size = 512;  // texels a side; of a sphere: around, and half of it from pole to pole
+  Cutout cutout = Cutout::kAuto;
 
   std::int64_t steps = 1000;  // the most
   // Where FitClock::kWindow steps at full resolution lower the images' loss by less than this share
@@ -56,7 +61,7 @@ struct FitConfig {
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
-  // area: -1: 0.3 from a hull without hollows, else 0; falls with rates.
+  // area: -1: 0.3 from a hull without hollows, 0.05 if that is thin, else 0; falls with rates.
   RegularizerWeights regularizers = {.area = -1};
   // Share of the steps until cameras move: those that are nearly right wait for shape and texture.
   // 0 where the start is the object's own shape.

@@ -35,8 +35,7 @@ nn::Tensor ColorWeights(const TargetImages& targets, const RenderedViews& render
 
 nn::Var SilhouetteLossOf(SilhouetteLoss loss, const TargetImages& targets,
                          const RenderedViews& rendered) {
-  const auto& silhouettes = targets.silhouette.empty() ? targets.alpha : targets.silhouette;
-  const nn::Tensor truth = ViewsOf(silhouettes, rendered.views, rendered.alpha);
+  const nn::Tensor truth = ViewsOf(targets.outline(), rendered.views, rendered.alpha);
   return loss == SilhouetteLoss::kIou ? IouLoss(rendered.alpha, truth)
                                       : SquaredSilhouetteLoss(rendered.alpha, truth);
 }

@@ -15,9 +15,10 @@ struct TargetImages {
   int width = 0, height = 0;
   AlignedVector<float> color;  // [N,3,H,W]
   AlignedVector<float> alpha;  // [N,H,W] in [0, 1]
-  // What silhouettes are held to, of the same shape; empty: alpha.
+  // What silhouettes, and hulls, are held to, of the same shape; empty: alpha.
   AlignedVector<float> silhouette = {};
 
+  const AlignedVector<float>& outline() const { return silhouette.empty() ? alpha : silhouette; }
   std::size_t pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }

@@ -8,6 +8,7 @@
 #include "fit/bare_frames.h"
 #include "fit/camera_check.h"
 #include "fit/colmap_frames.h"
+#include "fit/colmap_run.h"
 #include "fit/input_up.h"
 #include "fit/masks/start_masks.h"
 #include "fit/undistort.h"
@@ -96,7 +97,7 @@ void HoldOut(int every, FitInput* input) {
 
 struct Frames {
   std::vector<TransformsFrame> frames;
-  bool posed = true;
+  bool posed = true, own_world = false;
   std::vector<std::string> warnings;
 };
 
@@ -130,6 +131,7 @@ Result<Frames> ReadFrames(const Path& folder, double fov) {
   }
   if (const auto model = io::FindColmapModel(folder)) {
     if (!model->note.empty()) out.warnings.push_back(model->note);
+    out.own_world = PathExists(folder / kColmapPictures);
     TILEGRAD_ASSIGN(out.frames, ReadColmapFrames(model->folder));
     return out;
   }
@@ -209,6 +211,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   FitInput input;
   TILEGRAD_ASSIGN(Frames read, ReadFrames(folder, options.fov));
   input.posed = read.posed;
+  input.own_world = read.own_world;
   input.warnings = std::move(read.warnings);
   const Path test = folder / "transforms_test.json";
   if (PathExists(test) && options.hold_out > 0) {
@@ -256,20 +259,23 @@ TargetImages Reduce(const TargetImages& images, int factor) {
   const std::size_t views = images.alpha.size() / images.pixels(), plane = out.pixels();
   out.color.resize(3 * plane * views);
   out.alpha.resize(plane * views);
+  if (!images.silhouette.empty()) out.silhouette.resize(plane * views);
   const auto wide = static_cast<std::size_t>(images.width), f = static_cast<std::size_t>(factor);
   const auto width = static_cast<std::size_t>(out.width);
   for (std::size_t i = 0; i < plane * views; ++i) {
     const std::size_t n = i / plane, x = i % plane % width, y = i % plane / width;
-    float alpha = 0, color[3] = {};
+    float alpha = 0, silhouette = 0, color[3] = {};
     for (std::size_t s = 0; s < f * f; ++s) {
       const std::size_t p = (y * f + s / f) * wide + x * f + s % f;
       const float a = images.alpha[n * images.pixels() + p];
       alpha += a;
+      if (!images.silhouette.empty()) silhouette += images.silhouette[n * images.pixels() + p];
       for (std::size_t c = 0; c < 3; ++c) {
         color[c] += a * images.color[(3 * n + c) * images.pixels() + p];
       }
     }
     out.alpha[i] = alpha / static_cast<float>(f * f);
+    if (!images.silhouette.empty()) out.silhouette[i] = silhouette / static_cast<float>(f * f);
     for (std::size_t c = 0; c < 3; ++c) {
       out.color[(3 * n + c) * plane + i % plane] = alpha > 0 ? color[c] / alpha : 0.0f;
     }

@@ -26,7 +26,9 @@ struct FitInput {
   bool masked = false;                  // some image says where the object is
   // No image says where the object is, but cameras are known: masks are to be found (masks/).
   bool seeks_masks = false;
-  // Of masks that were found: how well they agree with what all views have in common, IoU, mean.
+  bool masks_found = false;  // masks were found in the images, which had none
+  // Of those that views have in common: how well they agree with what all views have in common,
+  // IoU, mean.
   std::optional<double> mask_agreement;
   bool posed = true;   // cameras are known; else only their lenses are
   bool found = false;  // cameras were found by looking at the images
@@ -34,6 +36,9 @@ struct FitInput {
   // else empty. In a world of their own.
   std::vector<Camera> given_cameras;
   std::vector<std::string> warnings;  // for people
+  std::vector<std::string> notes;     // for people, too: how sure each stage is of what it found
+  // The world of the cameras is one that COLMAP made for them, in which nothing is up.
+  bool own_world = false;
   UpAxis up = UpAxis::kY;  // of the world that the input is from; in that of `cameras` it is y
 
   // Of a dataset, what is known of the truth: occupancy at kOccupancyResolution. Else empty.

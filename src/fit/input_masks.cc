@@ -22,6 +22,7 @@ bool HasAlpha(const FitInput& input) {
 
 Status TakePlainBackgrounds(FitInput* input, const Watch& watch) {
   TargetImages& all = input->images;
+  std::size_t doubts = 0;
   for (std::size_t n = 0; n < input->names.size(); ++n) {
     TILEGRAD_TRY(watch.At({"looking for plain backgrounds", n, input->names.size(), ""}));
     const auto color = std::span(all.color).subspan(3 * n * all.pixels(), 3 * all.pixels());
@@ -29,9 +30,13 @@ Status TakePlainBackgrounds(FitInput* input, const Watch& watch) {
     std::ranges::copy(mask.alpha,
                       all.alpha.begin() + static_cast<std::ptrdiff_t>(n * all.pixels()));
     if (!mask.doubt.empty()) {
+      ++doubts;
       input->warnings.push_back(fmt::format("{}: {}", input->names[n], mask.doubt));
     }
   }
+  input->masks_found = true;
+  input->notes.push_back(fmt::format("masks: cut from plain backgrounds; {} of {} are in doubt",
+                                     doubts, input->names.size()));
   return watch.At({"looking for plain backgrounds", input->names.size(), input->names.size(), ""});
 }
 

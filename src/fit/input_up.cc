@@ -2,9 +2,11 @@
 #include "fit/input_up.h"
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include "base/error.h"
+#include "fit/masks/floor.h"
 
 namespace tilegrad::train {
 namespace {
@@ -25,6 +27,21 @@ Stand StandAbout(std::span<const Camera> cameras, int axis) {
   return out;
 }
 
+// Turns the world so that `up`, of length 1, becomes y.
+void TurnLevel(glm::vec3 up, std::span<Camera> cameras) {
+  const glm::vec3 any = std::abs(up.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 0, 1);
+  const glm::vec3 z = glm::normalize(glm::cross(any, up)), x = glm::cross(up, z);
+  for (Camera& camera : cameras) {
+    for (int row = 0; row < 9; row += 3) {
+      float* const r = camera.rotation + row;
+      const glm::vec3 old(r[0], r[1], r[2]);
+      r[0] = glm::dot(x, old);
+      r[1] = glm::dot(up, old);
+      r[2] = glm::dot(z, old);
+    }
+  }
+}
+
 }  // namespace
 
 std::optional<UpAxis> GuessUp(std::span<const Camera> cameras) {
@@ -39,6 +56,7 @@ std::optional<UpAxis> GuessUp(std::span<const Camera> cameras) {
 }
 
 void TurnInputUpright(std::optional<UpAxis> up, FitInput* input) {
+  if (!up && input->own_world) return TurnLevel(UpOf(input->cameras), input->cameras);
   if (!up) {
     up = GuessUp(input->cameras);
     if (up) {

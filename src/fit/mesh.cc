@@ -79,6 +79,15 @@ ImageU8 ToBytes(const Image& image) {
   return out;
 }
 
+Image WithAlpha(const Image& rgb, const std::vector<float>& alpha) {
+  Image out(rgb.width, rgb.height, 4);
+  for (std::size_t t = 0; t < alpha.size(); ++t) {
+    std::copy_n(&rgb.pixels[3 * t], 3, &out.pixels[4 * t]);
+    out.pixels[4 * t + 3] = alpha[t];
+  }
+  return out;
+}
+
 constexpr const char* kFitted = "fitted";
 
 void AddTexture(const FitScene& scene, Mesh* mesh) {
@@ -86,8 +95,14 @@ void AddTexture(const FitScene& scene, Mesh* mesh) {
     const auto at = 2 * static_cast<std::size_t>(u);
     mesh->corner_uvs.emplace_back(scene.uvs[at], scene.uvs[at + 1]);
   }
-  mesh->textures.push_back({kFitted, ToBytes(scene.texture)});
   mesh->materials = {{.name = kFitted, .base_color = glm::vec4(1), .base_color_texture = 0}};
+  if (scene.cutout.empty()) {
+    mesh->textures.push_back({kFitted, ToBytes(scene.texture)});
+    return;
+  }
+  mesh->textures.push_back({kFitted, ToBytes(WithAlpha(scene.texture, scene.cutout))});
+  mesh->materials[0].alpha_mode = AlphaMode::kMask;
+  mesh->materials[0].alpha_cutoff = kCutoff;
 }
 
 }  // namespace

@@ -42,8 +42,11 @@ std::string Summary(const FitJob& job, const FitOutcome& o) {
 std::string Facts(const FitJob& job, const FitOutcome& o, const Mesh& mesh) {
   std::string out = Row("vertices", WithCommas(std::ssize(mesh.positions)));
   out += Row("faces", WithCommas(std::ssize(mesh.faces)));
+  const bool cut_out = std::ranges::find(mesh.materials, AlphaMode::kMask, &Material::alpha_mode) !=
+                       mesh.materials.end();
   for (const MeshTexture& texture : mesh.textures)
-    out += Row("texture", fmt::format("{} × {} texels", texture.image.width, texture.image.height));
+    out += Row("texture", fmt::format("{} × {} texels{}", texture.image.width, texture.image.height,
+                                      cut_out ? ", cut out" : ""));
   if (mesh.textures.empty() && !mesh.colors.empty()) out += Row("colours", "one per vertex");
   out += Row("images fitted", WithCommas(std::ssize(job.input.training)));
   out += Row("images held out", WithCommas(std::ssize(job.input.held_out)));

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "fit/clock.h"
+#include "fit/cutout.h"
 #include "fit/hull/mask_distance.h"
 #include "fit/image_loss.h"
 #include "fit/material.h"
@@ -46,11 +47,11 @@ class SoftTargets {
 
 SoftTargets::SoftTargets(TargetImages images, const Workers& workers)
     : images_(std::move(images)), distances_(images_.alpha.size() / images_.pixels()) {
-  images_.silhouette.resize(images_.alpha.size());
+  if (images_.silhouette.empty()) images_.silhouette = images_.alpha;
   workers.For(distances_.size(), [&](std::size_t v, std::size_t) {
     const std::size_t plane = images_.pixels();
-    distances_[v] = DistanceOf(std::span(images_.alpha).subspan(v * plane, plane), images_.width,
-                               images_.height);
+    distances_[v] = DistanceOf(std::span(images_.silhouette).subspan(v * plane, plane),
+                               images_.width, images_.height);
   });
 }
 
@@ -240,9 +241,11 @@ Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& worke
   return DiagnoseStart(job, start, workers);
 }
 
-Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
+Result<FitOutcome> RunFit(const FitJob& asked, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop) {
   FitOutcome outcome;
+  const std::optional<FitJob> cutout = CutoutJob(asked, workers);
+  const FitJob& job = cutout ? *cutout : asked;
   const Watch watch{progress, &stop};
   TILEGRAD_TRY(CheckExistingRun(job.out, job.existing));  // before the work
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers, watch));
@@ -258,6 +261,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   FitScene scene = work.scene();
   if (progress) progress({"filling the texture", 0, 0, ""});
   TILEGRAD_TRY(FillTexture(job, workers, &scene));
+  if (cutout) TILEGRAD_TRY(FitCutout(job, workers, watch, &scene));
   TILEGRAD_TRY(FitResult(job, scene, work.clock(), workers, watch).Finish(plan, &outcome));
   return outcome;
 }

@@ -63,6 +63,8 @@ struct FitStart {
   FitConfig config;  // the job's, settled
   std::string note;  // why it is not what one would expect, or empty
 };
+// Whether it is the visual hull, if masks have one and do not leave its distance in doubt.
+bool MayStartFromHull(const FitJob& job);
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch = {});
 // Whether the configuration can be fitted to the input, as far as that is seen at once.
 Status CheckFit(const FitJob& job);

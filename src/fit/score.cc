@@ -9,7 +9,9 @@
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include <optional>
 
+#include "fit/cutout.h"
 #include "render/picture/composite.h"
 
 namespace tilegrad::train {
@@ -106,11 +108,15 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
   FitScene seen = scene;
   seen.cameras.assign(cameras.begin(), cameras.end());
   FitRenderer renderer(workers);
+  std::optional<CutoutView> cut;
+  if (!scene.cutout.empty()) cut.emplace(scene, workers);
   const ImageSize size{input.images.width, input.images.height};
   std::vector<ViewScore> scores;
   for (int i = 0; i < static_cast<int>(views.size()); ++i) {
     TILEGRAD_TRY(watch.At({"scoring views", static_cast<std::uint64_t>(i), views.size(), ""}));
-    TILEGRAD_ASSIGN(Picture rendered, DrawView(renderer, seen, i, size));
+    const Camera& camera = cameras[static_cast<std::size_t>(i)];
+    TILEGRAD_ASSIGN(Picture rendered,
+                    cut ? cut->Draw(camera, size, kSamples) : DrawView(renderer, seen, i, size));
     ViewScore score;
     score.view = views[static_cast<std::size_t>(i)];
     if (!scene.gains.empty()) {

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/rng.h"
+#include "fit/cutout.h"
 #include "fit/hull/hull_mesh.h"
 #include "fit/material.h"
 #include "fit/run.h"
@@ -81,11 +82,25 @@ struct Origin {
   std::string note;  // what is in doubt, and why there is no hull where one was tried
 };
 
+// With the outlines that shapes are held to for masks.
+FitInput OutlinedInput(const FitInput& input) {
+  FitInput out = input;
+  out.images.alpha = input.images.outline();
+  return out;
+}
+
+Result<Mesh> HullOf(const FitJob& job, const HullOptions& options, const Workers& workers,
+                    const Watch& watch, bool* hollow) {
+  if (job.input.images.silhouette.empty())
+    return HullMesh(job.input, options, workers, watch, hollow);
+  return HullMesh(OutlinedInput(job.input), options, workers, watch, hollow);
+}
+
 Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watch& watch,
                            Origin* origin) {
   HullOptions options;
   options.carve.tolerance = job.config.mask_tolerance;
-  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers, watch, &origin->hollow));
+  TILEGRAD_ASSIGN(Mesh mesh, HullOf(job, options, workers, watch, &origin->hollow));
   int size = job.config.texture_size;
   if (!job.config.vertex_colors) {
     TILEGRAD_TRY(watch.At({"placing the texture", 0, 0, ""}));
@@ -104,9 +119,7 @@ Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, const 
   origin->note = sphere.doubt;
   origin->hull = config.start == StartShape::kHull;
   if (origin->hull) return HullScene(job, workers, watch, origin);
-  const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
-  if (config.start == StartShape::kAuto && job.input.masked && known_cameras &&
-      job.input.training.size() >= kLeastHullViews && sphere.doubt.empty()) {
+  if (MayStartFromHull(job) && sphere.doubt.empty()) {
     auto hull = HullScene(job, workers, watch, origin);
     origin->hull = hull.ok();
     if (hull.ok() || hull.status().code() == StatusCode::kCancelled) return hull;
@@ -224,6 +237,14 @@ std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>&
   return cameras;
 }
 
+bool MayStartFromHull(const FitJob& job) {
+  const FitConfig& config = job.config;
+  if (job.start.has_value() || config.start == StartShape::kSphere) return false;
+  const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
+  return config.start == StartShape::kHull ||
+         (job.input.masked && known_cameras && job.input.training.size() >= kLeastHullViews);
+}
+
 std::string DescribeJob(const FitJob& job) {
   return DescribeConfig(job.config) +
          fmt::format("images = {} of {} x {}, {} held out\nmesh = {}\ninput = {}\n",
@@ -239,6 +260,7 @@ std::string DescribeJob(const FitJob& job) {
 Status CheckFit(const FitJob& job) {
   TILEGRAD_TRY(CheckConfig(job.config));
   TILEGRAD_TRY(CheckMaterial(job.config));
+  TILEGRAD_TRY(CheckCutout(job));
   return CheckMasks(job);
 }
 

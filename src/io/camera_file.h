@@ -59,6 +59,10 @@ std::optional<ColmapModel> FindColmapModel(const Path& folder);
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
                                                   const CameraFileOptions& options = {});
 
+// The mean distance, in pixels, between the points of a binary COLMAP model and where its images
+// see them; none if the model has no points.
+std::optional<double> ColmapPointError(const Path& folder);
+
 // Writers for what LoadCameras reads; numbers round-trip exactly.
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text
 std::vector<Path> ColmapFiles(const Path& folder);  // written by SaveColmapCameras

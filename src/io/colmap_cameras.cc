@@ -277,6 +277,15 @@ Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras
   return views;
 }
 
+// Of one point, its error is read, and the images that see it are skipped.
+bool ReadPointError(BinaryReader* in, double* error) {
+  constexpr std::size_t kSeenBytes = 8;  // numbers of the image and of the point in it
+  std::uint64_t id = 0, seen = 0;
+  std::array<double, 3> place;
+  std::array<std::uint8_t, 3> color;
+  return in->Read(id, place, color, *error, seen) && in->Skip(seen, kSeenBytes);
+}
+
 // Projects ------------------------------------------------------------------------------------
 
 bool IsModel(const Path& folder) {
@@ -345,6 +354,21 @@ std::optional<ColmapModel> FindColmapModel(const Path& folder) {
     if (IsModel(root / "sparse")) return ColmapModel{root / "sparse", ""};
   }
   return std::nullopt;
+}
+
+std::optional<double> ColmapPointError(const Path& folder) {
+  const auto bytes = ReadFile(folder / "points3D.bin");
+  if (!bytes.ok()) return std::nullopt;
+  BinaryReader in(*bytes);
+  std::uint64_t count = 0;
+  if (!in.Read(count) || count == 0) return std::nullopt;
+  double sum = 0;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    double error = 0;
+    if (!ReadPointError(&in, &error)) return std::nullopt;
+    sum += error;
+  }
+  return sum / static_cast<double>(count);
 }
 
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,

@@ -8,6 +8,7 @@
 #include "base/rng.h"
 #include "fit/input.h"
 #include "fit/make_views.h"
+#include "fit/masks/start_masks.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
@@ -93,20 +94,27 @@ TEST(Background, SaysWhenItIsNotPlain) {
   EXPECT_EQ(doubt(foot), "");
 }
 
-class BackgroundInput : public TempFolderTest {};
-
-// Renders before a grey wall with noise, as files; masks are compared with the renders' alpha.
-TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
-  StopFlag stop = false;
-  Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
-  SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-  ASSERT_TRUE(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views",
-                        OutputGuard(), {}, stop)
-                  .ok());
-  const auto truth = ReadFitFolder(folder_ / "views", 0);
-  ASSERT_TRUE(truth.ok());
-  Rng rng(3);
-  for (int i = 0; i < 4; ++i) {
+// Renders before a grey wall with noise, as files.
+class BackgroundInput : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    TempFolderTest::SetUp();
+    StopFlag stop = false;
+    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
+    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
+    ASSERT_TRUE(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views",
+                          OutputGuard(), {}, stop)
+                    .ok());
+    const auto truth = ReadFitFolder(folder_ / "views", 0);
+    ASSERT_TRUE(truth.ok());
+    truth_.assign(truth->images.alpha.begin(), truth->images.alpha.end());
+    Rng rng(3);
+    for (int i = 0; i < 4; ++i) PutBeforeWall(i, &rng);
+    const auto found = ReadFitFolder(folder_ / "views", InputOptions{});
+    ASSERT_TRUE(found.ok());
+    found_ = *found;
+  }
+  void PutBeforeWall(int i, Rng* rng) const {
     const Path file = folder_ / "views" / "images" / (std::string("00") + char('0' + i) + ".png");
     const auto image = io::LoadImage(file);
     ASSERT_TRUE(image.ok());
@@ -115,19 +123,23 @@ TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
       const double alpha = image->pixels[4 * p + 3] / 255.0;
       for (std::size_t c = 0; c < 3; ++c) {
         const double value =
-            alpha * image->pixels[4 * p + c] + (1 - alpha) * 205 + 5 * rng.Normal();
+            alpha * image->pixels[4 * p + c] + (1 - alpha) * 205 + 5 * rng->Normal();
         photo.pixels[3 * p + c] = static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
       }
     }
     ASSERT_TRUE(io::SavePng(file, photo).ok());
   }
-  const auto found = ReadFitFolder(folder_ / "views", InputOptions{});
-  ASSERT_TRUE(found.ok());
-  EXPECT_TRUE(found->masked);
-  EXPECT_TRUE(found->warnings.empty());
+
+  std::vector<float> truth_;  // alpha of the renders
+  FitInput found_;
+};
+
+TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
+  EXPECT_TRUE(found_.masked);
+  EXPECT_TRUE(found_.warnings.empty());
   double both = 0, either = 0;
-  for (std::size_t p = 0; p < found->images.alpha.size(); ++p) {
-    const bool a = found->images.alpha[p] >= 0.5f, b = truth->images.alpha[p] >= 0.5f;
+  for (std::size_t p = 0; p < found_.images.alpha.size(); ++p) {
+    const bool a = found_.images.alpha[p] >= 0.5f, b = truth_[p] >= 0.5f;
     both += a && b;
     either += a || b;
   }
@@ -137,7 +149,23 @@ TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
     ASSERT_TRUE(bare.ok());
     EXPECT_FALSE(bare->masked);
   }
-  // Without its cameras, the same folder.
+}
+
+// Where people can correct them; a fit reads them back.
+TEST_F(BackgroundInput, MasksAreKept) {
+  FitJob job;
+  job.input = found_;
+  job.out = folder_ / "fit";
+  ASSERT_TRUE(StartMasks(false, &job, Workers(1), {}).ok());
+  FitInput again = found_;
+  ASSERT_TRUE(ReadMasks(job.out / "masks", &again).ok());
+  for (std::size_t p = 0; p < again.images.alpha.size(); ++p)
+    EXPECT_NEAR(again.images.alpha[p], found_.images.alpha[p], 0.5 / 255 + 1e-6);
+  ASSERT_EQ(found_.notes.size(), 1u);
+  EXPECT_NE(found_.notes[0].find("0 of 4 are in doubt"), std::string::npos) << found_.notes[0];
+}
+
+TEST_F(BackgroundInput, NeedsNoCameras) {
   std::filesystem::remove(folder_ / "views" / "transforms_train.json");
   const auto lone = ReadFitFolder(folder_ / "views", {.fov = 90});
   ASSERT_TRUE(lone.ok()) << lone.status().message();

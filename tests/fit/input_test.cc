@@ -94,6 +94,27 @@ TEST_F(Input, ColmapImagesThatAreNotThere) {
   ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "cameras.txt: line 1", "undistort");
 }
 
+// Cameras that are upside down in COLMAP's world, as its first one is.
+TEST_F(Input, AWorldThatColmapMadeIsTurnedLevel) {
+  Model("p/colmap/sparse/0");
+  Write("p/colmap/sparse/0/images.txt",
+        std::string("1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 1 0 4 1 deep/b.png\n\n"));
+  Images("p/images");
+  const FitInput given = ReadFitFolder(folder_ / "p", 0).value();
+  Write("p/colmap/pictures.txt", std::string("a.png\n"));
+  const FitInput turned = ReadFitFolder(folder_ / "p", 0).value();
+  for (std::size_t v = 0; v < 2; ++v) {
+    EXPECT_EQ(given.cameras[v].rotation[4], -1);
+    EXPECT_NEAR(turned.cameras[v].rotation[4], 1, 1e-5);
+    for (int i = 0; i < 3; ++i)
+      EXPECT_EQ(turned.cameras[v].translation[i], given.cameras[v].translation[i]);
+  }
+  InputOptions as_it_is;
+  as_it_is.up = UpAxis::kY;
+  EXPECT_EQ(ReadFitFolder(folder_ / "p", as_it_is)->cameras[0].rotation[4],
+            given.cameras[0].rotation[4]);
+}
+
 constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
 
 TEST_F(Input, TransformsOfWindows) {

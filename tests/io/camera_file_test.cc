@@ -108,6 +108,21 @@ TEST_F(CameraFiles, ColmapBinary) {
   }
 }
 
+// Of two points, seen by one image and by none.
+TEST_F(CameraFiles, ColmapPointsHaveAMeanError) {
+  EXPECT_FALSE(io::ColmapPointError(folder_).has_value());
+  std::string points;
+  Put(&points, std::uint64_t{2}, std::uint64_t{5}, std::array<double, 3>{1, 2, 3},
+      std::array<std::uint8_t, 3>{9, 9, 9}, 0.25, std::uint64_t{1}, std::uint32_t{3},
+      std::uint32_t{0});
+  Put(&points, std::uint64_t{8}, std::array<double, 3>{}, std::array<std::uint8_t, 3>{}, 0.75,
+      std::uint64_t{0});
+  Write("points3D.bin", points);
+  EXPECT_EQ(io::ColmapPointError(folder_), 0.5);
+  Write("points3D.bin", points.substr(0, points.size() - 1));
+  EXPECT_FALSE(io::ColmapPointError(folder_).has_value());
+}
+
 TEST_F(CameraFiles, BrokenColmapText) {
   const auto refused = [&](const std::string& cameras, const std::string& images,
                            const std::string& part) {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kUnseen = 0.25;     // share of the views that may lack a cell
 constexpr float kSharpness = 80;     // of the vote, over shares of views
-constexpr float kSlack = 0.25f;      // pixels that a cell is drawn larger on each side
+constexpr float kCellSlack = 0.25f;  // pixels that a cell is drawn larger on each side
 constexpr float kLeastFull = 0.02f;  // cells below draw nothing
 
 bool IsIn(ImageSize size, float x, float y) {
@@ -89,7 +89,7 @@ std::vector<float> CommonHull::Silhouette(std::size_t view) const {
     if (full_[i] < kLeastFull) continue;
     const Place at = Project(view, Centre(i));
     if (!IsIn(size_, at.x, at.y)) continue;
-    const float half = std::min(0.5f * cell_ * std::abs(cameras_[view].fx) / at.depth + kSlack,
+    const float half = std::min(0.5f * cell_ * std::abs(cameras_[view].fx) / at.depth + kCellSlack,
                                 static_cast<float>(std::max(size_.width, size_.height)));
     const int left = std::max(0, static_cast<int>(at.x - half)),
               right = std::min(size_.width - 1, static_cast<int>(at.x + half)),

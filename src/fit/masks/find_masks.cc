@@ -23,7 +23,7 @@ constexpr double kFirstTolerance = 0.15, kLastTolerance = 0.06;
 constexpr float kOutsideHull = -5, kInsideHull = 0.4f;
 constexpr float kKept = 5;  // ln: of the rounds, for the last one at full resolution
 constexpr PixelField::Relaxing kRelaxing = {.rounds = 40, .coupling = 0.5f};
-constexpr float kInside = 0.5f;
+constexpr float kInsideMask = 0.5f;
 const Progress kDone = {"finding masks", kRounds + 1, kRounds + 1, ""};
 
 Camera Reduced(Camera c, float factor) {
@@ -156,7 +156,7 @@ double MaskSearch::Agreement(std::size_t view) const {
   const auto mask = Of(view, inside_);
   double both = 0, either = 0;
   for (std::size_t p = 0; p < hull.size(); ++p) {
-    const bool a = mask[p] >= kInside, b = hull[p] >= kInside;
+    const bool a = mask[p] >= kInsideMask, b = hull[p] >= kInsideMask;
     both += a && b;
     either += a || b;
   }

@@ -13,7 +13,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kDoubt = 0.7, kNoMasks = 0.6;  // agreement of a view; of all, the mean
+constexpr double kDoubtfulMask = 0.7, kNoMasks = 0.6;  // agreement of a view; of all, the mean
 
 std::string MaskName(const FitInput& input, std::size_t view) {
   const auto end = input.names.begin() + static_cast<std::ptrdiff_t>(view);
@@ -33,11 +33,23 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
+std::string NoteOf(const FoundMasks& found, const FitInput& input) {
+  const auto least = std::ranges::min_element(found.agreement);
+  const auto view = static_cast<std::size_t>(least - found.agreement.begin());
+  return fmt::format(
+      "masks: found in {}; they agree to {:.0f} % with what all have in common, that of {} to "
+      "{:.0f} %",
+      Count(found.agreement.size(), "image"), 100 * Mean(found.agreement), input.names[view],
+      100 * *least);
+}
+
 void Take(const FoundMasks& found, FitInput* input) {
   std::ranges::copy(found.alpha, input->images.alpha.begin());
+  input->masks_found = true;
   input->mask_agreement = Mean(found.agreement);
+  input->notes.push_back(NoteOf(found, *input));
   for (std::size_t v = 0; v < input->names.size(); ++v) {
-    if (found.agreement[v] >= kDoubt) continue;
+    if (found.agreement[v] >= kDoubtfulMask) continue;
     input->warnings.push_back(
         fmt::format("{}: its mask is doubtful, it covers {:.0f} % of what all views have in common "
                     "or that of it; look at masks/{}.png",
@@ -45,7 +57,7 @@ void Take(const FoundMasks& found, FitInput* input) {
   }
 }
 
-Status Find(const Path& folder, FitInput* input, const Workers& workers, const Watch& watch) {
+Status Find(FitInput* input, const Workers& workers, const Watch& watch) {
   TILEGRAD_ASSIGN(const FoundMasks found, FindMasks(*input, workers, watch));
   if (!(Mean(found.agreement) >= kNoMasks)) {
     input->warnings.push_back(fmt::format(
@@ -53,7 +65,12 @@ Status Find(const Path& folder, FitInput* input, const Workers& workers, const W
     return ApplyBackground(Background::kAuto, input, watch);
   }
   Take(found, input);
-  return folder.empty() ? Status() : WriteMasks(folder, *input);
+  return {};
+}
+
+// Before empty ones go.
+Status KeepFound(const Path& folder, const FitInput& input) {
+  return input.masks_found && !folder.empty() ? WriteMasks(folder, input) : Status();
 }
 
 }  // namespace
@@ -90,15 +107,16 @@ Status ReadMasks(const Path& folder, FitInput* input) {
 
 Status StartMasks(bool resume, FitJob* job, const Workers& workers, const Watch& watch) {
   FitInput& input = job->input;
-  if (!input.seeks_masks) return {};
-  input.seeks_masks = false;
   const Path folder = job->out.empty() ? Path() : job->out / "masks";
+  if (!input.seeks_masks) return KeepFound(folder, input);
+  input.seeks_masks = false;
   if (job->config.loss.silhouette_weight == 0) {
     TILEGRAD_TRY(ApplyBackground(Background::kAuto, &input, watch));
   } else if (resume && !folder.empty() && IsFolder(folder)) {
     TILEGRAD_TRY(ReadMasks(folder, &input));
   } else {
-    TILEGRAD_TRY(Find(folder, &input, workers, watch));
+    TILEGRAD_TRY(Find(&input, workers, watch));
+    TILEGRAD_TRY(KeepFound(folder, input));
   }
   input.masked = HasAlpha(input);
   return DropEmptyViews(&input);

@@ -6,9 +6,10 @@
 
 namespace tilegrad::train {
 
-// If the input seeks masks: finds them, writes them to <out>/masks, and warns of views whose mask
-// is in doubt; where all are, plain backgrounds are tried instead. `resume`: reads what an earlier
-// call wrote there. Views whose mask is empty go. Errors: those of FindMasks, ReadMasks and files.
+// If the input seeks masks: finds them and warns of views whose mask is in doubt; where all are,
+// plain backgrounds are tried instead. Writes masks that were found, by either way, to <out>/masks.
+// `resume`: reads what an earlier call wrote there. Views whose mask is empty go. Errors: those of
+// FindMasks, ReadMasks and files.
 Status StartMasks(bool resume, FitJob* job, const Workers& workers, const Watch& watch);
 
 // <folder>/NAME.png for each view, grey; NAME has its own ending, and the view's number before it

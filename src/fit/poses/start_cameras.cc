@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/poses/start_cameras.h"
 
+#include "base/error.h"
 #include "fit/masks/start_masks.h"
 #include "fit/poses/input_poses.h"
+#include "fit/poses/view_gap.h"
 #include "fit/sphere.h"
 
 namespace tilegrad::train {
@@ -10,6 +12,21 @@ namespace {
 
 // Of the steps; the best of a few on a van and a cat whose cameras were 2 degrees off.
 constexpr double kCamerasRest = 0.4;
+// Between a direction and the nearest camera: in two rings of twelve it is 25.
+constexpr double kWideGap = 30;
+
+// What one more picture would tell. Says nothing where masks do not tell where the object is.
+void NoteWidestGap(FitInput* input) {
+  const auto sphere = GuessSphere(*input);
+  if (!sphere.ok()) return;
+  const ViewGap gap = WidestGap(input->cameras, sphere->centre);
+  input->notes.push_back(
+      gap.degrees < kWideGap
+          ? fmt::format("views: all around, every direction is within {:.0f} degrees of one",
+                        kWideGap)
+          : fmt::format("views: one more picture would help most {}",
+                        DescribePlace(gap, input->names[gap.nearest])));
+}
 
 }  // namespace
 
@@ -31,6 +48,7 @@ Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& work
                                      {progress, &stop}));
   }
   if (!shaped) job->config.cameras_rest = kCamerasRest;
+  NoteWidestGap(&job->input);
   return {};
 }
 
