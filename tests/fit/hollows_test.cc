@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/vec2.hpp>
+#include <numbers>
+#include <vector>
 
 #include "fit/hull/carve.h"
 #include "fit/hull/cell_distance.h"
@@ -104,6 +107,46 @@ TEST_F(Hollows, OfAGreyBoxAreCarvedWhereShadingTells) {
   const Mesh truth = OpenBox(false);
   const Grids grids = Carved(Views(truth));
   EXPECT_GT(Iou(truth, grids.hollow), 0.7);
+}
+
+// A surface around the y axis through rings of (radius, height).
+Mesh Turned(const std::vector<glm::vec2>& profile) {
+  constexpr int kSegments = 32;
+  Mesh mesh;
+  for (const glm::vec2 ring : profile) {
+    for (int s = 0; s < kSegments; ++s) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(s) / kSegments;
+      mesh.positions.push_back({ring.x * std::cos(angle), ring.y, ring.x * std::sin(angle)});
+    }
+  }
+  for (int r = 0; r + 1 < static_cast<int>(profile.size()); ++r) {
+    for (int s = 0; s < kSegments; ++s) {
+      const int a = r * kSegments + s, b = r * kSegments + (s + 1) % kSegments;
+      mesh.faces.push_back({a, a + kSegments, b});
+      mesh.faces.push_back({b, a + kSegments, b + kSegments});
+    }
+  }
+  return mesh;
+}
+
+// Few views look down to the floor, none into the belly: the inside follows the outside as deep as
+// nothing speaks against it.
+TEST_F(Hollows, OfAJarAreAsDeepAsItsWallsAllow) {
+  Mesh jar = Turned({{0, -0.35f},
+                     {0.25f, -0.35f},
+                     {0.4f, -0.05f},
+                     {0.32f, 0.25f},
+                     {0.32f, 0.35f},
+                     {0.28f, 0.35f},
+                     {0.28f, 0.25f},
+                     {0.36f, -0.05f},
+                     {0.21f, -0.3f},
+                     {0, -0.3f}});
+  for (const glm::vec3& p : jar.positions)
+    jar.colors.push_back({0.5f + 0.6f * p.x, 0.4f, 0.5f + 0.6f * p.z, 1});
+  const Grids grids = Carved(Views(jar));
+  EXPECT_LT(Iou(jar, grids.hull), 0.5);
+  EXPECT_GT(Iou(jar, grids.hollow), 0.65);
 }
 
 TEST_F(Hollows, AreNotInAClosedBox) {

@@ -14,10 +14,9 @@ namespace tilegrad::train::hull_fit_test {
 
 class HullFit : public TempFolderTest {
  protected:
-  FitJob Job(const std::string& out) {
-    const Status made =
-        MakeViews(Torus(0.3f, 0.12f, 24, 12), {.views = 8, .held_out = 2, .size = 32},
-                  folder_ / "views", OutputGuard(true), {}, stop_);
+  FitJob Job(const std::string& out, const Mesh& mesh = Torus(0.3f, 0.12f, 24, 12), int size = 32) {
+    const Status made = MakeViews(mesh, {.views = 8, .held_out = 2, .size = size},
+                                  folder_ / "views", OutputGuard(true), {}, stop_);
     EXPECT_TRUE(made.ok()) << made.message();
     FitJob job;
     job.input = ReadFitFolder(folder_ / "views", 0).value();
@@ -70,6 +69,21 @@ TEST_F(HullFit, ChartsWithoutRoomGetALargerTexture) {
   const auto sphere = PrepareFit(job, Workers(1));
   ASSERT_TRUE(sphere.ok()) << sphere.status().message();
   EXPECT_NE(sphere->note.find("no hull: a texture of 8 x 8"), std::string::npos) << sphere->note;
+}
+
+// The ring is 3 pixels thick, the box 14.
+TEST_F(HullFit, TheAreaPullsThinHullsLess) {
+  const auto area = [](const FitJob& job) {
+    const auto start = PrepareFit(job, Workers(1));
+    EXPECT_TRUE(start.ok()) << start.status().message();
+    return start->config.regularizers.area;
+  };
+  const Mesh box = Box({0, 0, 0}, {0.9f, 0.6f, 0.7f});
+  EXPECT_EQ(area(Job("thin")), 0.05);
+  EXPECT_EQ(area(Job("thick", box, 64)), 0.3);
+  FitJob given = Job("given");
+  given.config.regularizers.area = 0.2;
+  EXPECT_EQ(area(given), 0.2);
 }
 
 // What a sphere cannot: the hole of a ring.

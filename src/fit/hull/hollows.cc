@@ -29,11 +29,17 @@ constexpr float kTapers[] = {0, 0.15f, 0.3f, 0.6f, 1};
 constexpr float kReaches[] = {4, 2, 8, 16};
 constexpr HollowShape kWidest = {.wall = 1.5f, .reach = 10};
 constexpr int kSweeps = 2;
-// Of numbers whose scores differ by less than this share of the gain, the first in its list: the
+// A number is the first in its list that none other beats by more than this share of the gain: the
 // floor of a cup of one colour gives no evidence, and is then as thick as the walls.
 constexpr double kTie = 0.02;
+// The share of the pixels known with the list's best that must be known: nothing contradicts what
+// few pixels show.
+constexpr double kLeastKnown = 0.5;
 
-constexpr float kLookInside = 3;      // cells behind the hull's surface where a hollow may begin
+// Cells behind the hull's surface where a hollow begins below its lid. Those that views look into
+// from the side begin behind a wall, two cells and more, and show the outside's colours.
+constexpr float kLookInside = 1;
+constexpr float kPartReach = 4;       // cells behind the surface where a part of a hollow may begin
 constexpr int kLidReach = 4;          // cells above and below a rim that belong to its lid
 constexpr double kLeastDoubt = 0.01;  // mean difference of colours on a lid
 // Columns in doubt differ by that much, and by this share of what the worst tenth does.
@@ -257,14 +263,53 @@ class HollowSearch {
     return out;
   }
 
+  using Agreements = std::vector<PhotoViews::Agreement>;
+
+  static constexpr std::size_t kStride = 3;
+  Agreements AgreeThrough(const Lookers& lookers, const ScalarGrid& hollow) {
+    return LookThrough(lookers, hollow, kStride).agreement;
+  }
+
   // The mean difference; that on the hull where a hollow's inside is not known.
-  double Score(const Lookers& lookers, const ScalarGrid& hollow) {
-    constexpr std::size_t kStride = 3;
-    const auto seen = LookThrough(lookers, hollow, kStride).agreement;
+  static double MeanOf(const Lookers& lookers, const Agreements& seen) {
     double sum = 0;
     for (std::size_t i = 0; i < seen.size(); ++i)
       sum += static_cast<double>(seen[i].known ? seen[i].difference : lookers.before[kStride * i]);
     return sum / static_cast<double>(seen.size());
+  }
+
+  static std::size_t Known(const Agreements& seen) {
+    return static_cast<std::size_t>(std::ranges::count(seen, true, &PhotoViews::Agreement::known));
+  }
+
+  // How much more views differ through one hollow than through another: a sum over the pixels for
+  // which both insides are known. What only one shows speaks for neither: fewer views look down to
+  // the floor of a deep jar than onto a floor that is too high.
+  static double Excess(const Agreements& one, const Agreements& other) {
+    double sum = 0;
+    for (std::size_t i = 0; i < one.size(); ++i)
+      if (one[i].known && other[i].known)
+        sum += static_cast<double>(one[i].difference - other[i].difference);
+    return sum;
+  }
+
+  // The first hollow whose excess over any other is at most `slack`; if there is none, the one
+  // whose greatest excess is least.
+  static std::size_t FirstUnbeaten(const std::vector<Agreements>& seen, double slack) {
+    std::vector<std::size_t> known;
+    for (const Agreements& s : seen) known.push_back(Known(s));
+    const double enough = kLeastKnown * static_cast<double>(*std::ranges::max_element(known));
+    std::size_t best = 0;
+    double least = HUGE_VAL;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (static_cast<double>(known[i]) < enough) continue;
+      double worst = slack;
+      for (const Agreements& other : seen) worst = std::max(worst, Excess(seen[i], other));
+      if (worst >= least) continue;
+      least = worst;
+      best = i;
+    }
+    return best;
   }
 
   Best Glance(const HollowRim& rim) {
@@ -273,8 +318,8 @@ class HollowSearch {
     if (lookers.pixels.size() < kLeastPixels || doubt < kLeastDoubt) return {};
     Best best;
     for (const HollowShape& shape : kGlances) {
-      const double gain =
-          static_cast<double>(lookers.pixels.size()) * (doubt - Score(lookers, rim.Hollow(shape)));
+      const double left = MeanOf(lookers, AgreeThrough(lookers, rim.Hollow(shape)));
+      const double gain = static_cast<double>(lookers.pixels.size()) * (doubt - left);
       if (gain > best.gain) best = {shape, gain};
     }
     return best;
@@ -283,15 +328,15 @@ class HollowSearch {
   HollowShape Refined(const HollowRim& rim, const Lookers& lookers, HollowShape shape) {
     const double doubt = lookers.doubt();
     const auto sweep = [&](float HollowShape::*number, std::span<const float> values) {
-      std::vector<double> scores;
+      std::vector<Agreements> seen;
+      double least = doubt;
       for (const float value : values) {
         shape.*number = value;
-        scores.push_back(Score(lookers, rim.Hollow(shape)));
+        seen.push_back(AgreeThrough(lookers, rim.Hollow(shape)));
+        least = std::min(least, MeanOf(lookers, seen.back()));
       }
-      const double least = *std::ranges::min_element(scores);
-      const double enough = least + kTie * std::max(0.0, doubt - least);
-      const auto first = std::ranges::find_if(scores, [&](double s) { return s <= enough; });
-      shape.*number = values[static_cast<std::size_t>(first - scores.begin())];
+      const double slack = kTie * (doubt - least) * static_cast<double>(seen[0].size());
+      shape.*number = values[FirstUnbeaten(seen, slack)];
     };
     for (int i = 0; i < kSweeps; ++i) {
       const HollowShape before = shape;
@@ -392,7 +437,7 @@ class HollowSearch {
 
   // The part of a hollow that a pixel looks into; 0: none.
   int PartBehind(PhotoViews::Pixel pixel, const std::vector<int>& parts) const {
-    for (float cells = 0; cells <= kLookInside + 1; cells += 0.5f) {
+    for (float cells = 0; cells <= kPartReach; cells += 0.5f) {
       const auto [i, j, k] = CellOf(views_.PointOf(pixel, cells * hull_.cell));
       if (const int part = parts[hull_.At(i, j, k)]; part > 0) return part;
     }

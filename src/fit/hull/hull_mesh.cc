@@ -64,6 +64,27 @@ std::vector<std::int32_t> PartsOf(const Mesh& mesh) {
   return parent;
 }
 
+// A corner, as seen from the first vertex, which keeps differences exact.
+glm::dvec3 CornerAt(const Mesh& mesh, std::int32_t v) {
+  return glm::dvec3(mesh.positions[static_cast<std::size_t>(v)] - mesh.positions[0]);
+}
+
+// Between a face and the first vertex, signed: the sum over a closed surface is what it encloses.
+double VolumeBelow(const Mesh& mesh, const Face& f) {
+  return glm::dot(CornerAt(mesh, f[0]), glm::cross(CornerAt(mesh, f[1]), CornerAt(mesh, f[2]))) / 6;
+}
+
+// World units.
+double MeanThickness(const Mesh& mesh) {
+  double volume = 0, area = 0;
+  for (const Face& f : mesh.faces) {
+    const glm::dvec3 a = CornerAt(mesh, f[0]);
+    volume += VolumeBelow(mesh, f);
+    area += 0.5 * glm::length(glm::cross(CornerAt(mesh, f[1]) - a, CornerAt(mesh, f[2]) - a));
+  }
+  return area > 0 ? 2 * volume / area : 0;
+}
+
 // Faces of parts that enclose more than `volume`, in size; hollows are parts that enclose less than
 // nothing. The largest part stays in any case.
 void DropSpecks(double volume, Mesh* mesh) {
@@ -72,11 +93,7 @@ void DropSpecks(double volume, Mesh* mesh) {
   const auto part = [&](const Face& f) {
     return static_cast<std::size_t>(parts[static_cast<std::size_t>(f[0])]);
   };
-  const auto at = [&](std::int32_t v) {
-    return glm::dvec3(mesh->positions[static_cast<std::size_t>(v)] - mesh->positions[0]);
-  };
-  for (const Face& f : mesh->faces)
-    volumes[part(f)] += glm::dot(at(f[0]), glm::cross(at(f[1]), at(f[2]))) / 6;
+  for (const Face& f : mesh->faces) volumes[part(f)] += VolumeBelow(*mesh, f);
   double largest = 0;
   for (const double v : volumes) largest = std::max(largest, std::abs(v));
   std::erase_if(mesh->faces, [&](const Face& f) {
@@ -119,18 +136,18 @@ Result<CarvedMesh> CarveMesh(const FitInput& input, const CarveOptions& options,
 }  // namespace
 
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
-                      const Watch& watch, bool* hollow) {
+                      const Watch& watch, HullTraits* traits) {
   CarveOptions carve = options.carve;
   TILEGRAD_ASSIGN(CarvedMesh carved, CarveMesh(input, carve, workers, watch));
   if (Handles(carved.mesh) > options.most_faces / kFacesPerHandle) {
     carve.cell_pixels *= kCoarser;
     TILEGRAD_ASSIGN(carved, CarveMesh(input, carve, workers, watch));
   }
-  if (hollow != nullptr) *hollow = carved.hollow;
   Mesh& mesh = carved.mesh;
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
   const double pixel = carved.cell / carve.cell_pixels;
+  if (traits != nullptr) *traits = {carved.hollow, MeanThickness(mesh) / pixel};
   const double patch = options.patch_pixels * pixel;
   const auto faces = static_cast<std::uint64_t>(mesh.faces.size());
   const auto told = [&watch, faces](std::size_t left) {

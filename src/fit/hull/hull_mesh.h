@@ -2,6 +2,8 @@
 // The surface of the visual hull as a mesh to start a fit from.
 #pragma once
 
+#include <cmath>
+
 #include "fit/hull/carve.h"
 #include "scene/mesh.h"
 
@@ -17,10 +19,16 @@ struct HullOptions {
   std::size_t most_faces = 40'000;
 };
 
+// What a fit needs to know of a hull.
+struct HullTraits {
+  bool hollow = false;  // less hollows that colours show (hollows.h)
+  // Mean thickness in pixels of an image where the object is: twice the volume by the area.
+  double thickness = HUGE_VAL;
+};
+
 // A closed manifold of any genus and number of parts, but for specks of less than a few cells; the
-// hull less the hollows that colours show (hollows.h); `hollow` gets whether there are any.
-// Errors: as Carve.
+// hull less the hollows that colours show (hollows.h). Writes `traits`, if given. Errors: as Carve.
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
-                      const Watch& watch = {}, bool* hollow = nullptr);
+                      const Watch& watch = {}, HullTraits* traits = nullptr);
 
 }  // namespace tilegrad::train
