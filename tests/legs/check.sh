@@ -12,7 +12,7 @@ export PYTHONDONTWRITEBYTECODE=1  # as ./run
 
 readonly LEGS=(format headers docs install wheel targets memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
-readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|api_renderer|render_pipeline|nn_tape)'
+readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|api_renderer|render_pipeline|nn_tape|nn_lanes|base_worker_groups)'
 # Tests that hold kernels to their references.
 readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|shaded|nn_|compat_|rivals_)'
 # Those that valgrind, which takes fifty times as long, runs in minutes.
