@@ -186,21 +186,26 @@ std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
   return out;
 }
 
-// Of two framed pictures, in [0, 1]: the mean over what either covers of the squared differences of
-// colour and of coverage, which count alike.
-double PictureDistance(const std::uint8_t* a, const std::uint8_t* b) {
+// The distance of two framed pictures, [0, 1]: the mean over what either covers of the squared
+// differences of colour and of coverage, with equal weight. May stop at a smaller value if that is
+// at least `limit`.
+double PictureDistance(const std::uint8_t* a, const std::uint8_t* b, double limit) {
   std::uint32_t color = 0, alpha = 0, covered = 0;  // at most 768 * 255^2
-  for (std::size_t i = 0; i < 3 * kPixels; ++i) {
-    const int difference = int{a[i]} - int{b[i]};
-    color += static_cast<std::uint32_t>(difference * difference);
-  }
   for (std::size_t i = 3 * kPixels; i < kPictureBytes; ++i) {
     const int difference = int{a[i]} - int{b[i]};
     alpha += static_cast<std::uint32_t>(difference * difference);
     covered += std::max(a[i], b[i]);
   }
   if (covered == 0) return 0;
-  return (color / 3.0 + alpha) / (2 * 255.0 * covered);
+  double distance = 0;
+  for (std::size_t i = 0; i < 3 * kPixels && distance < limit;) {
+    for (const std::size_t end = i + kPixels / 4; i < end; ++i) {
+      const int difference = int{a[i]} - int{b[i]};
+      color += static_cast<std::uint32_t>(difference * difference);
+    }
+    distance = (color / 3.0 + alpha) / (2 * 255.0 * covered);
+  }
+  return distance;
 }
 
 // One line of a text.
@@ -258,8 +263,9 @@ std::optional<TrainingPictures::Found> TrainingPictures::Search(std::span<const 
   std::optional<Found> best;
   for (std::size_t i = 0; i < of_.size(); ++i) {
     if (!may_match(i)) continue;
-    const double square = PictureDistance(small.data(), Picture(i).data());
-    if (!best || square < best->square) best = Found{i, square};
+    const double limit = best ? best->square : HUGE_VAL;
+    const double square = PictureDistance(small.data(), Picture(i).data(), limit);
+    if (square < limit) best = Found{i, square};
   }
   return best;
 }
