@@ -12,7 +12,7 @@
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/fingerprint.h"
-#include "train/eval/class_means.h"
+#include "train/eval/statistics.h"
 #include "train/models/sphere_model.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"

@@ -13,6 +13,7 @@
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
 #include "io/webp_animation.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "scene/mesh.h"
 #include "train/data/dataset.h"

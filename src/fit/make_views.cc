@@ -12,6 +12,7 @@
 #include "fit/transforms.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "train/data/build/glass.h"
 

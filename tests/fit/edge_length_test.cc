@@ -7,7 +7,7 @@
 #include "base/rng.h"
 #include "fit/diffusion.h"
 #include "scene/shapes.h"
-#include "train/losses/area.h"
+#include "train/losses/area_edge_length.h"
 
 namespace tilegrad::train::edge_length_test {
 

@@ -8,6 +8,7 @@
 
 #include "fit/find_camera.h"
 #include "fit/input.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "scene/shapes.h"
 

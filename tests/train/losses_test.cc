@@ -7,9 +7,9 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "support/shared_data.h"
-#include "train/losses/area.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/area_edge_length.h"
 #include "train/losses/iou.h"
+#include "train/losses/l1.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
 

@@ -15,8 +15,8 @@
 #include "train/data/photographs/distance_barrier.h"
 #include "train/losses/laplacian.h"
 #include "train/metrics/metrics.h"
+#include "train/models/camera_ops.h"
 #include "train/models/sphere_model.h"
-#include "train/models/weak_cameras.h"
 
 namespace tilegrad::train::photograph_parts_test {
 

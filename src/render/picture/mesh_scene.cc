@@ -4,12 +4,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 
-#include "base/error.h"
-#include "render/picture/composite.h"
-#include "render/picture/picture.h"
-#include "scene/camera_conventions.h"
 #include "shade/surface_color.h"
 
 namespace tilegrad {
@@ -196,90 +191,6 @@ void MeshScene::AddCover() {
   if (!textures_.empty()) cover.alpha.textures = alpha_textures_;
 }
 
-namespace {
-
-constexpr int kMaxSize = 4096;
-constexpr int kLitSamples = 4, kUnlitSamples = 3;  // per side of a pixel
-
-MeshSceneOptions LitOptions() {
-  MeshSceneOptions options;
-  options.color_space = ColorSpace::kSrgb;
-  options.normals = NormalSource::kAligned;
-  options.ambient.fill(kDatasetAmbient);
-  options.blend = false;
-  return options;
-}
-
-}  // namespace
-
-struct LitRenderer::Impl {
-  Workers workers{1};
-  PictureRenderer renderer{workers};
-  Picture picture;
-
-  template <class Visit>
-  Status Draw(const Mesh& mesh, std::span<const Camera> cameras, int size, const Visit& visit) {
-    if (size < 1 || size > kMaxSize) {
-      return InvalidArgument("the size must be in [1, {}] pixels, got {}", kMaxSize, size);
-    }
-    TILEGRAD_TRY(Validate(mesh));
-    if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
-    const std::array<Light, 2> lights = DatasetLights();
-    const MeshScene made(mesh, LitOptions());
-    Scene scene = made.scene();
-    scene.shading.lighting = Lighting::kLambert;
-    scene.lights = lights;
-    for (const Camera& camera : cameras) {
-      scene.camera = camera;
-      const PictureRequest request{
-          .width = size, .height = size, .supersampling = kLitSamples, .cover = made.cover()};
-      TILEGRAD_TRY(renderer.Render(scene, request, &picture));
-      visit(picture);
-    }
-    return {};
-  }
-};
-
-LitRenderer::LitRenderer() : impl_(std::make_unique<Impl>()) {}
-LitRenderer::~LitRenderer() = default;
-LitRenderer::LitRenderer(LitRenderer&&) noexcept = default;
-
-Result<std::vector<std::uint8_t>> LitRenderer::Render(const Mesh& mesh,
-                                                      std::span<const Camera> cameras, int size) {
-  std::vector<std::uint8_t> out;
-  TILEGRAD_TRY(impl_->Draw(mesh, cameras, size, [&](const Picture& picture) {
-    const auto planes = PremultipliedPlanes(picture);
-    out.insert(out.end(), planes.begin(), planes.end());
-  }));
-  return out;
-}
-
-Result<ImageU8> LitRenderer::RenderStraight(const Mesh& mesh, const Camera& camera, int size) {
-  ImageU8 out;
-  TILEGRAD_TRY(impl_->Draw(mesh, {&camera, 1}, size,
-                           [&](const Picture& picture) { out = StraightRgba(picture); }));
-  return out;
-}
-
-Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const UnlitPictures& request,
-                                      const Workers& workers) {
-  TILEGRAD_TRY(Validate(mesh));
-  const MeshScene made(mesh, {.color_space = ColorSpace::kSrgb});
-  Scene scene = made.scene();
-  PictureRenderer renderer(workers);
-  Picture picture;
-  std::vector<ImageU8> out;
-  for (const Camera& camera : request.cameras) {
-    scene.camera = ScaledCamera(
-        camera, static_cast<float>(request.size) / static_cast<float>(request.camera_size));
-    TILEGRAD_TRY(renderer.Render(
-        scene, {.width = request.size, .height = request.size, .supersampling = kUnlitSamples},
-        &picture));
-    out.push_back(OverGrey(picture, kPaper));
-  }
-  return out;
-}
-
 std::vector<glm::vec3> CornerColors(const Mesh& mesh) {
   const shade::SurfaceColor surface(mesh);
   std::vector<glm::vec3> out;
@@ -288,84 +199,6 @@ std::vector<glm::vec3> CornerColors(const Mesh& mesh) {
     for (int k = 0; k < 3; ++k) out.push_back(surface.AtCorner(f, k));
   }
   return out;
-}
-
-namespace {
-
-constexpr float kKey = 0.45f, kFill = 0.2f;
-
-Light LightFrom(glm::vec3 towards, float intensity) {
-  const glm::vec3 d = glm::normalize(towards);
-  return {{d.x, d.y, d.z}, intensity};
-}
-
-}  // namespace
-
-std::array<Light, 2> DatasetLights() {
-  return {LightFrom({0.35f, 0.8f, 0.5f}, kKey), LightFrom({-0.6f, 0.3f, -0.75f}, kFill)};
-}
-
-Surface DatasetSurface() {
-  Surface surface;
-  surface.ambient.fill(kDatasetAmbient);
-  surface.specular.fill(0);
-  return surface;
-}
-
-float SurfaceCover::Of(float alpha) const {
-  if (kind == Kind::kOpaque) return 1;
-  if (kind == Kind::kMask) return alpha >= cutoff ? 1.0f : 0.0f;
-  return std::clamp(alpha, 0.0f, 1.0f);
-}
-
-Status LayerRenderer::DrawAlpha(const SceneCover& cover, const Camera& camera,
-                                const RenderOptions& options) {
-  Scene scene = cover.alpha;
-  scene.camera = camera;
-  Outputs outputs;
-  outputs.attributes = outputs.alpha = false;
-  return engine_.Render({&scene, 1}, options, outputs, &alpha_);
-}
-
-// Reports what this layer shows, and opens unfinished pixels to the next one. Returns whether there
-// are any.
-bool LayerRenderer::Visit(const Scene& scene, const SceneCover& cover, const TakeLayer& take) {
-  const Images images = ImagesOf(layer_);
-  bool any = false;
-  for (std::size_t at = 0; at < images.face_ids.size(); ++at) {
-    const std::int32_t face = images.face_ids[at];
-    if (face < 0) continue;
-    const auto surface =
-        scene.face_surfaces.empty()
-            ? std::size_t{0}
-            : static_cast<std::size_t>(scene.face_surfaces[static_cast<std::size_t>(face)]);
-    const bool done = take(images, at, cover.surfaces[surface].Of(alpha_.color[at]));
-    if (done) layer_.peeled[at] = 0;
-    any |= !done;
-  }
-  return any;
-}
-
-Status LayerRenderer::RenderAll(const Scene& scene, const SceneCover& cover,
-                                const RenderOptions& options, const Outputs& outputs,
-                                const TakeLayer& take) {
-  const auto pixels =
-      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  layer_.peeled.assign(pixels, std::numeric_limits<float>::infinity());
-  for (int layer = 0; layer < kMostLayers; ++layer) {
-    alpha_.peeled = layer_.peeled;
-    TILEGRAD_TRY(engine_.Render({&scene, 1}, options, outputs, &layer_));
-    if (layer == 0) plan_ = engine_.Explain();
-    TILEGRAD_TRY(DrawAlpha(cover, scene.camera, options));
-    if (!Visit(scene, cover, take)) break;
-  }
-  return {};
-}
-
-Status LayerRenderer::Render(const Scene& scene, const SceneCover& cover,
-                             const RenderOptions& options, const Outputs& outputs,
-                             const TakeLayer& take) {
-  return Guarded([&] { return RenderAll(scene, cover, options, outputs, take); });
 }
 
 }  // namespace tilegrad

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render/picture/layers.h"
 #include "render/picture/mesh_scene.h"
 #include "render/renderer.h"
 

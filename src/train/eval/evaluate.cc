@@ -8,8 +8,8 @@
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
-#include "train/eval/class_means.h"
-#include "train/eval/retrieval.h"
+#include "train/eval/baselines.h"
+#include "train/eval/statistics.h"
 
 namespace tilegrad::train {
 namespace {

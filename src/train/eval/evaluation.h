@@ -60,7 +60,7 @@ struct EvaluationRow {
   std::string method;
   std::vector<Score> classes;                 // as Evaluation::classes
   Score mean;                                 // of the class means
-  std::optional<Score> error = std::nullopt;  // standard errors of `mean` (class_means.h)
+  std::optional<Score> error = std::nullopt;  // standard errors of `mean` (statistics.h)
 };
 
 struct ModelScore {

@@ -12,9 +12,9 @@
 #include "nn/kernels/pointwise.h"
 #include "nn/networks.h"
 #include "nn/tape.h"
-#include "train/losses/area.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/area_edge_length.h"
 #include "train/losses/iou.h"
+#include "train/losses/l1.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/losses/regularizers.h"
 
-#include "train/losses/area.h"
+#include "train/losses/area_edge_length.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
 

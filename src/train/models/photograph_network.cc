@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "scene/weak_perspective_ref.h"
-#include "train/models/weak_cameras.h"
+#include "train/models/camera_ops.h"
 
 namespace tilegrad::train {
 namespace {

@@ -109,7 +109,7 @@ struct Prediction {
   nn::Var shininess{};   // [B]; Phong
   nn::Var sh{};          // [B, 9]; harmonics
   nn::Var pose{};        // [B, 10] Pose of the picture's camera (picture_lookup.h)
-  nn::Var cameras{};     // [B, 7] (weak_cameras.h), quaternions unit
+  nn::Var cameras{};     // [B, 7] (camera_ops.h), quaternions unit
   // For a network that predicts N cameras per picture: all of them (`cameras` holds the likeliest),
   // and their logits.
   nn::Var camera_choices{};  // [B N, 7]

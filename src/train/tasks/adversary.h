@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "nn/networks.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/l1.h"
 #include "train/losses/loss_sum.h"
 #include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"

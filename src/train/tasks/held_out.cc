@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Alpha masks and transparency in pictures, by values worked out by hand.
+#include "render/picture/layers.h"
+
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
 #include <glm/vec3.hpp>
 
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "render/picture/picture.h"
 #include "scene/camera.h"

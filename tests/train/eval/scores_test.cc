@@ -13,10 +13,9 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/eval/class_means.h"
 #include "train/eval/evaluate.h"
 #include "train/eval/evaluation.h"
-#include "train/eval/retrieval.h"
+#include "train/eval/statistics.h"
 
 namespace tilegrad::train::scores_test {
 
@@ -133,36 +132,6 @@ TEST(PredictionPictures, KnowWhichSidesAViewSees) {
   EXPECT_LE(count(1, Side::kSeen), 2);
   EXPECT_NEAR(count(1, Side::kHidden), count(0, Side::kSeen), 4);
   EXPECT_TRUE(pictures.Draw(ball).value().sides.empty());
-}
-
-std::vector<std::uint8_t> Flat(std::uint8_t value, int size) {
-  return std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(size * size), value);
-}
-
-TEST(ImageIndex, FindsTheNearestAndSaysHowFarItIs) {
-  ImageIndex index;
-  std::vector<std::uint8_t> two = Flat(10, 32), more = Flat(200, 32);
-  two.insert(two.end(), more.begin(), more.end());
-  index.Add(two, 2, 32);
-  index.Add(Flat(100, 32), 1, 32);
-  EXPECT_EQ(index.size(), 3u);
-  const auto match = index.Nearest(Flat(190, 64), 64);  // of another size
-  EXPECT_EQ(match.model, 0);
-  EXPECT_EQ(match.view, 1);
-  EXPECT_NEAR(match.distance, 10 / 255.0, 1e-9);
-  EXPECT_EQ(index.Nearest(Flat(100, 16), 16).model, 1);
-  EXPECT_EQ(index.Nearest(Flat(100, 16), 16).distance, 0);
-}
-
-TEST(ImageIndex, ThumbnailsAreMeans) {
-  std::vector<std::uint8_t> image = Flat(0, 32);
-  image[0] = 255;
-  image[1] = 1;  // two of the four pixels of the first mean: 64
-  const auto small = Thumbnail(image, 32);
-  EXPECT_EQ(small.size(), 4u * 16 * 16);
-  EXPECT_EQ(small[0], 64);
-  EXPECT_EQ(small[1], 0);
-  EXPECT_EQ(Thumbnail(Flat(7, 5), 5), std::vector<std::uint8_t>(4 * 256, 7));  // fewer than it has
 }
 
 // Tables of scores: names of classes are text, whatever they hold.

@@ -8,7 +8,7 @@
 #include "nn/gradient_check.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/l1.h"
 #include "train/models/classifier.h"
 #include "train/models/render_op.h"
 

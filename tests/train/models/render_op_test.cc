@@ -17,7 +17,7 @@
 #include "scene/shapes.h"
 #include "shade/spherical_harmonics_ref.h"
 #include "train/gradient_check.h"
-#include "train/models/weak_cameras.h"
+#include "train/models/camera_ops.h"
 
 namespace tilegrad::train::render_op_test {
 

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "train/data/dataset_files.h"
 #include "train/data/sources/model_source.h"

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "render/picture/picture.h"
 #include "scene/shapes.h"

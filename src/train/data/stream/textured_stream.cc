@@ -9,6 +9,7 @@
 #include "base/clocks.h"
 #include "base/error.h"
 #include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 
 namespace tilegrad::train {

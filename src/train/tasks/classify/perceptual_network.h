@@ -4,7 +4,7 @@
 
 #include "base/file.h"
 #include "nn/context.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/l1.h"
 
 namespace tilegrad::train {
 

@@ -2,7 +2,7 @@
 #include "train/tasks/gan/config.h"
 
 #include "base/error.h"
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 
 namespace tilegrad::train {
 namespace {

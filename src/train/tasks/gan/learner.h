@@ -10,7 +10,7 @@
 
 #include "train/tasks/adversary.h"
 #include "train/tasks/gan/config.h"
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 #include "train/tasks/gan/step.h"
 #include "train/tasks/gan/watch.h"
 #include "train/tasks/task.h"

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "scene/shapes.h"
 #include "train/data/dataset.h"

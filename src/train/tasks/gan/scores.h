@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "base/file.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/l1.h"
 #include "train/metrics/set_scores.h"
 #include "train/tasks/gan/model.h"
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 #include "train/tasks/gan/watch.h"
 
 namespace tilegrad::train {

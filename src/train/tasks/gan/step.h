@@ -10,7 +10,7 @@
 #include "train/losses/loss_sum.h"
 #include "train/models/render_op.h"
 #include "train/tasks/gan/config.h"
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 #include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {

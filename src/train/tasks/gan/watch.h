@@ -4,7 +4,7 @@
 #pragma once
 
 #include "train/metrics/set_scores.h"
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 #include "train/tasks/gan/step.h"
 
 namespace tilegrad::train {

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/losses/feature_l1.h"
+#include "train/losses/l1.h"
 #include "train/tasks/common_config.h"
 
 namespace tilegrad::train {

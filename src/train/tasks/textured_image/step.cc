@@ -9,8 +9,8 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/losses/feature_l1.h"
-#include "train/models/weak_cameras.h"
+#include "train/losses/l1.h"
+#include "train/models/camera_ops.h"
 #include "train/tasks/common_config.h"
 
 namespace tilegrad::train {

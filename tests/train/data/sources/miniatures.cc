@@ -10,6 +10,7 @@
 #include "io/image_file.h"
 #include "io/npz.h"
 #include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "support/expect.h"
 #include "train/data/dataset.h"

@@ -7,6 +7,7 @@
 
 #include "io/binvox.h"
 #include "io/npz.h"
+#include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"

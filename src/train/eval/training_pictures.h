@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest training picture: a baseline that only memorises, and a measure of how unlike the
-// training data an input is.
+// Thumbnails of a run's training pictures, in its folder: other pictures can be compared with them
+// without the dataset.
+//
+//   <run>/thumbnails.npz    written when training starts, some 3 MB; runs of earlier versions have
+//                           none
 #pragma once
 
 #include <cstdint>
@@ -13,65 +16,12 @@
 #include "base/parallel.h"
 #include "io/npz.h"
 #include "scene/image.h"
-#include "scene/mesh.h"
 #include "tilegrad/status.h"
 #include "train/data/batches.h"
 #include "train/data/dataset.h"
 #include "train/run/carried_files.h"
 
 namespace tilegrad::train {
-
-// Pictures averaged to kThumbnail x kThumbnail, RGBA: small differences of pose matter less, and a
-// search takes a sixteenth of the time.
-inline constexpr int kThumbnail = 16;
-
-// [4][kThumbnail][kThumbnail] of planar RGBA [4][size][size]; `size` is a multiple of kThumbnail,
-// or the mean is over the nearest whole pixels.
-std::vector<std::uint8_t> Thumbnail(std::span<const std::uint8_t> image, int size);
-
-class ImageIndex {
- public:
-  struct Match {
-    int model = 0, view = 0;
-    double distance = 0;  // root mean square difference of thumbnails, [0, 1]
-  };
-
-  // Pictures [views][4][size][size] of one model; models count from 0 in the order of calls.
-  void Add(std::span<const std::uint8_t> images, int views, int size);
-  // The first of ties. Needs at least one picture.
-  Match Nearest(std::span<const std::uint8_t> image, int size) const;
-  std::size_t size() const { return entries_.size(); }
-
- private:
-  struct Entry {
-    int model, view;
-  };
-  std::vector<Entry> entries_;
-  std::vector<std::uint8_t> thumbnails_;
-  int models_ = 0;
-};
-
-// The best prediction that ignores the image: the mean shape of the training models.
-
-struct SingleShape {
-  std::vector<std::uint8_t> occupancy;  // in the layout of the grids
-  double threshold = 0;                 // a voxel is solid if this share of the grids has it
-  double mean_iou = 0;                  // over the grids
-};
-
-// Uses the threshold k/256 with the best mean IoU over `grids`, which have one size and hold 0 or
-// 1; the lowest of ties. At least one grid.
-SingleShape BestSingleShape(std::span<const std::vector<std::uint8_t>> grids);
-
-// The faces between solid and empty voxels of [n][n][n] as a closed mesh in voxel units, outside
-// counter-clockwise. The squares share no vertices.
-Mesh VoxelSurface(std::span<const std::uint8_t> occupancy, int n);
-
-// Thumbnails of a run's training pictures, in its folder: other pictures can be compared with them
-// without the dataset.
-//
-//   <run>/thumbnails.npz    written when training starts, some 3 MB; runs of earlier versions have
-//                           none
 
 // The most thumbnails kept, spread evenly over all: 8 MB before compression.
 inline constexpr std::size_t kMostThumbnails = 8192;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The critics' real pictures: unlit training objects in a few fixed views, so that generated
-// objects must have the pose of training objects. A pure function of (seed, place in the run).
+// What critics see as real: pictures of training objects, and texture maps extracted from pictures.
 #pragma once
 
 #include <array>
@@ -34,6 +33,8 @@ struct ObjectViews {
 // their silhouettes in the front and side views, as if each object were at the origin.
 std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& rule);
 
+// Unlit training objects in a few fixed views, so that generated objects must have the pose of
+// training objects. A pure function of (seed, place in the run).
 class RealPictures {
  public:
   struct Job {
@@ -74,9 +75,8 @@ class RealPictures {
   NextBatch<ObjectViews> next_;  // last: ends before what it uses is destroyed
 };
 
-// Real data of the texture-map critic: the textures that the network of sections 5.2 and 5.3
-// extracts from pictures of the training objects. No others have the sphere's layout.
-
+// The textures that the network of sections 5.2 and 5.3 extracts from pictures of the training
+// objects: no other textures have the sphere's layout.
 class TextureBank {
  public:
   struct Job {

@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equation 16: compares images by the features of a network's layers,
-//
-//   L = mean over images of sum over layers i of |F^i(I) - F^i(I')|_1 / N_i,
-//
-// N_i the elements of layer i. With a pretrained network it is the perceptual loss, the equation's
-// first sum; with the critic in training it is discriminator feature matching, its second sum.
+// L1 losses of colours (equation 13) and of a network's features (equation 16).
 #pragma once
 
 #include <algorithm>
@@ -18,22 +13,8 @@
 
 namespace tilegrad::train {
 
-// images [n, 3, h, w], RGB over black in [0, 1] -> the output of each layer, [n, ..]. Perceptual
-// networks come from LoadPerceptualNetwork (tasks/classify/perceptual_network.h).
-using FeatureFunction = std::function<std::vector<nn::Var>(const nn::Var& images)>;
-
-// `predicted` and `truth` are of one shape. A scalar with a gradient with respect to `predicted`;
-// the features of the truth are constants. The network's own weights stay fixed: the optimiser of
-// `predicted` does not ask for their gradients.
-nn::Var FeatureL1Loss(const FeatureFunction& features, const nn::Var& predicted,
-                      const nn::Tensor& truth);
-
-// The levels of a critic without its scores, which the adversarial loss uses. The critic must
-// outlive the function.
-FeatureFunction FeaturesOf(nn::Critic& critic);
-
-// Equation 13: the L1 loss of colours. As in the official code: the sum over channels of the mean
-// over pixels and images of |I - I'|, which is three times a plain mean for RGB.
+// Equation 13 as in the official code: the sum over channels of the mean over pixels and images of
+// |I - I'|, which is three times a plain mean for RGB.
 
 // Sum of |a - b| of one image, in double and in order.
 template <class T>
@@ -83,5 +64,26 @@ void HuberDifferenceBackward(std::span<const T> truth, std::span<const T> predic
 }
 // soft > 0, in units of colours.
 nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft);
+
+// Equation 16: images compared by the features of a network's layers,
+//
+//   L = mean over images of sum over layers i of |F^i(I) - F^i(I')|_1 / N_i,
+//
+// N_i the elements of layer i. With a pretrained network it is the perceptual loss, the equation's
+// first sum; with the critic in training it is discriminator feature matching, its second sum.
+
+// images [n, 3, h, w], RGB over black in [0, 1] -> the output of each layer, [n, ..]. Perceptual
+// networks come from LoadPerceptualNetwork (tasks/classify/perceptual_network.h).
+using FeatureFunction = std::function<std::vector<nn::Var>(const nn::Var& images)>;
+
+// `predicted` and `truth` are of one shape. A scalar with a gradient with respect to `predicted`;
+// the features of the truth are constants. The network's own weights stay fixed: the optimiser of
+// `predicted` does not ask for their gradients.
+nn::Var FeatureL1Loss(const FeatureFunction& features, const nn::Var& predicted,
+                      const nn::Tensor& truth);
+
+// The levels of a critic without its scores, which the adversarial loss uses. The critic must
+// outlive the function.
+FeatureFunction FeaturesOf(nn::Critic& critic);
 
 }  // namespace tilegrad::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/gan/real_pictures.h"
+#include "train/tasks/gan/real_samples.h"
 
 #include <algorithm>
 #include <memory>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras of weak perspective (scene/weak_perspective.h) on the tape: rows of seven numbers, scale,
-// x, y and a quaternion (w, x, y, z) of any length > 0, in image units of [-1, 1], x right, y down.
+// Differentiable operations on cameras, and on lights given in their axes.
+//
+// A camera of weak perspective (scene/weak_perspective.h) is a row of seven numbers: scale, x, y
+// and a quaternion (w, x, y, z) of any length > 0, in image units of [-1, 1], x right, y down.
 #pragma once
 
 #include <span>
@@ -36,8 +38,7 @@ Camera PinholeIn(const WeakPerspective& camera, int size);
 // [B, 7] without gradient.
 nn::Tensor CameraRows(nn::Context& context, std::span<const WeakPerspective> cameras);
 
-// Rotates light from camera axes, which networks use, to world axes, which the renderer uses.
-
+// Light from camera axes, which networks use, to world axes, which the renderer uses.
 // [N,3] -> [N,3]: R^T d with the rotation R of each image's camera.
 nn::Var DirectionsToWorld(const nn::Var& directions, std::span<const Camera> cameras);
 // [N,9] -> [N,9], as scene/light_frame.h.

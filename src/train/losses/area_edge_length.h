@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The area of a mesh's surface. A face with n = (b - a) x (c - a) has the area |n| / 2, and
-// dA/da = n / |n| x (c - b) / 2, and cyclically for b and c.
+// Regularisers of a mesh's area and of its edge lengths.
+//
+// A face with n = (b - a) x (c - a) has the area |n| / 2, and dA/da = n / |n| x (c - b) / 2, and
+// cyclically for b and c. Edge lengths: their variance over the square of their mean,
+// n sum l^2 / (sum l)^2 - 1, is 0 if all are equal; independent of the mesh's size, so it never
+// shrinks it.
 #pragma once
 
 #include <cmath>
@@ -47,10 +51,6 @@ inline double SurfaceArea(std::span<const Face> faces, std::span<const float> p)
 
 // positions: [B, V, 3]. A scalar, the mean over the batch.
 nn::Var AreaLoss(const nn::Var& positions, std::span<const Face> faces);
-
-// The edge-length regulariser: the variance of the lengths of a mesh's edges over the square of
-// their mean, n sum l^2 / (sum l)^2 - 1. 0 if all are equal; independent of the mesh's size, so it
-// never shrinks it.
 
 // Over all edges; in double, because the loss is the small difference of their quotient from 1.
 struct EdgeSums {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/eval/class_means.h"
+#include "train/eval/statistics.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Averages scores of models over the models of a shape (ShapeOf), over the shapes of a class, and
-// over classes.
+// Statistics of scores: means over classes, their standard errors, and paired differences between
+// runs.
 #pragma once
 
 #include <map>
@@ -16,6 +16,8 @@
 
 namespace tilegrad::train {
 
+// Averages scores of models over the models of a shape (ShapeOf), over the shapes of a class, and
+// over classes.
 class ClassMeans {
  public:
   // `models`: indices into the dataset's.
@@ -32,8 +34,7 @@ class ClassMeans {
   std::vector<int> class_models_;
 };
 
-// The sampling error of means over held-out models.
-
+// A mean over held-out models with its sampling error.
 struct ClassedMean {
   double mean = 0;              // over classes of means over shapes
   std::optional<double> error;  // its standard error; none: no class has two shapes
@@ -50,7 +51,6 @@ std::optional<Score> StandardErrors(std::span<const std::vector<Score>> classes)
 
 // Two runs on the same held-out models. Models differ far more than runs do, so the difference of
 // two means is known much better than either.
-
 struct PairedDifference {
   const ScoreMeasure* measure;
   ClassedMean difference;  // of the first run minus the second

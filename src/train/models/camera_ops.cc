@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/models/weak_cameras.h"
+#include "train/models/camera_ops.h"
 
 #include <algorithm>
 #include <cmath>

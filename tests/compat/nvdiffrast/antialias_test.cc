@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compat/nvdiffrast/antialias.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "compat/nvdiffrast/test_util.h"
+
+namespace tilegrad::compat::nvdiffrast::antialias_test {
+
+template <class T>
+AntialiasInput<T> InputOf(const Scene<T>& scene, const EdgeRings& rings, const Numbers<T>& rast,
+                          const Numbers<T>& color, std::size_t channels) {
+  return {{scene.positions, scene.vertices(), 4, scene.shared},
+          scene.faces,
+          &rings,
+          scene.grid(),
+          rast,
+          color,
+          channels};
+}
+
+template <class T>
+Numbers<T> Antialiased(const AntialiasInput<T>& input, const Workers& workers = Workers(1)) {
+  Numbers<T> out(input.color.size(), T(-7));
+  const Status status = Antialias<T>(input, workers, out);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return out;
+}
+
+// A quad whose sides are at the given places, in pixels of an image of 8 x 8.
+Scene<double> Rectangle(double left, double right, double bottom, double top) {
+  const auto at = [](double pixels) { return pixels / 4 - 1; };
+  Scene<double> out;
+  out.positions = {at(left),  at(bottom), 0, 1, at(right), at(bottom), 0, 1,
+                   at(right), at(top),    0, 1, at(left),  at(top),    0, 1};
+  out.faces = {0, 1, 2, 0, 2, 3};
+  return out;
+}
+
+// 1 where something is seen.
+Numbers<double> Coverage(const Numbers<double>& rast) {
+  Numbers<double> out;
+  for (std::size_t i = 3; i < rast.size(); i += 4) out.push_back(rast[i] > 0);
+  return out;
+}
+
+TEST(EdgeRings, GoAroundTheSidesOfEachEdge) {
+  // Two faces share (0, 2); three share (4, 5).
+  const std::vector<std::int32_t> faces = {0, 1, 2, 2, 3, 0, 4, 5, 6, 5, 4, 7, 8, 4, 5};
+  const EdgeRings rings = BuildEdgeRings(faces);
+  EXPECT_EQ(rings.next[2], 5);
+  EXPECT_EQ(rings.next[5], 2);
+  EXPECT_EQ(rings.next[0], 0);
+  EXPECT_EQ(rings.next[6], 9);
+  EXPECT_EQ(rings.next[9], 13);
+  EXPECT_EQ(rings.next[13], 6);
+}
+
+TEST(Antialias, SidesOfARectangleGetTheirShareOfThePixel) {
+  // Columns 2 to 5 and rows 2 to 5 are seen. Of column 1, 0.2 is covered; of column 6, 0.1; row 2
+  // lacks 0.4 below; row 5 reaches exactly to its upper border.
+  const Scene<double> scene = Rectangle(1.8, 6.1, 2.4, 6.0);
+  const auto rast = Rasterize(scene).rast;
+  const auto color = Coverage(rast);
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto at = [&](int x, int y) { return out[static_cast<std::size_t>(8 * y + x)]; };
+  for (int y = 3; y < 5; ++y) {
+    const double row[8] = {0, 0.2, 1, 1, 1, 1, 0.1, 0};
+    for (int x = 0; x < 8; ++x) EXPECT_NEAR(at(x, y), row[x], 1e-12) << x << "," << y;
+  }
+  for (int x = 3; x < 5; ++x) {
+    const double column[8] = {0, 0, 0.6, 1, 1, 1, 0, 0};
+    for (int y = 0; y < 8; ++y) EXPECT_NEAR(at(x, y), column[y], 1e-12) << x << "," << y;
+  }
+}
+
+TEST(Antialias, TheSumOfCoverageIsTheArea) {
+  // Of a disc: edges at all angles. The rule is exact along straight edges at any angle but for
+  // pixels at corners, of which there are 60, each off by less than 1/8.
+  constexpr int kSides = 60;
+  Scene<double> scene;
+  scene.height = scene.width = 100;
+  scene.positions = {0.013, 0.021, 0, 1};
+  double area = 0;
+  for (int i = 0; i < kSides; ++i) {
+    const double a = 2 * 3.14159265358979 * i / kSides;
+    for (const double v : {0.013 + 0.7 * std::cos(a), 0.021 + 0.7 * std::sin(a), 0.0, 1.0}) {
+      scene.positions.push_back(v);
+    }
+    scene.faces.insert(scene.faces.end(), {0, 1 + i, 1 + (i + 1) % kSides});
+    area += 0.5 * 35 * 35 * std::sin(2 * 3.14159265358979 / kSides);
+  }
+  const auto rast = Rasterize(scene).rast;
+  const auto color = Coverage(rast);
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  double sum = 0, before = 0;
+  for (const double v : out) sum += v;
+  for (const double v : color) before += v;
+  EXPECT_NEAR(sum, area, 2.0) << "point-sampled: " << before;
+}
+
+// Two triangles meet at x = 4.3 and fill the image. Sharing vertices they are one surface; in a
+// soup the left one ends there and reaches 0.3 into the pixels of column 4.
+TEST(Antialias, InASoupEveryEdgeIsASilhouette) {
+  const auto at = [](double x, double y) { return Numbers<double>{x / 4 - 1, y / 4 - 1, 0, 1}; };
+  const Numbers<double> corners[] = {at(4.3, -9), at(4.3, 17), at(-20, 4), at(30, 4)};
+  for (const bool soup : {false, true}) {
+    Scene<double> scene;
+    scene.faces = {0, 1, 2, 1, 0, 3};
+    std::vector<std::int32_t> vertices = {0, 1, 2, 3};
+    if (soup) vertices = std::exchange(scene.faces, {0, 1, 2, 3, 4, 5});
+    for (const auto v : vertices) {
+      const auto& corner = corners[v];
+      scene.positions.insert(scene.positions.end(), corner.begin(), corner.end());
+    }
+    const auto rast = Rasterize(scene).rast;
+    Numbers<double> color;
+    for (std::size_t i = 3; i < rast.size(); i += 4) color.push_back(rast[i]);
+    const EdgeRings rings = BuildEdgeRings(scene.faces);
+    const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+    for (std::size_t p = 0; p < 64; ++p) {
+      const double expected = p % 8 < 4 ? 1 : p % 8 > 4 || !soup ? 2 : 2 - 0.3;
+      EXPECT_NEAR(out[p], expected, 1e-12) << p;
+    }
+  }
+}
+
+// Faces that name a vertex twice lie on no side of their edges.
+TEST(Antialias, FacesWithoutAreaHideNoEdge) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Scene<double> scene = WavyGrid(2, seed, 24, 24);
+    const auto rast = Rasterize(scene).rast;
+    const auto color = RandomNumbers<double>(scene.grid().pixels(), 2);
+    const auto blend = [&] {
+      const EdgeRings rings = BuildEdgeRings(scene.faces);
+      return Antialiased(InputOf(scene, rings, rast, color, 1));
+    };
+    const auto expected = blend();
+    for (std::int32_t v = 0; v < 9; ++v) {
+      for (std::int32_t w = 0; w < 9; ++w)
+        scene.faces.insert(scene.faces.end(), {v, w, w, v, v, w});
+    }
+    EXPECT_EQ(blend(), expected) << seed;
+  }
+}
+
+TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
+  const Scene<double> scene = WavyGrid(3, 1, 24, 24);
+  const auto rast = Rasterize(scene).rast;
+  const auto color = RandomNumbers<double>(scene.grid().pixels(), 2);
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  std::size_t changed = 0, inside = 0;
+  for (int y = 1; y < 23; ++y) {
+    for (int x = 1; x < 23; ++x) {
+      const auto p = static_cast<std::size_t>(24 * y + x);
+      bool surrounded = true;
+      for (const std::size_t q : {p, p - 1, p + 1, p - 24, p + 24})
+        surrounded &= rast[4 * q + 3] > 0;
+      if (surrounded) {
+        EXPECT_EQ(out[p], color[p]) << x << "," << y;
+      }
+      inside += surrounded;
+      changed += out[p] != color[p];
+    }
+  }
+  EXPECT_GT(inside, 100u);
+  EXPECT_GT(changed, 30u);
+  // With corners of its own, every face is a silhouette on all sides.
+  Scene<double> loose = scene;
+  loose.positions.clear();
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const auto from = scene.positions.begin() + 4 * scene.faces[i];
+    loose.positions.insert(loose.positions.end(), from, from + 4);
+    loose.faces[i] = static_cast<std::int32_t>(i);
+  }
+  const EdgeRings own = BuildEdgeRings(loose.faces);
+  const auto all = Antialiased(InputOf(loose, own, rast, color, 1));
+  std::size_t more = 0;
+  for (std::size_t p = 0; p < all.size(); ++p) more += all[p] != color[p];
+  EXPECT_GT(more, changed + 50);
+}
+
+TEST(Antialias, AFoldIsASilhouetteBeforeAnotherSurface) {
+  // Two faces share the edge x = 3.3 pixels and both lie to its right, one behind the other; the
+  // background plane is farther away.
+  const double x = 3.3 / 4 - 1;
+  Scene<double> scene;
+  scene.positions = {x, -1, -0.5, 1,  x,   1, -0.5, 1,  9,   0, -0.5, 1,  9,   0,
+                     0, 1,  -9,   -9, 0.5, 1, 20,   -9, 0.5, 1, -9,   20, 0.5, 1};
+  scene.faces = {0, 2, 1, 0, 1, 3, 4, 5, 6};
+  const auto rast = Rasterize(scene).rast;
+  Numbers<double> color;
+  for (std::size_t i = 3; i < rast.size(); i += 4) color.push_back(rast[i] == 3 ? 10 : 20);
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  // Column 3, centre 3.5, shows the face and lacks 0.3.
+  EXPECT_NEAR(out[8 * 4 + 3], 20 - 0.3 * 10, 1e-12);
+  EXPECT_NEAR(out[8 * 4 + 2], 10, 1e-12);
+}
+
+TEST(Antialias, AnEdgeThatPassesTheEyeIsFollowed) {
+  // One end of the edge x = 0.3 is behind the eye.
+  Scene<double> scene;
+  scene.positions = {0.3, -0.9, 0, 1, -0.9, 9, 0, -3, -9, -1, 0, 1};
+  scene.faces = {0, 1, 2};
+  scene.height = scene.width = 20;
+  const auto rast = Rasterize(scene).rast;
+  const auto color = Coverage(rast);
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  // x/w = 0.3 is column 13, of which it covers nothing, at its left border.
+  std::size_t checked = 0;
+  for (std::size_t y = 0; y < 20; ++y) {
+    if (color[20 * y + 12] == 0) continue;
+    EXPECT_NEAR(out[20 * y + 12], 1, 1e-12);
+    EXPECT_NEAR(out[20 * y + 13], 0, 1e-12);
+    ++checked;
+  }
+  EXPECT_GT(checked, 3u);
+}
+
+}  // namespace tilegrad::compat::nvdiffrast::antialias_test
