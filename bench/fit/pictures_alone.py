@@ -23,7 +23,7 @@ import time
 from typing import Any
 
 import numpy as np
-from unmasked_captures import CAPTURES, Shots, make, run, silhouettes, true_masks
+from unmasked_captures import CAPTURES, Shots, make, run, silhouettes, tabulate, true_masks
 
 SHOTS = Shots(32, 640, 480)
 PLACED = re.compile(r"COLMAP placed (\d+) of \d+ images")
@@ -93,17 +93,12 @@ def main() -> int:
     options = parser.parse_args()
     lines = [f"| capture | placed, of {SHOTS.count} | cameras, degrees off | silhouettes, IoU | seconds |",
              "|---|--:|--:|--:|--:|"]
-    for capture in options.only.split(","):
-        folder = options.out / capture
-        if not (folder / "transforms.json").exists():
-            make(options.program, capture, folder, SHOTS)
-        record = folder / "row.json"
-        if not record.exists():
-            record.write_text(json.dumps(measure(options.program, folder, options.fit)))
-        row = json.loads(record.read_text())
-        lines.append("| {capture} | {placed} | {degrees:.2f} | {silhouettes:.1f} | {seconds:.0f} |".format(**row))
-        print(lines[-1], flush=True)
-    (options.out / "table.md").write_text("\n".join(lines) + "\n")
+    captures = options.only.split(",")
+    for capture in captures:
+        if not (options.out / capture / "transforms.json").exists():
+            make(options.program, capture, options.out / capture, SHOTS)
+    tabulate(options.out, captures, lambda folder: measure(options.program, folder, options.fit), lines,
+             "| {capture} | {placed} | {degrees:.2f} | {silhouettes:.1f} | {seconds:.0f} |")
     return 0
 
 

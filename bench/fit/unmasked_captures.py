@@ -22,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -233,6 +234,18 @@ def measure(program: str, folder: pathlib.Path, options: list[str]) -> dict[str,
             "fit_truth": silhouettes(program, folder / "fit_truth", truth, cameras)}
 
 
+def tabulate(out: pathlib.Path, captures: list[str], measure: Callable[[pathlib.Path], dict[str, Any]], lines: list[str],
+             row: str) -> None:
+    """Measures captures below `out` that have no row.json yet. Prints a row each, and writes table.md, which begins with `lines`."""
+    for capture in captures:
+        record = out / capture / "row.json"
+        if not record.exists():
+            record.write_text(json.dumps(measure(out / capture)))
+        lines.append(row.format(**json.loads(record.read_text())))
+        print(lines[-1], flush=True)
+    (out / "table.md").write_text("\n".join(lines) + "\n")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder to fill")
@@ -245,15 +258,9 @@ def main() -> int:
         folder = options.out / capture
         if not (folder / "transforms.json").exists():
             make(options.program, capture, folder)
-        if options.only_capture:
-            continue
-        record = folder / "row.json"
-        if not record.exists():
-            record.write_text(json.dumps(measure(options.program, folder, options.fit)))
-        row = json.loads(record.read_text())
-        lines.append("| {capture} | {masks:.1f} | {worst:.1f} | {fit:.1f} | {fit_truth:.1f} |".format(**row))
-        print(lines[-1], flush=True)
-    (options.out / "table.md").write_text("\n".join(lines) + "\n")
+    if not options.only_capture:
+        tabulate(options.out, list(CAPTURES), lambda folder: measure(options.program, folder, options.fit), lines,
+                 "| {capture} | {masks:.1f} | {worst:.1f} | {fit:.1f} | {fit_truth:.1f} |")
     return 0
 
 

@@ -3,9 +3,9 @@
 
 namespace tilegrad {
 
-// Gives the system what the heap holds of memory that was freed, where it otherwise stays with the
-// process: what one thread has allocated and another frees, and what lies between blocks in use. A
-// millisecond for each 100 MB.
+// Returns free heap memory to the system, including what malloc keeps otherwise: memory freed by
+// another thread than the one that allocated it, and gaps between live blocks. Takes a millisecond
+// per 100 MB.
 void ReturnFreeMemory();
 
 }  // namespace tilegrad

@@ -48,7 +48,7 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
         100 * train::MeanIou(scores));
 }
 
-// Where a wrong mask or camera would show.
+// The view in which a wrong mask or camera would show.
 void PrintWorst(const train::FitInput& input, const std::vector<train::ViewScore>& scores) {
   const auto worst = std::ranges::min_element(scores, {}, &train::ViewScore::iou);
   if (worst == scores.end()) return;
@@ -187,7 +187,7 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
   if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
 }
 
-// How sure the stages before the fit are, for people.
+// The confidence of the stages before the fit, for people.
 void PrintNotes(const train::FitInput& input) {
   if (CurrentVerbosity() != Verbosity::kFull) return;
   for (const std::string& note : input.notes) PrintNote("tilegrad: {}\n", note);

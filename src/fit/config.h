@@ -23,8 +23,8 @@ inline constexpr int kLeastHullViews = 4;
 // everywhere, and highlights.
 enum class MaterialKind { kUnlit, kLambert, kPhong };
 
-// Whether the texture is cut out, for wire and thin leaves (cutout.h). kAuto: where a fit
-// starts from a hull whose masks have many narrow gaps.
+// Whether the texture is cut out, for wire and thin leaves (cutout.h). kAuto: if the fit starts
+// from a hull and the masks have many narrow gaps.
 enum class Cutout { kOff, kAuto, kOn };
 
 struct FitConfig {

@@ -13,6 +13,7 @@
 #include "fit/texture_fill.h"
 #include "nn/context.h"
 #include "nn/optim.h"
+#include "render/picture/layers.h"
 #include "render/picture/mesh_scene.h"
 
 namespace tilegrad::train {

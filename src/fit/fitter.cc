@@ -7,7 +7,7 @@
 
 #include "base/array_checks.h"
 #include "base/error.h"
-#include "train/losses/area.h"
+#include "train/losses/area_edge_length.h"
 
 namespace tilegrad::train {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "train/losses/feature_l1.h"
 #include "train/losses/iou.h"
+#include "train/losses/l1.h"
 
 namespace tilegrad::train {
 namespace {

@@ -15,7 +15,7 @@ struct TargetImages {
   int width = 0, height = 0;
   AlignedVector<float> color;  // [N,3,H,W]
   AlignedVector<float> alpha;  // [N,H,W] in [0, 1]
-  // What silhouettes, and hulls, are held to, of the same shape; empty: alpha.
+  // The masks that silhouettes and hulls are fitted to, of the same shape; empty: alpha.
   AlignedVector<float> silhouette = {};
 
   const AlignedVector<float>& outline() const { return silhouette.empty() ? alpha : silhouette; }

@@ -36,8 +36,8 @@ struct FitInput {
   // else empty. In a world of their own.
   std::vector<Camera> given_cameras;
   std::vector<std::string> warnings;  // for people
-  std::vector<std::string> notes;     // for people, too: how sure each stage is of what it found
-  // The world of the cameras is one that COLMAP made for them, in which nothing is up.
+  std::vector<std::string> notes;     // for people, too: the confidence of each stage
+  // The cameras' world is COLMAP's own, which has no up.
   bool own_world = false;
   UpAxis up = UpAxis::kY;  // of the world that the input is from; in that of `cameras` it is y
 

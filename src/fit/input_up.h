@@ -10,8 +10,8 @@ namespace tilegrad::train {
 std::optional<UpAxis> GuessUp(std::span<const Camera> cameras);
 
 // Turns cameras that are given in a world with another axis up, so that meshes made with them have
-// y up, as glTF wants it: `up`, or where there is none what GuessUp finds, which a warning says. In
-// a world of its own, up is what it is for people who hold their cameras level (UpOf).
+// Turns the world y up, as in glTF, from `up` or, if that is not given, from GuessUp, with a
+// warning. In COLMAP's own world, up is the mean up of the cameras (UpOf).
 void TurnInputUpright(std::optional<UpAxis> up, FitInput* input);
 
 }  // namespace tilegrad::train

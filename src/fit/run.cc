@@ -47,7 +47,7 @@ class SoftTargets {
 
 SoftTargets::SoftTargets(TargetImages images, const Workers& workers)
     : images_(std::move(images)), distances_(images_.alpha.size() / images_.pixels()) {
-  if (images_.silhouette.empty()) images_.silhouette = images_.alpha;
+  images_.silhouette = AlignedVector<float>(images_.outline());
   workers.For(distances_.size(), [&](std::size_t v, std::size_t) {
     const std::size_t plane = images_.pixels();
     distances_[v] = DistanceOf(std::span(images_.silhouette).subspan(v * plane, plane),

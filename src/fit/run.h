@@ -63,7 +63,7 @@ struct FitStart {
   FitConfig config;  // the job's, settled
   std::string note;  // why it is not what one would expect, or empty
 };
-// Whether it is the visual hull, if masks have one and do not leave its distance in doubt.
+// Whether a fit starts from the visual hull, unless masks leave the object's distance in doubt.
 bool MayStartFromHull(const FitJob& job);
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch = {});
 // Whether the configuration can be fitted to the input, as far as that is seen at once.
@@ -81,9 +81,7 @@ TermLabels FitLabels();
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,
                               const ImageU8& sheet);
 
-// What a fit leaves behind when it is over.
-
-// The scene at the end, its scores and what is written of both.
+// Scores the scene at the end of a fit, and writes its files.
 class FitResult {
  public:
   FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers,

@@ -17,7 +17,7 @@ namespace tilegrad::train {
 
 // The mean of max(0, cos) over all directions is a quarter.
 inline constexpr float kDirectionsPerMean = 4;
-inline constexpr float kCutoff = 0.5f;  // alpha of a texture that is cut out
+inline constexpr float kCutoff = 0.5f;  // glTF's default alphaCutoff
 
 // V vertices, F faces, U texture coordinates. What is empty is not there.
 struct FitScene {
@@ -27,8 +27,8 @@ struct FitScene {
   std::vector<float> uvs;                // [U,2]
   std::vector<std::int32_t> uv_indices;  // [F,3]: corners that share one move together
   Image texture;                         // of 3 channels
-  // [height,width] of the texture: alpha of its texels, where it is cut out; what has less than
-  // kCutoff is not there. The tape does not see it (cutout.h).
+  // [height,width] of a cut-out texture: the alpha of its texels, transparent below kCutoff; empty:
+  // opaque. Not on the tape (cutout.h).
   std::vector<float> cutout;
   Filter filter = Filter::kBilinear;
   Wrap wrap = Wrap::kRepeat;

@@ -22,9 +22,9 @@ namespace {
 
 constexpr float kGrey = 0.5f;                 // what is to be coloured
 constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
-// Pixels of mean thickness below which the area pulls hardest on what a hull consists of: tables,
-// taps and leaves have 2 to 4. Chairs and lamps of sheet metal have 6 to 19, sofas and cabinets
-// more, and lose 0 to 2 points of IoU with the lesser weight.
+// Hulls with a mean thickness below kThinPixels get the smaller weight, since the area's pull
+// removes thin parts first. Tables, taps and leaves have 2 to 4 pixels; chairs and lamps of sheet
+// metal 6 to 19, sofas and cabinets more, and these lose 0 to 2 points of IoU with it.
 constexpr double kThinPixels = 5, kThinArea = 0.05;
 
 Status CheckConfig(const FitConfig& config) {
@@ -87,25 +87,11 @@ struct Origin {
   std::string note;  // what is in doubt, and why there is no hull where one was tried
 };
 
-// With the outlines that shapes are held to for masks.
-FitInput OutlinedInput(const FitInput& input) {
-  FitInput out = input;
-  out.images.alpha = input.images.outline();
-  return out;
-}
-
-Result<Mesh> HullOf(const FitJob& job, const HullOptions& options, const Workers& workers,
-                    const Watch& watch, HullTraits* traits) {
-  if (job.input.images.silhouette.empty())
-    return HullMesh(job.input, options, workers, watch, traits);
-  return HullMesh(OutlinedInput(job.input), options, workers, watch, traits);
-}
-
 Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watch& watch,
                            Origin* origin) {
   HullOptions options;
   options.carve.tolerance = job.config.mask_tolerance;
-  TILEGRAD_ASSIGN(Mesh mesh, HullOf(job, options, workers, watch, &origin->traits));
+  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers, watch, &origin->traits));
   int size = job.config.texture_size;
   if (!job.config.vertex_colors) {
     TILEGRAD_TRY(watch.At({"placing the texture", 0, 0, ""}));

@@ -16,7 +16,7 @@ struct PngChunk {
   std::span<const std::uint8_t> data;
 };
 
-// Ends behind IEND, and before a chunk that does not lie in the file. No checksum is looked at.
+// Iterates over chunks up to IEND; stops early at a chunk that exceeds the file. Ignores checksums.
 class PngChunks {
  public:
   // `bytes` begin with a PNG's signature (IsPng).

@@ -38,21 +38,21 @@ class Context {
   KernelContext kernels() { return {workers(), here().scratch}; }
   DType dtype() const { return dtype_; }
 
-  // Divides the workers into min(most, workers().count()) groups, each of a lane; with one there
-  // are no lanes. Once, before any PerLane is made.
+  // Divides the workers into min(most, workers().count()) groups with a lane each; a single group
+  // makes no lanes. Call once, before constructing any PerLane.
   void MakeLanes(std::size_t most);
-  // As many as groups: 1 without lanes.
+  // The number of groups; 1 without lanes.
   std::size_t lanes() const { return groups_ ? groups_->count() : 1; }
-  // Calls task(i) for each lane, i in [0, lanes()), side by side and within that lane; without
-  // lanes task(0), where it is. What a lane allocates may leave it, graphs and StepVectors may not.
+  // Calls task(i) for i in [0, lanes()), concurrently, each in its lane; without lanes calls
+  // task(0) outside. Tensors may outlive their lane's task, graphs and StepVectors must not.
   void ForEachLane(FunctionRef<void(std::size_t i)> task, LoopSite site = LoopSite::Here());
-  // The lane that the calling thread is in: i + 1, or 0 outside of lanes.
+  // The calling thread's lane: i + 1, or 0 outside lanes.
   std::size_t lane() const;
-  // Of its workers, the number of the first among all.
+  // The index among all workers of the first worker here.
   std::size_t first_worker() const { return lane() == 0 ? 0 : groups_->first(lane() - 1); }
-  // Lanes have copies of these, of any contents: what every lane writes.
+  // Gives each lane an uninitialised copy of tensors that every lane writes.
   void CopyForLanes(const std::vector<NamedTensor>& tensors);
-  // In a lane its copy of a tensor, if it has one; else the tensor.
+  // The lane's copy of a tensor, if it has one; else the tensor itself.
   Tensor InLane(const Tensor& tensor) const;
 
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
@@ -85,7 +85,7 @@ class Context {
     const std::byte* of;  // the storage
     Tensor tensor;
   };
-  // What computations of one thread need.
+  // The state of one computing thread.
   struct Lane {
     explicit Lane(const Workers& workers);
     const Workers* workers;
@@ -101,7 +101,7 @@ class Context {
 
   DType dtype_;
   std::optional<WorkerGroups> groups_;
-  std::vector<std::unique_ptr<Lane>> lanes_;  // the first: outside of lanes
+  std::vector<std::unique_ptr<Lane>> lanes_;  // the first: outside lanes
 };
 
 // Sets whether operations record their derivatives, for a scope.

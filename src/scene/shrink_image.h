@@ -5,8 +5,8 @@
 
 namespace tilegrad {
 
-// The mean of the pixels behind each of an image that has at most `side` pixels a side; the same
-// image if it has them already.
+// Box-filters an image down to at most `side` pixels a side; an image that fits is returned as it
+// is.
 ImageU8 ShrunkImage(const ImageU8& image, int side);
 
 }  // namespace tilegrad

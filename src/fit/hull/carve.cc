@@ -64,7 +64,7 @@ class Carver {
       const auto v = static_cast<std::size_t>(input.training[i]);
       const std::size_t plane = input.images.pixels();
       views_[i] = {input.cameras[v],
-                   DistanceOf(std::span(input.images.alpha).subspan(v * plane, plane),
+                   DistanceOf(std::span(input.images.outline()).subspan(v * plane, plane),
                               input.images.width, input.images.height)};
     });
   }

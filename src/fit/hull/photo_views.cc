@@ -92,7 +92,7 @@ PhotoViews::PhotoViews(const FitInput& input, const ScalarGrid& solid, const Wor
     view.camera = Scaled(input.cameras[v], factor);
     view.eye = CameraCentre(view.camera);
     view.color = std::span(images_.color).subspan(3 * v * plane, 3 * plane);
-    view.alpha = std::span(images_.alpha).subspan(v * plane, plane);
+    view.alpha = std::span(images_.outline()).subspan(v * plane, plane);
     view.depth.assign(plane, HUGE_VALF);
     for (std::uint32_t p = 0; p < plane; ++p)
       if (view.alpha[p] > 0.5f) view.depth[p] = March(view, p, 0, solid);

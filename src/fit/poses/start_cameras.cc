@@ -12,10 +12,10 @@ namespace {
 
 // Of the steps; the best of a few on a van and a cat whose cameras were 2 degrees off.
 constexpr double kCamerasRest = 0.4;
-// Between a direction and the nearest camera: in two rings of twelve it is 25.
+// Degrees between a direction and the nearest camera. Two rings of twelve cameras leave 25.
 constexpr double kWideGap = 30;
 
-// What one more picture would tell. Says nothing where masks do not tell where the object is.
+// Nothing to note where masks do not locate the object.
 void NoteWidestGap(FitInput* input) {
   const auto sphere = GuessSphere(*input);
   if (!sphere.ok()) return;

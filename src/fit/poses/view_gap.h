@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where one more picture would tell most: the direction that is furthest from all cameras.
+// Where one more picture would help most: the direction farthest from all cameras.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,16 +10,17 @@
 
 namespace tilegrad::train {
 
-// A direction from the object, beside the camera that is nearest to it.
+// A direction from the object, relative to the nearest camera.
 struct ViewGap {
   std::size_t nearest = 0;  // index of that camera
-  double degrees = 0;       // between the two, seen from the object
-  // The way from the camera there: around the object to the photographer's right, and upwards.
+  double degrees = 0;       // angle between the two at the object
+  // From the camera to the direction: around the object to the photographer's right, and upwards.
   double right = 0, up = 0;  // degrees
 };
 
-// Of directions from the object's `middle`, every 5 degrees around and from level to 60 above, the
-// one with the largest gap. At least one camera; people hold them level on the whole.
+// The direction from the object's `middle` with the largest gap, of those every 5 degrees around
+// and from level to 60 degrees above. Needs at least one camera. Up is the cameras' mean up,
+// because people hold them level on the whole.
 ViewGap WidestGap(std::span<const Camera> cameras, glm::vec3 middle);
 
 // "about 40 degrees to the right of NAME and 20 higher"

@@ -19,12 +19,12 @@
 
 namespace tilegrad::train {
 
-// Means of gradients and running statistics. The portions of this process are shared by the lanes
-// of its context as those of a run are by ranks: each lane sums its own as they come, then the
-// sums of lanes are added, in the order of the tree. Those of other ranks travel meanwhile: during
-// the last portion's backward pass where there is one lane, else once lanes have ended. Without
-// other ranks a gradient that is a product stays one: the factors of all portions are stacked, and
-// Adam sums products where it uses them.
+// Means of gradients and running statistics. Lanes of the context divide the portions of this
+// process as ranks divide those of a run: each lane sums its own portions, then the lanes' sums are
+// added, all in the order of the tree. The exchange with other ranks overlaps the last portion's
+// backward pass with one lane, and starts after the lanes have ended with several. Without other
+// ranks a gradient that is a product stays one: the factors of all portions are stacked, and Adam
+// sums products where it uses them.
 class GradientSums {
  public:
   struct Shape {
@@ -38,17 +38,17 @@ class GradientSums {
   GradientSums(const GradientSums&) = delete;
   GradientSums& operator=(const GradientSums&) = delete;
 
-  // How many lanes can have portions of this rank.
+  // The most lanes that have portions of this rank.
   static std::size_t MostLanes(const Shape& shape);
 
   // The portions of a lane, and their sums.
   class Lane : public nn::GradientListener {
    public:
     Lane(GradientSums& all, std::vector<Subtree> subtrees);
-    // Ascending. Every update takes all of them in this order, within the lane: BeginPortion, a
-    // backward pass that listener() listens to, EndPortion.
+    // Ascending. Every update runs, in the lane and for each of them in this order, BeginPortion, a
+    // backward pass with listener(), and EndPortion.
     const std::vector<std::int64_t>& portions() const { return portions_; }
-    // This with other ranks, else null: then nothing is gained by hearing of gradients early.
+    // This object with other ranks; null without, when early gradients are of no use.
     nn::GradientListener* listener() { return all_.exchange_ ? this : nullptr; }
     void BeginPortion(std::size_t i);  // of portions(): statistics are as the update found them
     void Begin(std::span<const nn::Var> parameters) override;

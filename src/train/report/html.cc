@@ -17,8 +17,13 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kPlotWidth = 720, kPlotHeight = 440, kPlotLeft = 80, kPlotTop = 24,
-                 kPlotRight = 250, kPlotBottom = 56;
+// Pixels: the picture, and the margins for labels, of which the right one holds the key.
+constexpr double kPlotWidth = 720;
+constexpr double kPlotHeight = 440;
+constexpr double kPlotLeft = 80;
+constexpr double kPlotTop = 24;
+constexpr double kPlotRight = 250;
+constexpr double kPlotBottom = 56;
 constexpr std::array kPlotColors = {"#0b6a9a", "#c2571a", "#3a7d44", "#7b4ea3",
                                     "#9a7d0a", "#a31f34", "#2a9d8f", "#555555"};
 
