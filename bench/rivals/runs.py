@@ -47,7 +47,7 @@ def row_of(found: dict[str, Any], method: str) -> dict[str, Any]:
 
 
 def mean_over_classes(classes: Iterable[list[float]]) -> tuple[float, float]:
-    """Mean of means and its standard error, as src/train/eval/class_means.h has them."""
+    """Mean of means and its standard error, as src/train/eval/statistics.h has them."""
     known = [numbers for numbers in classes if numbers]
     means = [statistics.fmean(numbers) for numbers in known]
     squares = sum((x - mean) ** 2 for numbers, mean in zip(known, means) for x in numbers)

@@ -4,7 +4,7 @@
 
 #include "bindings/calls.h"
 #include "scene/topology.h"
-#include "train/losses/area.h"
+#include "train/losses/area_edge_length.h"
 #include "train/losses/iou.h"
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
