@@ -30,6 +30,17 @@ Status CheckFaceIds(std::span<const T> rast, std::size_t faces) {
 template Status CheckFaceIds(std::span<const float>, std::size_t);
 template Status CheckFaceIds(std::span<const double>, std::size_t);
 
+template <class T>
+Status CheckNoPixel(std::span<const std::size_t> bad, std::span<const T> rast, std::size_t faces) {
+  for (const std::size_t pixel : bad) {
+    if (pixel == kNoPixel) continue;
+    return NoSuchFace(pixel, static_cast<double>(rast[4 * pixel + 3]), faces);
+  }
+  return {};
+}
+template Status CheckNoPixel(std::span<const std::size_t>, std::span<const float>, std::size_t);
+template Status CheckNoPixel(std::span<const std::size_t>, std::span<const double>, std::size_t);
+
 BandSums::BandSums(std::size_t rows, std::size_t channels, std::size_t bands,
                    const Workers& workers)
     : rows_(rows),

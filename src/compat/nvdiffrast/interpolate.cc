@@ -59,11 +59,7 @@ Status ForBands(const InterpolateInput<float>& input, const Workers& workers, co
   workers.For(bad.size(), [&](std::size_t index, std::size_t worker) {
     bad[index] = work(InterpolateTask{input, sloped.rows, input.grid.band(index)}, worker);
   });
-  for (const std::size_t pixel : bad) {
-    if (pixel == kNoPixel) continue;
-    return NoSuchFace(pixel, double{input.rast[4 * pixel + 3]}, input.faces.size() / 3);
-  }
-  return {};
+  return CheckNoPixel<float>(bad, input.rast, input.faces.size() / 3);
 }
 
 // Distributes the sums of a band's faces to the rows of their corners.

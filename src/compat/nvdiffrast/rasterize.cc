@@ -10,6 +10,7 @@
 #include "base/aligned.h"
 #include "base/error.h"
 #include "base/inline_vector.h"
+#include "compat/nvdiffrast/barycentrics.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 #include "raster/bin.h"
@@ -253,16 +254,14 @@ template void MakeClipScreen(const VertexRows<float>&, FaceList, const FaceRange
 template void MakeClipScreen(const VertexRows<double>&, FaceList, const FaceRange&, std::size_t,
                              const PixelGrid&, ClipScreen*);
 
-template <class T>
-void WritePixel(const Barycentrics<double>& b, std::int32_t face, T* rast, T* rast_db) {
-  const double u = std::clamp(b.u, 0.0, 1.0);
-  rast[0] = static_cast<T>(u);
-  rast[1] = static_cast<T>(std::clamp(b.v, 0.0, 1.0 - u));
-  rast[2] = static_cast<T>(std::clamp(b.depth, -1.0, 1.0));
-  rast[3] = static_cast<T>(face + 1);
+void WritePixel(const Barycentrics<double>& b, std::int32_t face, double* rast, double* rast_db) {
+  rast[0] = std::clamp(b.u, 0.0, 1.0);
+  rast[1] = std::clamp(b.v, 0.0, 1.0 - rast[0]);
+  rast[2] = std::clamp(b.depth, -1.0, 1.0);
+  rast[3] = face + 1;
   if (rast_db == nullptr) return;
   const double slopes[4] = {b.du_dx, b.du_dy, b.dv_dx, b.dv_dy};
-  for (int i = 0; i < 4; ++i) rast_db[i] = static_cast<T>(slopes[i]);
+  std::copy(slopes, slopes + 4, rast_db);
 }
 
 // An image prepared for its bins.
@@ -288,6 +287,40 @@ void Prepare(const RasterizeInput<T>& input, std::size_t image, const Workers* w
                         &out->lists, workers);
 }
 
+// A call of Rasterizer::Run.
+template <class T>
+struct Drawing {
+  const RasterizeInput<T>& input;
+  const RasterizeOutput<T>& out;
+  PixelCentres centres;
+
+  Drawing(const RasterizeInput<T>& in, const RasterizeOutput<T>& to)
+      : input(in), out(to), centres(in.grid) {}
+};
+
+void WriteRow(const Drawing<float>& drawing, const BinRow& row) {
+  WriteBarycentrics(drawing.input, drawing.centres, row, drawing.out);
+}
+
+void WriteRow(const Drawing<double>& drawing, const BinRow& row) {
+  const RasterizeInput<double>& input = drawing.input;
+  const RasterizeOutput<double>& out = drawing.out;
+  const PixelSize size = SizeOf(input.grid);
+  LastFace corners(input, row.image);
+  std::size_t at = 4 * (input.grid.first(row.image, row.y) + static_cast<std::size_t>(row.x));
+  for (std::size_t i = 0; i < row.count; ++i, at += 4) {
+    double* rast = &out.rast[at];
+    double* rast_db = out.rast_db.empty() ? nullptr : &out.rast_db[at];
+    if (row.faces[i] == raster::kNoFace) {
+      std::fill(rast, rast + 4, 0.0);
+      if (rast_db != nullptr) std::fill(rast_db, rast_db + 4, 0.0);
+      continue;
+    }
+    const PixelCentre centre = CentreOf(input.grid, row.x + static_cast<int>(i), row.y);
+    WritePixel(BarycentricsAt(corners(row.faces[i]), centre, size), row.faces[i], rast, rast_db);
+  }
+}
+
 // A bin of an image: its visible faces and position.
 struct DrawnBin {
   std::size_t image;
@@ -297,26 +330,24 @@ struct DrawnBin {
 };
 
 template <class T>
-void WriteBin(const RasterizeInput<T>& input, const DrawnBin& bin, const RasterizeOutput<T>& out) {
-  const PixelSize size = SizeOf(input.grid);
-  LastFace<T> corners(input, bin.image);
-  for (int y = bin.rect.y0; y < bin.rect.y1; ++y) {
-    const std::size_t row = input.grid.first(bin.image, y);
-    for (int x = bin.rect.x0; x < bin.rect.x1; ++x) {
-      const std::size_t pixel = row + static_cast<std::size_t>(x);
-      const int at = (y - bin.rect.y0) * raster::kBinSize + x - bin.rect.x0;
-      T* rast = &out.rast[4 * pixel];
-      T* rast_db = out.rast_db.empty() ? nullptr : &out.rast_db[4 * pixel];
-      if (!out.peeled.empty()) out.peeled[pixel] = bin.seen.inverse_depth[at];
-      if (bin.seen.face[at] == raster::kNoFace) {
-        std::fill(rast, rast + 4, T(0));
-        if (rast_db != nullptr) std::fill(rast_db, rast_db + 4, T(0));
-        continue;
-      }
-      const std::int32_t face = bin.mesh.source_face[static_cast<std::size_t>(bin.seen.face[at])];
-      WritePixel(BarycentricsAt(corners(face), CentreOf(input.grid, x, y), size), face, rast,
-                 rast_db);
+void WriteBin(const Drawing<T>& drawing, const DrawnBin& bin) {
+  const raster::PixelRect& rect = bin.rect;
+  const auto count = static_cast<std::size_t>(rect.x1 - rect.x0);
+  std::int32_t faces[raster::kBinSize];
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    const int first = (y - rect.y0) * raster::kBinSize;
+    for (int x = 0; x < raster::kBinSize; ++x) {
+      const std::int32_t face = bin.seen.face[first + x];
+      faces[x] = face == raster::kNoFace ? raster::kNoFace
+                                         : bin.mesh.source_face[static_cast<std::size_t>(face)];
     }
+    WriteRow(drawing, {bin.image, rect.x0, y, count, faces});
+    if (drawing.out.peeled.empty()) continue;
+    const float* depth = bin.seen.inverse_depth + first;
+    std::copy(
+        depth, depth + count,
+        &drawing.out
+             .peeled[drawing.input.grid.first(bin.image, y) + static_cast<std::size_t>(rect.x0)]);
   }
 }
 
@@ -337,18 +368,19 @@ void LoadPeeled(const float* peeled, std::size_t row, const raster::PixelRect& r
 }
 
 template <class T>
-void DrawBin(const RasterizeInput<T>& input, const PreparedImage& image, std::size_t n,
-             std::size_t bin, BinScratch* scratch, const RasterizeOutput<T>& out) {
-  const raster::PixelRect rect = raster::BinGrid(input.grid.width, input.grid.height).rect(bin);
+void DrawBin(const Drawing<T>& drawing, const PreparedImage& image, std::size_t n, std::size_t bin,
+             BinScratch* scratch) {
+  const PixelGrid& grid = drawing.input.grid;
+  const raster::PixelRect rect = raster::BinGrid(grid.width, grid.height).rect(bin);
   const raster::ScreenMesh mesh = image.screen.mesh.View();
   const raster::BinDrawList list{image.drawn.storage, image.lists.View()[bin]};
-  if (out.peeled.empty()) {
+  if (drawing.out.peeled.empty()) {
     raster::ComputeVisibility(mesh, list, rect, &scratch->seen);
   } else {
-    LoadPeeled(&out.peeled[input.grid.first(n, 0)], input.grid.row(), rect, scratch->behind);
+    LoadPeeled(&drawing.out.peeled[grid.first(n, 0)], grid.row(), rect, scratch->behind);
     raster::PeelVisibility(mesh, list, rect, scratch->behind, &scratch->seen);
   }
-  WriteBin(input, {n, rect, mesh, scratch->seen}, out);
+  WriteBin(drawing, {n, rect, mesh, scratch->seen});
 }
 
 }  // namespace
@@ -377,10 +409,11 @@ Status Rasterizer::Run(const RasterizeInput<T>& input, const Workers& workers,
   } else {
     workers.For(n, [&](std::size_t i, std::size_t) { Prepare(input, i, nullptr, &images[i]); });
   }
+  const Drawing<T> drawing(input, out);
   const std::size_t count = raster::BinGrid(input.grid.width, input.grid.height).cells();
   workers.For(n * count, [&](std::size_t task, std::size_t worker) {
     const std::size_t image = task / count;
-    DrawBin(input, images[image], image, task % count, bins[worker].get(), out);
+    DrawBin(drawing, images[image], image, task % count, bins[worker].get());
   });
   return {};
 }

@@ -1,31 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <vector>
 
 #include "base/error.h"
+#include "compat/nvdiffrast/barycentrics.h"
 #include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
 
-template <class T>
-BarycentricsCotangent<double> CotangentAt(const RasterizeCotangents<T>& all, std::size_t pixel) {
+BarycentricsCotangent<double> CotangentAt(const RasterizeCotangents<double>& all,
+                                          std::size_t pixel) {
   BarycentricsCotangent<double> out{};
   if (!all.d_rast.empty()) {
-    out.d_u = static_cast<double>(all.d_rast[4 * pixel]);
-    out.d_v = static_cast<double>(all.d_rast[4 * pixel + 1]);
+    out.d_u = all.d_rast[4 * pixel];
+    out.d_v = all.d_rast[4 * pixel + 1];
   }
   for (std::size_t i = 0; i < 4 && !all.d_rast_db.empty(); ++i) {
-    out.d_slopes[i] = static_cast<double>(all.d_rast_db[4 * pixel + i]);
+    out.d_slopes[i] = all.d_rast_db[4 * pixel + i];
   }
   return out;
 }
 
 // Sums gradients on the current face before adding them to the face's vertices.
-template <class T>
 class FacePull {
  public:
-  FacePull(const RasterizeInput<T>& input, std::size_t image, BandSums::Adder* adder)
+  FacePull(const RasterizeInput<double>& input, std::size_t image, BandSums::Adder* adder)
       : input_(input), image_(image), adder_(adder) {}
   ~FacePull() { Flush(); }
 
@@ -50,28 +51,38 @@ class FacePull {
     sum_ = {};
   }
 
-  const RasterizeInput<T>& input_;
+  const RasterizeInput<double>& input_;
   std::size_t image_;
   BandSums::Adder* adder_;
   std::int32_t face_ = raster::kNoFace;
   ClipCorners<double> sum_{};
 };
 
-template <class T>
-void PullBand(const RasterizeInput<T>& input, const RasterizeCotangents<T>& cotangents,
-              const Band& band, BandSums::Adder* adder) {
+// Both return the first pixel with a face that does not exist, or kNoPixel.
+std::size_t PullBand(const RasterizeInput<float>& input, const PixelCentres& centres,
+                     const RasterizeCotangents<float>& cotangents, const Band& band,
+                     BandSums::Adder* adder) {
+  return PullBarycentrics(input, centres, cotangents, band, adder);
+}
+std::size_t PullBand(const RasterizeInput<double>& input, const PixelCentres& centres,
+                     const RasterizeCotangents<double>& cotangents, const Band& band,
+                     BandSums::Adder* adder) {
   const PixelSize size = SizeOf(input.grid);
-  LastFace<T> corners(input, band.image);
-  FacePull<T> pull(input, band.image, adder);
+  LastFace corners(input, band.image);
+  FacePull pull(input, band.image, adder);
   for (int y = band.row_begin; y < band.row_end; ++y) {
-    for (int x = 0; x < input.grid.width; ++x) {
-      const std::size_t pixel = input.grid.first(band.image, y) + static_cast<std::size_t>(x);
-      const std::int32_t face = FaceOf(&cotangents.rast[4 * pixel]);
+    for (std::size_t x = 0; x < input.grid.row(); ++x) {
+      const std::size_t pixel = input.grid.first(band.image, y) + x;
+      const double* rast = &cotangents.rast[4 * pixel];
+      if (!IsFaceId(rast[3], input.faces.size() / 3)) return pixel;
+      const std::int32_t face = FaceOf(rast);
       if (face < 0) continue;
-      BarycentricsAdjoint(corners(face), CentreOf(input.grid, x, y), size,
-                          CotangentAt(cotangents, pixel), pull.Of(face));
+      const PixelCentre centre{centres.x[x], centres.y[static_cast<std::size_t>(y)]};
+      BarycentricsAdjoint(corners(face), centre, size, CotangentAt(cotangents, pixel),
+                          pull.Of(face));
     }
   }
+  return kNoPixel;
 }
 
 }  // namespace
@@ -80,12 +91,14 @@ template <class T>
 Status RasterizeBackward(const RasterizeInput<T>& input, const RasterizeCotangents<T>& cotangents,
                          const Workers& workers, std::span<T> d_positions) {
   TILEGRAD_TRY(CheckInput(input));
-  TILEGRAD_TRY(CheckFaceIds(cotangents.rast, input.faces.size() / 3));
-  BandSums sums(input.positions.rows(), 4, input.grid.bands(), workers);
-  workers.For(input.grid.bands(), [&](std::size_t index, std::size_t worker) {
+  const PixelCentres centres(input.grid);
+  std::vector<std::size_t> bad(input.grid.bands());
+  BandSums sums(input.positions.rows(), 4, bad.size(), workers);
+  workers.For(bad.size(), [&](std::size_t index, std::size_t worker) {
     BandSums::Adder adder(&sums, index, worker);
-    PullBand(input, cotangents, input.grid.band(index), &adder);
+    bad[index] = PullBand(input, centres, cotangents, input.grid.band(index), &adder);
   });
+  TILEGRAD_TRY(CheckNoPixel<T>(bad, cotangents.rast, input.faces.size() / 3));
   std::fill(d_positions.begin(), d_positions.end(), T(0));
   sums.AddTo(d_positions, workers);
   return {};

@@ -14,25 +14,24 @@ namespace tilegrad::compat::nvdiffrast {
 template <class T>
 Status CheckInput(const RasterizeInput<T>& input);
 
-template <class T>
-ClipCorners<double> CornersOf(const RasterizeInput<T>& input, std::size_t image,
-                              std::int32_t face) {
+inline ClipCorners<double> CornersOf(const RasterizeInput<double>& input, std::size_t image,
+                                     std::int32_t face) {
   ClipCorners<double> out;
   for (int k = 0; k < 3; ++k) {
-    const T* p = input.positions.at(image, input.faces[3 * static_cast<std::size_t>(face) + k]);
-    out.x[k] = static_cast<double>(p[0]);
-    out.y[k] = static_cast<double>(p[1]);
-    out.z[k] = static_cast<double>(p[2]);
-    out.w[k] = static_cast<double>(p[3]);
+    const double* p =
+        input.positions.at(image, input.faces[3 * static_cast<std::size_t>(face) + k]);
+    out.x[k] = p[0];
+    out.y[k] = p[1];
+    out.z[k] = p[2];
+    out.w[k] = p[3];
   }
   return out;
 }
 
 // Caches the corners of the last face; adjacent pixels mostly show the same one.
-template <class T>
 class LastFace {
  public:
-  LastFace(const RasterizeInput<T>& input, std::size_t image) : input_(input), image_(image) {}
+  LastFace(const RasterizeInput<double>& input, std::size_t image) : input_(input), image_(image) {}
 
   const ClipCorners<double>& operator()(std::int32_t face) {
     if (face != face_) {
@@ -43,7 +42,7 @@ class LastFace {
   }
 
  private:
-  const RasterizeInput<T>& input_;
+  const RasterizeInput<double>& input_;
   std::size_t image_;
   std::int32_t face_ = raster::kNoFace;
   ClipCorners<double> corners_{};

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cmath>
 #include <limits>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/test_util.h"
@@ -205,6 +209,68 @@ TEST(Rasterize, SameBitsForEveryTargetAndNumberOfWorkers) {
           RasterizeBackward<float>(narrow.input(), {out.rast, d_rast, d_db}, workers, d).ok());
       if (!gradient.has_value()) gradient = d;
       EXPECT_EQ(d, *gradient) << target << " " << count;
+    }
+  }
+}
+
+// The bits of a list of numbers; those of NaN differ from instruction set to instruction set.
+std::vector<std::uint32_t> BitsOf(const Numbers<float>& numbers) {
+  std::vector<std::uint32_t> bits;
+  for (const float v : numbers) bits.push_back(std::isnan(v) ? 1 : std::bit_cast<std::uint32_t>(v));
+  return bits;
+}
+
+// Float goes through vectors, double pixel by pixel; both compute in double. One band, so that sums
+// are rounded once. Faces of any size, some of them edge-on or behind the eye, in every number of
+// pixels that a vector may have left at the end of a row.
+TEST(Rasterize, FloatIsDoubleRoundedBitByBit) {
+  std::size_t seen = 0, pulled = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    const int height = 20 + static_cast<int>(seed), width = 60 + static_cast<int>(seed);
+    Scene<double> soup = WavyGrid(8, seed, height, width);
+    const auto first = static_cast<std::int32_t>(soup.vertices());
+    for (const double v : Soup(20, seed, 1, 1).positions) soup.positions.push_back(v);
+    for (std::int32_t i = 0; i < 60; ++i) soup.faces.push_back(first + i);
+    const Scene<float> narrow = AsScene<float>(soup);
+    Scene<double> wide = soup;
+    wide.positions = As<double>(narrow.positions);
+    const auto expected = Rasterize(wide);
+    const auto d_rast = RandomNumbers<float>(expected.rast.size(), seed);
+    auto d_db = RandomNumbers<float>(expected.rast.size(), seed + 100);
+    // Pixels may name any face, wherever it is.
+    auto rast = As<float>(expected.rast);
+    for (std::size_t p = 0; p < rast.size() / 4; p += 7) {
+      rast[4 * p + 3] = static_cast<float>(p % (soup.faces.size() / 3 + 1));
+    }
+    Numbers<double> pull(wide.positions.size());
+    Ok(RasterizeBackward<double>(
+        wide.input(), {As<double>(rast), As<double>(d_rast), As<double>(d_db)}, Workers(1), pull));
+    for (const std::string target : EveryTarget()) {
+      const auto out = Rasterize(narrow);
+      EXPECT_EQ(BitsOf(out.rast), BitsOf(As<float>(expected.rast))) << target << " " << seed;
+      EXPECT_EQ(BitsOf(out.rast_db), BitsOf(As<float>(expected.rast_db))) << target << " " << seed;
+      Numbers<float> d(narrow.positions.size());
+      Ok(RasterizeBackward<float>(narrow.input(), {rast, d_rast, d_db}, Workers(1), d));
+      EXPECT_EQ(BitsOf(d), BitsOf(As<float>(pull))) << target << " " << seed;
+    }
+    for (std::size_t p = 3; p < rast.size(); p += 4) seen += rast[p] > 0;
+    for (const double v : pull) pulled += v != 0;
+  }
+  EXPECT_GT(seen, 20000u);
+  EXPECT_GT(pulled, 2000u);
+}
+
+TEST(RasterizeBackward, NamesTheFirstPixelWhoseFaceDoesNotExist) {
+  const Scene<float> scene = AsScene<float>(WavyGrid(2, 9, 100, 27));
+  for (const float id : {-1.0f, 9.0f, 0.5f, std::nanf(""), 3e9f, HUGE_VALF}) {
+    for (const std::size_t pixel : {0u, 26u, 1000u, 2699u}) {
+      auto rast = Rasterize(scene).rast;
+      rast.back() = -3;
+      rast[4 * pixel + 3] = id;
+      Numbers<float> gradient(scene.positions.size(), 5.0f);
+      const Status status =
+          RasterizeBackward<float>(scene.input(), {rast, rast, rast}, Workers(1), gradient);
+      ExpectMessage(status, "pixel " + std::to_string(pixel) + " of rast");
     }
   }
 }
