@@ -2,12 +2,15 @@
 #include "compat/nvdiffrast/antialias.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include "base/error.h"
 #include "base/scalar.h"
+#include "compat/nvdiffrast/face_steps.h"
+#include "compat/nvdiffrast/face_steps_ref.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
@@ -94,19 +97,28 @@ struct PixelAt {
 // Two adjacent pixels along an axis, the one with the nearer face first.
 struct PixelPair {
   std::size_t front, back;
-  PixelAt at;  // of `front`
+  std::int32_t face;  // of `front`
+  PixelAt at;
   int axis, direction;
 };
 
-// The pair of a pixel and the next one along an axis, with different faces.
+// Pixel `at`, the next one along an axis, and their numbers in rast, which differ.
+struct PixelPlace {
+  std::size_t pixel;
+  PixelAt at;
+  int axis;
+  std::int32_t id, next_id;
+};
+
 template <class T>
-PixelPair PairAt(const AntialiasInput<T>& input, std::size_t pixel, const PixelAt& at, int axis) {
+PixelPair PairAt(const AntialiasInput<T>& input, const PixelPlace& place) {
+  const auto& [pixel, at, axis, id, next_id] = place;
   const std::size_t next = pixel + (axis == 0 ? 1 : input.grid.row());
-  const T* here = &input.rast[4 * pixel];
-  const T* there = &input.rast[4 * next];
-  const std::int32_t face = FaceOf(here), other = FaceOf(there);
-  if (other < 0 || (face >= 0 && here[2] <= there[2])) return {pixel, next, at, axis, 1};
-  return {next, pixel, {at.x + (axis == 0 ? 1 : 0), at.y + axis}, axis, -1};
+  const T depth = input.rast[4 * pixel + 2], next_depth = input.rast[4 * next + 2];
+  if (next_id == 0 || (id != 0 && depth <= next_depth)) {
+    return {pixel, next, id - 1, at, axis, 1};
+  }
+  return {next, pixel, next_id - 1, {at.x + (axis == 0 ? 1 : 0), at.y + axis}, axis, -1};
 }
 
 PixelStep StepOf(const PixelGrid& grid, const PixelPair& pair) {
@@ -129,17 +141,21 @@ WayPoint<double> VertexOnWay(const AntialiasInput<T>& input, std::size_t image, 
 // worker.
 class Silhouettes {
  public:
-  // Bit k: no face in the ring of the edge from corner k continues beyond it.
   template <class T>
-  std::uint8_t Of(const AntialiasInput<T>& input, std::size_t image, std::int32_t face) {
-    if (image_ != image) {
-      image_ = image;
-      edges_.assign(input.faces.size() / 3, kUnknown);
-    }
-    std::uint8_t& edges = edges_[static_cast<std::size_t>(face)];
+  void Begin(const AntialiasInput<T>& input, std::size_t image) {
+    if (image_ == image) return;
+    image_ = image;
+    edges_.assign(input.faces.size() / 3 + 1, kUnknown);
+    edges_[0] = 0;
+  }
+  // Of the face with a number in rast; none without a face. Bit k: no face in the ring of the edge
+  // from corner k continues beyond it.
+  template <class T>
+  std::uint8_t Of(const AntialiasInput<T>& input, std::int32_t id) {
+    std::uint8_t& edges = edges_[static_cast<std::size_t>(id)];
     if (edges == kUnknown) {
       edges = 0;
-      for (int k = 0; k < 3; ++k) edges |= IsSilhouette(input, image, 3 * face + k) << k;
+      for (int k = 0; k < 3; ++k) edges |= IsSilhouette(input, image_, 3 * (id - 1) + k) << k;
     }
     return edges;
   }
@@ -176,18 +192,17 @@ class Silhouettes {
   }
 
   std::size_t image_ = kNoImage;
-  std::vector<std::uint8_t> edges_;
+  std::vector<std::uint8_t> edges_;  // [F + 1]
 };
 
-// The blend of two pixels due to the edge at which the nearer face of the pair ends.
+// The blend of two pixels due to one of the silhouette edges (Silhouettes::Of) of the nearer face
+// of the pair, where that ends.
 template <class T>
 std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
-                             const PixelPair& pair, Silhouettes* silhouettes) {
-  const std::int32_t face = FaceOf(&input.rast[4 * pair.front]);
-  const unsigned edges = silhouettes->Of(input, image, face);
-  if (edges == 0) return std::nullopt;  // most of them
+                             const PixelPair& pair, unsigned edges) {
+  if (edges == 0) return std::nullopt;
   const PixelStep step = StepOf(input.grid, pair);
-  const std::int32_t* v = &input.faces[3 * static_cast<std::size_t>(face)];
+  const std::int32_t* v = &input.faces[3 * static_cast<std::size_t>(pair.face)];
   WayPoint<double> corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = VertexOnWay(input, image, v[k], step);
   for (int k = 0; k < 3; ++k) {
@@ -208,36 +223,99 @@ std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
 
 using BlendLists = std::vector<std::vector<Blend>>;  // of bands
 
-template <class T>
-void FindBlendsOfRow(const AntialiasInput<T>& input, std::size_t image, int y,
-                     Silhouettes* silhouettes, std::vector<Blend>* out) {
-  const PixelGrid& grid = input.grid;
-  std::size_t pixel = grid.first(image, y);
-  const T* id = &input.rast[4 * pixel + 3];
-  // To the next pixels' ids; to itself at the border.
-  const std::size_t above = y + 1 == grid.height ? 0 : 4 * grid.row();
-  for (int x = 0; x < grid.width; ++x, ++pixel, id += 4) {
-    const std::size_t next[2] = {x + 1 == grid.width ? 0 : std::size_t{4}, above};
-    if (id[0] == id[next[0]] && id[0] == id[next[1]]) continue;  // most of them
-    for (int axis = 0; axis < 2; ++axis) {
-      if (id[0] == id[next[axis]]) continue;
-      const PixelPair pair = PairAt(input, pixel, {x, y}, axis);
-      if (const auto blend = BlendOf(input, image, pair, silhouettes)) out->push_back(*blend);
-    }
-  }
+std::size_t ReadRow(std::span<const float> rast, std::size_t faces, FaceRow* out) {
+  return ReadFaceRow(rast, faces, out);
+}
+std::size_t ReadRow(std::span<const double> rast, std::size_t faces, FaceRow* out) {
+  return ReadFaceRowRef(rast, faces, out);
 }
 
+// Finds the blends of bands. Scratch of one worker.
 template <class T>
-BlendLists FindBlends(const AntialiasInput<T>& input, const Workers& workers) {
+class BlendFinder {
+ public:
+  explicit BlendFinder(const AntialiasInput<T>& input)
+      : input_(input),
+        row_(input.grid.row()),
+        above_(input.grid.row()),
+        steps_((input.grid.row() + kStepBits - 1) / kStepBits) {}
+
+  // Appends to *out. Returns the first pixel with a face that does not exist, or kNoPixel.
+  std::size_t Find(const Band& band, std::vector<Blend>* out) {
+    silhouettes_.Begin(input_, band.image);
+    std::size_t bad = Read(band.image, band.row_begin, &above_);
+    for (int y = band.row_begin; y < band.row_end; ++y) {
+      std::swap(row_, above_);
+      const bool last = y + 1 == input_.grid.height;
+      if (!last) bad = std::min(bad, Read(band.image, y + 1, &above_));
+      FindSteps(row_, last ? row_ : above_, input_.grid.row(), steps_);
+      for (std::size_t word = 0; word < steps_.size(); ++word) {
+        const int first = static_cast<int>(word * kStepBits);
+        for (std::uint64_t left = steps_[word]; left != 0; left &= left - 1) {
+          FindAt(band.image, {first + std::countr_zero(left), y}, last, out);
+        }
+      }
+    }
+    return bad;
+  }
+
+ private:
+  std::size_t Read(std::size_t image, int y, FaceRow* out) {
+    const std::size_t first = input_.grid.first(image, y);
+    const auto rast = input_.rast.subspan(4 * first, 4 * input_.grid.row());
+    const std::size_t bad = ReadRow(rast, input_.faces.size() / 3, out);
+    return bad == kNoPixel ? kNoPixel : first + bad;
+  }
+  void FindAt(std::size_t image, const PixelAt& at, bool last_row, std::vector<Blend>* out) {
+    const auto x = static_cast<std::size_t>(at.x);
+    const std::int32_t id = row_.ids[x], next[2] = {row_.ids[x + 1], last_row ? id : above_.ids[x]};
+    const unsigned edges = silhouettes_.Of(input_, id);
+    for (int axis = 0; axis < 2; ++axis) {
+      if (id == next[axis]) continue;
+      // Which one is nearer is a guess for the processor, and mostly neither has a silhouette.
+      const unsigned next_edges = silhouettes_.Of(input_, next[axis]);
+      if ((edges | next_edges) == 0) continue;
+      const std::size_t pixel = input_.grid.first(image, at.y) + x;
+      const PixelPair pair = PairAt(input_, {pixel, at, axis, id, next[axis]});
+      const auto blend = BlendOf(input_, image, pair, pair.front == pixel ? edges : next_edges);
+      if (blend) out->push_back(*blend);
+    }
+  }
+
+  const AntialiasInput<T>& input_;
+  Silhouettes silhouettes_;
+  FaceRow row_, above_;
+  std::vector<std::uint64_t> steps_;
+};
+
+// The colours that a pass starts from, and where to; `to` may be empty.
+template <class T>
+struct ColorCopy {
+  std::span<const T> from;
+  std::span<T> to;
+
+  void OfBand(const AntialiasInput<T>& input, const Band& band) const {
+    if (to.empty()) return;
+    const std::size_t begin = input.grid.first(band.image, band.row_begin) * input.channels;
+    const std::size_t end = input.grid.first(band.image, band.row_end) * input.channels;
+    std::copy(from.data() + begin, from.data() + end, to.data() + begin);
+  }
+};
+
+template <class T>
+Result<BlendLists> FindBlends(const AntialiasInput<T>& input, const Workers& workers,
+                              const ColorCopy<T>& copy) {
   const PixelGrid& grid = input.grid;
   BlendLists out(grid.bands());
-  std::vector<Silhouettes> silhouettes(static_cast<std::size_t>(workers.count()));
+  if (grid.pixels() == 0) return out;
+  std::vector<std::size_t> bad(grid.bands());
+  std::vector<BlendFinder<T>> finders(static_cast<std::size_t>(workers.count()),
+                                      BlendFinder<T>(input));
   workers.For(grid.bands(), [&](std::size_t index, std::size_t worker) {
-    const Band band = grid.band(index);
-    for (int y = band.row_begin; y < band.row_end; ++y) {
-      FindBlendsOfRow(input, band.image, y, &silhouettes[worker], &out[index]);
-    }
+    copy.OfBand(input, grid.band(index));
+    bad[index] = finders[worker].Find(grid.band(index), &out[index]);
   });
+  TILEGRAD_TRY(CheckNoPixel<T>(bad, input.rast, input.faces.size() / 3));
   return out;
 }
 
@@ -257,8 +335,7 @@ Status CheckInput(const AntialiasInput<T>& input) {
     return InvalidArgument("the topology hash is that of {} triangles, but tri has {}",
                            input.rings->next.size() / 3, input.faces.size() / 3);
   }
-  TILEGRAD_TRY(CheckFaces(input.faces, input.positions.vertices));
-  return CheckFaceIds(input.rast, input.faces.size() / 3);
+  return CheckFaces(input.faces, input.positions.vertices);
 }
 
 // dL/dt of a blend.
@@ -301,8 +378,7 @@ void PullColor(const AntialiasInput<T>& input, const Blend& blend, const T* d_ou
 template <class T>
 Status Antialias(const AntialiasInput<T>& input, const Workers& workers, std::span<T> out) {
   TILEGRAD_TRY(CheckInput(input));
-  const BlendLists blends = FindBlends(input, workers);
-  std::copy(input.color.begin(), input.color.end(), out.begin());
+  TILEGRAD_ASSIGN(const BlendLists blends, FindBlends(input, workers, {input.color, out}));
   workers.For(input.grid.images, [&](std::size_t image, std::size_t) {
     ForBlendsOf(blends, input.grid, image, [&](const Blend& blend) {
       for (std::size_t c = 0; c < input.channels; ++c) {
@@ -319,8 +395,7 @@ template <class T>
 Status AntialiasBackward(const AntialiasInput<T>& input, std::span<const T> d_out,
                          const Workers& workers, const AntialiasGradients<T>& out) {
   TILEGRAD_TRY(CheckInput(input));
-  const BlendLists blends = FindBlends(input, workers);
-  if (!out.d_color.empty()) std::copy(d_out.begin(), d_out.end(), out.d_color.begin());
+  TILEGRAD_ASSIGN(const BlendLists blends, FindBlends(input, workers, {d_out, out.d_color}));
   BandSums sums(input.positions.rows(), 4, input.grid.images, workers);
   workers.For(input.grid.images, [&](std::size_t image, std::size_t worker) {
     BandSums::Adder adder(&sums, image, worker);

@@ -20,15 +20,12 @@ Status NoSuchFace(std::size_t pixel, double id, std::size_t faces) {
       faces);
 }
 
-template <class T>
-Status CheckFaceIds(std::span<const T> rast, std::size_t faces) {
+Status CheckFaceIds(std::span<const double> rast, std::size_t faces) {
   for (std::size_t i = 3; i < rast.size(); i += 4) {
-    if (!IsFaceId(rast[i], faces)) return NoSuchFace(i / 4, static_cast<double>(rast[i]), faces);
+    if (!IsFaceId(rast[i], faces)) return NoSuchFace(i / 4, rast[i], faces);
   }
   return {};
 }
-template Status CheckFaceIds(std::span<const float>, std::size_t);
-template Status CheckFaceIds(std::span<const double>, std::size_t);
 
 template <class T>
 Status CheckNoPixel(std::span<const std::size_t> bad, std::span<const T> rast, std::size_t faces) {

@@ -53,8 +53,7 @@ bool IsFaceId(T id, std::size_t faces) {
 // The error for a pixel of `rast` with an invalid channel 3.
 Status NoSuchFace(std::size_t pixel, double id, std::size_t faces);
 // An error that names the first such pixel of `rast` [pixels,4].
-template <class T>
-Status CheckFaceIds(std::span<const T> rast, std::size_t faces);
+Status CheckFaceIds(std::span<const double> rast, std::size_t faces);
 // The same, of the first such pixel of each band, kNoPixel for none.
 template <class T>
 Status CheckNoPixel(std::span<const std::size_t> bad, std::span<const T> rast, std::size_t faces);

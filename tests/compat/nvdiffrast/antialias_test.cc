@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "compat/nvdiffrast/test_util.h"
+#include "support/expect.h"
 
 namespace tilegrad::compat::nvdiffrast::antialias_test {
 
@@ -201,6 +205,65 @@ TEST(Antialias, AFoldIsASilhouetteBeforeAnotherSurface) {
   // Column 3, centre 3.5, shows the face and lacks 0.3.
   EXPECT_NEAR(out[8 * 4 + 3], 20 - 0.3 * 10, 1e-12);
   EXPECT_NEAR(out[8 * 4 + 2], 10, 1e-12);
+}
+
+// Float reads ids by vectors, double pixel by pixel, and a colour is blended in the type of the
+// images; three bands, rows that do not fill the words of FindSteps.
+TEST(Antialias, FloatIsTheReferenceForAnyNumberOfWorkers) {
+  std::size_t blended = 0;
+  for (const int width : {1, 5, 64, 65, 201}) {
+    Scene<double> soup = WavyGrid(5, 3, 150, width);
+    for (const double v : Soup(20, 4, 1, 1).positions) soup.positions.push_back(v);
+    for (std::int32_t i = 0; i < 60; ++i) soup.faces.push_back(36 + i);
+    const Scene<float> scene = AsScene<float>(soup);
+    Scene<double> wide = soup;
+    wide.positions = As<double>(scene.positions);
+    const auto rast = Rasterize(scene).rast;
+    const auto color = RandomNumbers<float>(3 * scene.grid().pixels(), 2);
+    const auto d_out = RandomNumbers<float>(color.size(), 3);
+    const EdgeRings rings = BuildEdgeRings(scene.faces);
+    const auto rast64 = As<double>(rast);
+    const auto color64 = As<double>(color);
+    const auto input = InputOf(scene, rings, rast, color, 3);
+    const auto expected = Antialiased(InputOf(wide, rings, rast64, color64, 3));
+    for (std::size_t i = 0; i < color.size(); ++i) blended += expected[i] != color64[i];
+    std::optional<Numbers<float>> first, first_color, first_positions;
+    for (const std::string target : EveryTarget()) {
+      for (const int count : {1, 3}) {
+        const Workers workers(count);
+        const auto out = Antialiased(input, workers);
+        // A pixel takes part in four pairs, each of weight 1/2 at most: twenty roundings.
+        ExpectWithin("out", out, expected, [](std::size_t) { return 24 * kRounding; });
+        Numbers<float> d_color(color.size()), d_positions(scene.positions.size());
+        Ok(AntialiasBackward<float>(input, d_out, workers, {d_color, d_positions}));
+        if (!first) {
+          first = out;
+          first_color = d_color;
+          first_positions = d_positions;
+        }
+        EXPECT_EQ(out, *first) << target << " " << count;
+        EXPECT_EQ(d_color, *first_color) << target << " " << count;
+        EXPECT_EQ(d_positions, *first_positions) << target << " " << count;
+      }
+    }
+  }
+  EXPECT_GT(blended, 1000u);
+}
+
+TEST(Antialias, NamesTheFirstPixelWhoseFaceDoesNotExist) {
+  const Scene<float> scene = AsScene<float>(WavyGrid(2, 9, 100, 27));
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  const Numbers<float> color(scene.grid().pixels());
+  for (const float id : {-1.0f, 9.0f, 0.5f, std::nanf(""), 3e9f}) {
+    for (const std::size_t pixel : {0u, 26u, 1728u, 2699u}) {  // 1728: the first of a band
+      auto rast = Rasterize(scene).rast;
+      rast.back() = -3;
+      rast[4 * pixel + 3] = id;
+      Numbers<float> out(color.size());
+      ExpectMessage(Antialias<float>(InputOf(scene, rings, rast, color, 1), Workers(1), out),
+                    "pixel " + std::to_string(pixel) + " of rast");
+    }
+  }
 }
 
 TEST(Antialias, AnEdgeThatPassesTheEyeIsFollowed) {
