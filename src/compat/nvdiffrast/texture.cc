@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include "compat/nvdiffrast/texture-inl.h"
+#include "compat/nvdiffrast/texture_backward-inl.h"
 
 #if HWY_ONCE
 
@@ -19,15 +20,11 @@ namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 HWY_EXPORT(SampleBand);
-HWY_EXPORT(PullCoordinatesOfBand);
-HWY_EXPORT(PullTexelsOfBand);
+HWY_EXPORT(PullBand);
 
 constexpr std::size_t kFillGrain = std::size_t{1} << 16;
 
-// Every task visits all pixels and sums the texels of its part: each texel in pixel order, whatever
-// the number of tasks.
-void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
-                const Workers& workers, std::span<const std::span<float>> d_levels) {
+void Clear(std::span<const std::span<float>> d_levels, const Workers& workers) {
   for (const std::span<float> level : d_levels) {
     workers.ForRanges(level.size(), kFillGrain,
                       [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -35,17 +32,27 @@ void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
                                   level.begin() + static_cast<std::ptrdiff_t>(end), 0.0f);
                       });
   }
+}
+
+// Every task visits all pixels and sums the texels of its part: each texel in pixel order, whatever
+// the number of tasks. On the way it computes the coordinates' gradients of its share of bands.
+void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
+                const Workers& workers, const TextureGradients<float>& out) {
+  Clear(out.d_levels, workers);
   const auto parts = static_cast<std::size_t>(workers.count());
   workers.For(parts, [&](std::size_t part, std::size_t) {
-    std::vector<float*> at(d_levels.size());
+    std::vector<float*> at(out.d_levels.size());
+    const TexelPart texels{static_cast<std::uint32_t>(part), static_cast<std::uint32_t>(parts),
+                           at.data()};
     for (std::size_t b = 0; b < input.grid.bands(); ++b) {
       const Band band = input.grid.band(b);
       for (std::size_t l = 0; l < at.size(); ++l) {
-        at[l] = d_levels[l].data() + texture_ref::FirstTexel(input, l, band.image) * input.channels;
+        at[l] =
+            out.d_levels[l].data() + texture_ref::FirstTexel(input, l, band.image) * input.channels;
       }
-      HWY_DYNAMIC_DISPATCH(PullTexelsOfBand)
-      (input, band, d_out, {static_cast<std::uint32_t>(part), static_cast<std::uint32_t>(parts)},
-       at.data());
+      const bool own = b % parts == part;
+      HWY_DYNAMIC_DISPATCH(PullBand)
+      (input, band, d_out, texels, own ? out : TextureGradients<float>());
     }
   });
 }
@@ -68,16 +75,17 @@ void SampleTexture(const TextureInput<double>& input, const Workers& workers,
 template <>
 void SampleTextureBackward(const TextureInput<float>& input, std::span<const float> d_out,
                            const Workers& workers, const TextureGradients<float>& out) {
-  if (!out.d_levels.empty()) PullTexels(input, d_out, workers, out.d_levels);
+  TextureGradients<float> wanted = out;
   if (input.filter == TextureFilter::kNearest) {  // a step function of the coordinates
     for (const auto& gradient : {out.d_uv, out.d_uv_da, out.d_mip_level_bias}) {
       std::fill(gradient.begin(), gradient.end(), 0.0f);
     }
-    return;
+    wanted = {out.d_levels, {}, {}, {}};
   }
-  if (out.d_uv.empty() && out.d_uv_da.empty() && out.d_mip_level_bias.empty()) return;
+  if (!wanted.d_levels.empty()) return PullTexels(input, d_out, workers, wanted);
+  if (!wanted.HasCoordinates()) return;
   workers.For(input.grid.bands(), [&](std::size_t band, std::size_t) {
-    HWY_DYNAMIC_DISPATCH(PullCoordinatesOfBand)(input, input.grid.band(band), d_out, out);
+    HWY_DYNAMIC_DISPATCH(PullBand)(input, input.grid.band(band), d_out, TexelPart(), wanted);
   });
 }
 

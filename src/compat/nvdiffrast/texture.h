@@ -95,6 +95,10 @@ template <class T>
 struct TextureGradients {
   std::span<const std::span<T>> d_levels;  // shaped as the levels' texels; empty, or one per level
   std::span<T> d_uv, d_uv_da, d_mip_level_bias;
+
+  bool HasCoordinates() const {
+    return !d_uv.empty() || !d_uv_da.empty() || !d_mip_level_bias.empty();
+  }
 };
 
 template <class T>
@@ -107,7 +111,8 @@ inline std::size_t TexelsOf(const MipSize& size, std::size_t faces) {
 
 // The texels, of all levels, that one of several tasks sums.
 struct TexelPart {
-  std::uint32_t part, parts;
+  std::uint32_t part = 0, parts = 1;
+  float* const* levels = nullptr;  // gradients of an image's texture; null: not requested
 };
 
 }  // namespace tilegrad::compat::nvdiffrast

@@ -38,11 +38,13 @@ inline constexpr std::size_t kRun = 128;  // pixels: their data stays in the L1 
 
 // Coordinates of a run: those of the images, or a padded copy at their end.
 struct RunCoordinates {
+  std::size_t first, count;  // pixels
   const float *uv, *uv_da = nullptr, *bias = nullptr;
   alignas(128) float padded[kRun * 10];
 
-  HWY_INLINE RunCoordinates(const TextureInput<float>& input, std::size_t first,
-                            std::size_t count) {
+  HWY_INLINE RunCoordinates(const TextureInput<float>& input, std::size_t first_pixel,
+                            std::size_t pixels)
+      : first(first_pixel), count(pixels) {
     const std::size_t n = input.coordinates();
     float* free = padded;
     const auto place = [&](std::span<const float> from, std::size_t numbers) -> const float* {
@@ -461,12 +463,11 @@ HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& poin
   CrossEdges(base, x, y, point.face, cross, i, out);
 }
 
-// The lookups of `count` pixels.
-HWY_INLINE void LookUp(const TextureInput<float>& input, const RunCoordinates& at,
-                       std::size_t count, LookupRun* out) {
+// The lookups of a run.
+HWY_INLINE void LookUp(const TextureInput<float>& input, const RunCoordinates& at, LookupRun* out) {
   const RunTag d;
   out->mixes = false;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < at.count; i += hn::Lanes(d)) {
     const PointLanes point = FindPoints(input, at, i);
     const LevelLanesOf levels(input, at, i, point);
     SetTaps(input, point, levels.fine, hn::Sub(hn::Set(d, 1.0f), levels.mix), i, &out->taps[0]);
