@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of barycentrics.h. Lanes are adjacent pixels of a row. Every operation is that of
-// barycentrics_ref.h, in its order and without fused multiply-adds: so are the bits.
+// Vector body of barycentrics.h, forward. Lanes are adjacent pixels of a row. Every operation is
+// that of barycentrics_ref.h, in its order and without fused multiply-adds: so are the bits.
 #if defined(TILEGRAD_COMPAT_NVDIFFRAST_BARYCENTRICS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_COMPAT_NVDIFFRAST_BARYCENTRICS_INL_H_
 #undef TILEGRAD_COMPAT_NVDIFFRAST_BARYCENTRICS_INL_H_
@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <span>
 
 #include "compat/nvdiffrast/barycentrics.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
@@ -41,37 +40,51 @@ struct NarrowQuads {
   }
 };
 
-// The first `count` pixels of a vector, four numbers each; zeros after them.
-class PixelQuads {
+// The corners of the faces at adjacent pixels. Filled for all of them before the first are read: a
+// load waits while its place was written by narrower stores that are not in the cache yet.
+class CornerStage {
  public:
-  HWY_INLINE const float* At(const float* from, std::size_t count) {
-    if (HWY_LIKELY(count >= hn::Lanes(WideTag()))) return from;
-    std::memset(padded_, 0, sizeof(padded_));
-    std::memcpy(padded_, from, 4 * count * sizeof(float));
-    return padded_;
+  static constexpr std::size_t kPixels = raster::kBinSize;
+
+  // Sets the faces of a vector of pixels from number `at` on, some of which may have none: these
+  // get the corners of the first face.
+  HWY_INLINE void Put(const RasterizeInput<float>& input, std::size_t image, std::size_t at,
+                      hn::Vec<NarrowIntTag> face) {
+    const QuadTag quad;
+    hn::Store(face, NarrowIntTag(), faces_ + at);
+    for (std::size_t p = at; p < at + hn::Lanes(WideTag()); ++p) {
+      const auto some = static_cast<std::size_t>(HWY_MAX(faces_[p], 0));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float* from = input.positions.at(image, input.faces[3 * some + k]);
+        hn::Store(hn::LoadU(quad, from), quad, quads_[k] + 4 * p);
+      }
+    }
+  }
+  // A vector of pixels without faces.
+  HWY_INLINE void PutNone(std::size_t at) {
+    hn::Store(hn::Set(NarrowIntTag(), raster::kNoFace), NarrowIntTag(), faces_ + at);
+  }
+  HWY_INLINE const std::int32_t* faces(std::size_t at) const { return faces_ + at; }
+  HWY_INLINE NarrowQuads Corners(std::size_t k, std::size_t at) const {
+    return NarrowQuads(quads_[k] + 4 * at);
   }
 
  private:
-  HWY_ALIGN float padded_[4 * kMostLanes];
+  HWY_ALIGN float quads_[3][4 * kPixels];
+  HWY_ALIGN std::int32_t faces_[kPixels];
 };
 
-// Pixels without a face have the corners of the first one, which exists if any pixel has a face.
+HWY_INLINE hn::Mask<NarrowIntTag> HaveFaces(hn::Vec<NarrowIntTag> face) {
+  return hn::Gt(face, hn::Set(NarrowIntTag(), raster::kNoFace));
+}
+
+// The corners at a vector of pixels.
 struct CornerLanes {
   Wide x[3], y[3], z[3], w[3];
 
-  HWY_INLINE CornerLanes(const RasterizeInput<float>& input, std::size_t image,
-                         const std::int32_t* faces) {
-    const QuadTag quad;
-    HWY_ALIGN float corners[3][4 * kMostLanes];
-    for (std::size_t p = 0; p < hn::Lanes(WideTag()); ++p) {
-      const auto face = static_cast<std::size_t>(HWY_MAX(faces[p], 0));
-      for (std::size_t k = 0; k < 3; ++k) {
-        const float* from = input.positions.at(image, input.faces[3 * face + k]);
-        hn::Store(hn::LoadU(quad, from), quad, corners[k] + 4 * p);
-      }
-    }
+  HWY_INLINE CornerLanes(const CornerStage& stage, std::size_t at) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const NarrowQuads q(corners[k]);
+      const NarrowQuads q = stage.Corners(k, at);
       x[k] = hn::PromoteTo(WideTag(), q.c[0]);
       y[k] = hn::PromoteTo(WideTag(), q.c[1]);
       z[k] = hn::PromoteTo(WideTag(), q.c[2]);
@@ -167,15 +180,33 @@ struct BarycentricLanes {
 };
 
 // Writes four numbers of each of the first `count` pixels of a vector; zeros where there is none.
-HWY_INLINE void WriteQuads(const hn::Vec<NarrowTag> (&v)[4], hn::Mask<NarrowTag> some,
-                           std::size_t count, float* to) {
+HWY_INLINE void WriteQuads(const Wide (&wide)[4], hn::Mask<NarrowTag> some, std::size_t count,
+                           float* to) {
   const NarrowTag d;
   HWY_ALIGN float numbers[4 * kMostLanes];
   const bool whole = count >= hn::Lanes(d);
+  hn::Vec<NarrowTag> v[4];
+  for (int i = 0; i < 4; ++i) v[i] = hn::DemoteTo(d, wide[i]);
   hn::StoreInterleaved4(hn::IfThenElseZero(some, v[0]), hn::IfThenElseZero(some, v[1]),
                         hn::IfThenElseZero(some, v[2]), hn::IfThenElseZero(some, v[3]), d,
                         whole ? to : numbers);
   if (!whole) std::memcpy(to, numbers, 4 * count * sizeof(float));
+}
+
+// Puts the faces of a row in place.
+HWY_INLINE void StageRow(const RasterizeInput<float>& input, const BinRow& row,
+                         CornerStage* stage) {
+  const NarrowIntTag d;
+  for (std::size_t i = 0; i < row.count; i += hn::Lanes(d)) {
+    const auto seen = hn::LoadU(d, row.seen + i);
+    const auto some = HaveFaces(seen);
+    if (hn::AllFalse(d, some)) {
+      stage->PutNone(i);
+    } else {
+      const auto face = hn::GatherIndex(d, row.source.data(), hn::Max(seen, hn::Zero(d)));
+      stage->Put(input, row.image, i, hn::IfThenElse(some, face, seen));
+    }
+  }
 }
 
 void WriteRow(const RasterizeInput<float>& input, const PixelCentres& centres, const BinRow& row,
@@ -189,226 +220,24 @@ void WriteRow(const RasterizeInput<float>& input, const PixelCentres& centres, c
   const std::size_t first = 4 * (input.grid.first(row.image, row.y) + column);
   float* rast = out.rast.data() + first;
   float* rast_db = out.rast_db.empty() ? nullptr : out.rast_db.data() + first;
+  CornerStage stage;
+  StageRow(input, row, &stage);
   for (std::size_t i = 0; i < row.count; i += hn::Lanes(d)) {
     const std::size_t count = HWY_MIN(hn::Lanes(d), row.count - i);
-    const auto face = hn::LoadU(whole, row.faces + i);
-    const auto some = hn::RebindMask(narrow, hn::Gt(face, hn::Set(whole, raster::kNoFace)));
+    const auto face = hn::Load(whole, stage.faces(i));
+    const auto some = hn::RebindMask(narrow, HaveFaces(face));
     if (hn::AllFalse(narrow, some)) {
       WriteZeros(rast + 4 * i, rast + 4 * (i + count));
       if (rast_db != nullptr) WriteZeros(rast_db + 4 * i, rast_db + 4 * (i + count));
       continue;
     }
-    const CornerLanes c(input, row.image, row.faces + i);
+    const CornerLanes c(stage, i);
     const ProductLanes p(c, hn::LoadU(d, &centres.x[column + i]), y);
     const BarycentricLanes b(c, QuotientLanes(p, size));
-    const auto id = hn::ConvertTo(narrow, hn::Add(face, hn::Set(whole, 1)));
-    WriteQuads(
-        {hn::DemoteTo(narrow, b.u), hn::DemoteTo(narrow, b.v), hn::DemoteTo(narrow, b.depth), id},
-        some, count, rast + 4 * i);
-    if (rast_db == nullptr) continue;
-    WriteQuads({hn::DemoteTo(narrow, b.slope[0]), hn::DemoteTo(narrow, b.slope[1]),
-                hn::DemoteTo(narrow, b.slope[2]), hn::DemoteTo(narrow, b.slope[3])},
-               some, count, rast_db + 4 * i);
+    const Wide id = hn::PromoteTo(d, hn::Add(face, hn::Set(whole, 1)));
+    WriteQuads({b.u, b.v, b.depth, id}, some, count, rast + 4 * i);
+    if (rast_db != nullptr) WriteQuads(b.slope, some, count, rast_db + 4 * i);
   }
-}
-
-// The backward pass.
-
-// Cotangents of a vector of pixels: BarycentricsCotangent.
-struct CotangentLanes {
-  Wide weight[2], slope[4];
-
-  // rast, rast_db: of the pixels, or null.
-  HWY_INLINE CotangentLanes(const float* rast, const float* rast_db) {
-    const WideTag d;
-    weight[0] = weight[1] = slope[0] = slope[1] = slope[2] = slope[3] = hn::Zero(d);
-    if (rast != nullptr) {
-      const NarrowQuads q(rast);
-      for (int k = 0; k < 2; ++k) weight[k] = hn::PromoteTo(d, q.c[k]);
-    }
-    if (rast_db != nullptr) {
-      const NarrowQuads q(rast_db);
-      for (int i = 0; i < 4; ++i) slope[i] = hn::PromoteTo(d, q.c[i]);
-    }
-  }
-};
-
-// The cotangents of Products.
-struct ProductPulls {
-  Wide a[3], ax[3], ay[3];
-
-  HWY_INLINE ProductPulls(const ProductLanes& p, const QuotientLanes& q, const PixelSize& size,
-                          const CotangentLanes& of) {
-    const WideTag d;
-    const Wide size_x = hn::Set(d, size.x), size_y = hn::Set(d, size.y);
-    Wide sum = hn::Zero(d), sum_x = hn::Zero(d), sum_y = hn::Zero(d);
-    a[2] = ax[2] = ay[2] = hn::Zero(d);
-    for (int k = 0; k < 2; ++k) {
-      const Wide by_x = of.slope[2 * k], by_y = of.slope[2 * k + 1];
-      ax[k] = hn::Mul(hn::Mul(by_x, size_x), q.inverse);
-      ay[k] = hn::Mul(hn::Mul(by_y, size_y), q.inverse);
-      const Wide rest = hn::Sub(of.weight[k], hn::Mul(ax[k], p.sum_x));
-      a[k] = hn::Mul(hn::Sub(rest, hn::Mul(ay[k], p.sum_y)), q.inverse);
-      sum_x = hn::Sub(sum_x, hn::Mul(ax[k], q.weight[k]));
-      sum_y = hn::Sub(sum_y, hn::Mul(ay[k], q.weight[k]));
-      const Wide slopes = hn::Add(hn::Mul(by_x, q.slope[2 * k]), hn::Mul(by_y, q.slope[2 * k + 1]));
-      sum = hn::Sub(sum, hn::Add(hn::Mul(a[k], q.weight[k]), hn::Mul(slopes, q.inverse)));
-    }
-    for (int k = 0; k < 3; ++k) {
-      a[k] = hn::Add(a[k], sum);
-      ax[k] = hn::Add(ax[k], sum_x);
-      ay[k] = hn::Add(ay[k], sum_y);
-    }
-  }
-};
-
-// What a vector of pixels adds to x, y and w of the corners of their faces: BarycentricsAdjoint;
-// zeros where a face is not solid.
-struct CornerPulls {
-  static constexpr std::size_t kNumbers = 10;  // of a pixel: x, y, w of corners 0, 1, 2; 0
-  Wide x[3], y[3], w[3];
-
-  HWY_INLINE CornerPulls(const CornerLanes& c, const ProductLanes& p, const ProductPulls& of) {
-    for (int k = 0; k < 3; ++k) x[k] = y[k] = w[k] = hn::Zero(WideTag());
-    for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      x[i] = hn::Add(x[i], Minor(of.a[k], p.py[j], of.ay[k], c.w[j]));
-      y[i] = hn::Add(y[i], Minor(of.ax[k], c.w[j], of.a[k], p.px[j]));
-      x[j] = hn::Add(x[j], Minor(of.ay[k], c.w[i], of.a[k], p.py[i]));
-      y[j] = hn::Add(y[j], Minor(of.a[k], p.px[i], of.ax[k], c.w[i]));
-      w[i] = hn::Add(w[i], Minor(of.ay[k], p.px[j], of.ax[k], p.py[j]));
-      w[j] = hn::Add(w[j], Minor(of.ax[k], p.py[i], of.ay[k], p.px[i]));
-    }
-  }
-  HWY_INLINE void Finish(Wide at_x, Wide at_y, WideMask solid) {
-    for (int k = 0; k < 3; ++k) {
-      w[k] = hn::Sub(hn::Sub(w[k], hn::Mul(at_x, x[k])), hn::Mul(at_y, y[k]));
-      for (Wide* v : {&x[k], &y[k], &w[k]}) *v = hn::IfThenElseZero(solid, *v);
-    }
-  }
-  // Pairs of numbers: of all pixels the first pair, then the second, ...
-  HWY_INLINE void Store(double* to) const {
-    const WideTag d;
-    const std::size_t pair = 2 * hn::Lanes(d);
-    hn::StoreInterleaved2(x[0], y[0], d, to);
-    hn::StoreInterleaved2(w[0], x[1], d, to + pair);
-    hn::StoreInterleaved2(y[1], w[1], d, to + 2 * pair);
-    hn::StoreInterleaved2(x[2], y[2], d, to + 3 * pair);
-    hn::StoreInterleaved2(w[2], hn::Zero(d), d, to + 4 * pair);
-  }
-};
-
-// Sums gradients on the current face before adding them to the face's corners.
-class FaceSums {
- public:
-  HWY_INLINE FaceSums(const RasterizeInput<float>& input, std::size_t image, BandSums::Adder* adder)
-      : input_(input), image_(image), adder_(adder) {
-    Clear();
-  }
-  // Adds pixel p of CornerPulls::Store, which shows `face`.
-  HWY_INLINE void Add(std::int32_t face, const double* pulls, std::size_t p) {
-    if (face != face_) {
-      Flush();
-      face_ = face;
-    }
-    const PairTag d;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      sum_[i] = hn::Add(sum_[i], hn::Load(d, pulls + 2 * (i * hn::Lanes(WideTag()) + p)));
-    }
-  }
-  HWY_INLINE void Flush() {
-    if (face_ == raster::kNoFace) return;
-    HWY_ALIGN double sum[CornerPulls::kNumbers];
-    for (std::size_t i = 0; i < kPairs; ++i) hn::Store(sum_[i], PairTag(), sum + 2 * i);
-    const std::int32_t* v = &input_.faces[3 * static_cast<std::size_t>(face_)];
-    for (std::size_t k = 0; k < 3; ++k) {
-      double* to = adder_->Row(input_.positions.row(image_, v[k]));
-      to[0] += sum[3 * k];
-      to[1] += sum[3 * k + 1];
-      to[3] += sum[3 * k + 2];  // z has no gradient
-    }
-    Clear();
-  }
-
- private:
-  using PairTag = hn::FixedTag<double, 2>;
-  static constexpr std::size_t kPairs = CornerPulls::kNumbers / 2;
-
-  HWY_INLINE void Clear() {
-    for (auto& s : sum_) s = hn::Zero(PairTag());
-  }
-
-  const RasterizeInput<float>& input_;
-  std::size_t image_;
-  BandSums::Adder* adder_;
-  std::int32_t face_ = raster::kNoFace;
-  hn::Vec<PairTag> sum_[kPairs];
-};
-
-// The faces at a vector of pixels, and the first pixel whose face does not exist, as FaceOf and
-// IsFaceId have it.
-class FaceLanes {
- public:
-  explicit FaceLanes(std::size_t count) : most_(static_cast<float>(count)) {}
-
-  // Writes the faces; whether there is one. `first`: the index of the first pixel.
-  HWY_INLINE bool Find(const float* rast, std::size_t first, std::int32_t* faces) {
-    const NarrowTag d;
-    const NarrowIntTag di;
-    const auto id = NarrowQuads(rast).c[3];
-    const auto number = hn::ConvertTo(di, id);
-    const auto exists = hn::And(hn::Eq(hn::ConvertTo(d, number), id),
-                                hn::And(hn::Ge(id, hn::Zero(d)), hn::Le(id, hn::Set(d, most_))));
-    if (HWY_UNLIKELY(!hn::AllTrue(d, exists))) {
-      const auto at = static_cast<std::size_t>(hn::FindFirstTrue(d, hn::Not(exists)));
-      bad_ = HWY_MIN(bad_, first + at);
-    }
-    const auto one = hn::Set(di, 1);
-    const auto face = hn::Sub(hn::IfThenElseZero(hn::RebindMask(di, exists), number), one);
-    hn::Store(face, di, faces);
-    return !hn::AllFalse(di, hn::Gt(face, hn::Set(di, raster::kNoFace)));
-  }
-  std::size_t bad() const { return bad_; }
-
- private:
-  float most_;
-  std::size_t bad_ = kNoPixel;
-};
-
-std::size_t PullBand(const RasterizeInput<float>& input, const PixelCentres& centres,
-                     const RasterizeCotangents<float>& cotangents, const Band& band,
-                     BandSums::Adder* adder) {
-  const WideTag d;
-  const PixelSize size = SizeOf(input.grid);
-  FaceLanes numbers(input.faces.size() / 3);
-  FaceSums sums(input, band.image, adder);
-  PixelQuads rast, d_rast, d_rast_db;
-  HWY_ALIGN std::int32_t faces[kMostLanes];
-  HWY_ALIGN double pulls[CornerPulls::kNumbers * kMostLanes];
-  for (int row = band.row_begin; row < band.row_end; ++row) {
-    const Wide y = hn::Set(d, centres.y[static_cast<std::size_t>(row)]);
-    for (std::size_t x = 0; x < input.grid.row(); x += hn::Lanes(d)) {
-      const std::size_t first = input.grid.first(band.image, row) + x;
-      const std::size_t count = HWY_MIN(hn::Lanes(d), input.grid.row() - x);
-      const auto at = [&](std::span<const float> image, PixelQuads* quads) HWY_ATTR {
-        return image.empty() ? nullptr : quads->At(image.data() + 4 * first, count);
-      };
-      if (!numbers.Find(at(cotangents.rast, &rast), first, faces)) continue;
-      const CotangentLanes of(at(cotangents.d_rast, &d_rast), at(cotangents.d_rast_db, &d_rast_db));
-      const CornerLanes corners(input, band.image, faces);
-      const Wide column = hn::LoadU(d, &centres.x[x]);
-      const ProductLanes products(corners, column, y);
-      const QuotientLanes quotients(products, size);
-      CornerPulls pull(corners, products, ProductPulls(products, quotients, size, of));
-      pull.Finish(column, y, quotients.solid);
-      pull.Store(pulls);
-      for (std::size_t p = 0; p < hn::Lanes(d); ++p) {
-        if (faces[p] != raster::kNoFace) sums.Add(faces[p], pulls, p);
-      }
-    }
-  }
-  sums.Flush();
-  return numbers.bad();
 }
 
 }  // namespace HWY_NAMESPACE

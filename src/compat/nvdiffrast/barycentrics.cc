@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include "compat/nvdiffrast/barycentrics-inl.h"
+#include "compat/nvdiffrast/barycentrics_backward-inl.h"
 
 #if HWY_ONCE
 

@@ -22,15 +22,16 @@ struct PixelCentres {
   explicit PixelCentres(const PixelGrid& grid);
 };
 
-// The pixels of a row of a bin and where their outputs go.
+// The visible faces of a row of a bin.
 struct BinRow {
   std::size_t image;
   int x, y;
-  std::size_t count;
-  const std::int32_t* faces;  // [count rounded up to a multiple of 16] of input.faces, or kNoFace
+  std::size_t count;                     // pixels, at most raster::kBinSize
+  const std::int32_t* seen;              // [raster::kBinSize] of `source`, or kNoFace
+  std::span<const std::int32_t> source;  // faces of the caller
 };
 
-// Writes rast, and rast_db unless it is empty. Faces of `row` exist.
+// Writes rast, and rast_db unless it is empty.
 void WriteBarycentrics(const RasterizeInput<float>& input, const PixelCentres& centres,
                        const BinRow& row, const RasterizeOutput<float>& out);
 

@@ -311,13 +311,14 @@ void WriteRow(const Drawing<double>& drawing, const BinRow& row) {
   for (std::size_t i = 0; i < row.count; ++i, at += 4) {
     double* rast = &out.rast[at];
     double* rast_db = out.rast_db.empty() ? nullptr : &out.rast_db[at];
-    if (row.faces[i] == raster::kNoFace) {
+    if (row.seen[i] == raster::kNoFace) {
       std::fill(rast, rast + 4, 0.0);
       if (rast_db != nullptr) std::fill(rast_db, rast_db + 4, 0.0);
       continue;
     }
+    const std::int32_t face = row.source[static_cast<std::size_t>(row.seen[i])];
     const PixelCentre centre = CentreOf(input.grid, row.x + static_cast<int>(i), row.y);
-    WritePixel(BarycentricsAt(corners(row.faces[i]), centre, size), row.faces[i], rast, rast_db);
+    WritePixel(BarycentricsAt(corners(face), centre, size), face, rast, rast_db);
   }
 }
 
@@ -333,15 +334,9 @@ template <class T>
 void WriteBin(const Drawing<T>& drawing, const DrawnBin& bin) {
   const raster::PixelRect& rect = bin.rect;
   const auto count = static_cast<std::size_t>(rect.x1 - rect.x0);
-  std::int32_t faces[raster::kBinSize];
   for (int y = rect.y0; y < rect.y1; ++y) {
     const int first = (y - rect.y0) * raster::kBinSize;
-    for (int x = 0; x < raster::kBinSize; ++x) {
-      const std::int32_t face = bin.seen.face[first + x];
-      faces[x] = face == raster::kNoFace ? raster::kNoFace
-                                         : bin.mesh.source_face[static_cast<std::size_t>(face)];
-    }
-    WriteRow(drawing, {bin.image, rect.x0, y, count, faces});
+    WriteRow(drawing, {bin.image, rect.x0, y, count, bin.seen.face + first, bin.mesh.source_face});
     if (drawing.out.peeled.empty()) continue;
     const float* depth = bin.seen.inverse_depth + first;
     std::copy(
