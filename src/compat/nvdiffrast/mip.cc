@@ -9,37 +9,39 @@ namespace {
 struct Halving {
   std::size_t fine_row, fine_rows, coarse_row;  // numbers of a row; rows of a texture
   std::size_t step_x, step_y, channels;
+  std::size_t below;  // from a fine number to that of the second row; 0 if there is none
 
   Halving(const MipSize& fine, std::size_t c)
       : fine_row(static_cast<std::size_t>(fine.width) * c),
         fine_rows(static_cast<std::size_t>(fine.height)),
         step_x(fine.width > 1 ? 2 : 1),
         step_y(fine.height > 1 ? 2 : 1),
-        channels(c) {
+        channels(c),
+        below((step_y - 1) * fine_row) {
     coarse_row = fine_row / step_x;
   }
   // Calls visit(coarse number, fine number, its neighbour to the right) for the numbers that belong
-  // together of one row of the coarse level, counted over all textures, and one of the fine rows
-  // that it is made of. Both fine numbers are the same where there is no neighbour.
+  // together of one row of the coarse level, counted over all textures, and the first of the fine
+  // rows that it is made of. Both fine numbers are the same where there is no neighbour.
   template <class Visit>
-  void ForRow(std::size_t row, std::size_t fine, const Visit& visit) const {
+  void ForRow(std::size_t row, const Visit& visit) const {
     switch (channels) {  // a constant makes the loop unroll
       case 1:
-        return ForRowOf<1>(row, fine, visit);
+        return ForRowOf<1>(row, visit);
       case 3:
-        return ForRowOf<3>(row, fine, visit);
+        return ForRowOf<3>(row, visit);
       case 4:
-        return ForRowOf<4>(row, fine, visit);
+        return ForRowOf<4>(row, visit);
       default:
-        return ForRowOf<0>(row, fine, visit);
+        return ForRowOf<0>(row, visit);
     }
   }
 
  private:
   template <std::size_t kChannels, class Visit>
-  void ForRowOf(std::size_t row, std::size_t fine, const Visit& visit) const {
+  void ForRowOf(std::size_t row, const Visit& visit) const {
     const std::size_t n = kChannels > 0 ? kChannels : channels, rows = fine_rows / step_y;
-    std::size_t from = (row / rows * fine_rows + row % rows * step_y + fine) * fine_row;
+    std::size_t from = (row / rows * fine_rows + row % rows * step_y) * fine_row;
     const std::size_t beside = (step_x - 1) * n, end = (row + 1) * coarse_row;
     for (std::size_t to = row * coarse_row; to < end; from += beside) {
       for (std::size_t c = 0; c < n; ++c, ++to, ++from) visit(to, from, from + beside);
@@ -74,16 +76,21 @@ void HalveTexture(const TextureLevel<T>& fine, std::size_t channels, const Worke
   const T share = T(0.5) / static_cast<T>(halving.step_y);
   const T* from = fine.texels.data();
   T* to = coarse.data();
+  const std::size_t below = halving.below;
+  const auto one_row = [&](std::size_t c, std::size_t a, std::size_t b) {
+    to[c] = share * (from[a] + from[b]);
+  };
+  const auto two_rows = [&](std::size_t c, std::size_t a, std::size_t b) {
+    to[c] = share * (from[a] + from[b]) + share * (from[a + below] + from[b + below]);
+  };
   workers.ForRanges(coarse.size() / halving.coarse_row, kRowGrain,
                     [&](std::size_t begin, std::size_t end, std::size_t) {
                       for (std::size_t row = begin; row < end; ++row) {
-                        halving.ForRow(row, 0, [&](std::size_t c, std::size_t a, std::size_t b) {
-                          to[c] = share * (from[a] + from[b]);
-                        });
-                        if (halving.step_y == 1) continue;
-                        halving.ForRow(row, 1, [&](std::size_t c, std::size_t a, std::size_t b) {
-                          to[c] += share * (from[a] + from[b]);
-                        });
+                        if (below == 0) {
+                          halving.ForRow(row, one_row);
+                        } else {
+                          halving.ForRow(row, two_rows);
+                        }
                       }
                     });
 }
@@ -95,17 +102,18 @@ void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
   const T share = T(0.5) / static_cast<T>(halving.step_y);
   const T* from = d_coarse.texels.data();
   T* to = d_fine.data();
+  const std::size_t below = halving.below;
   const auto pull = [&](std::size_t c, std::size_t a, std::size_t b) {
-    to[a] += share * from[c];
-    to[b] += share * from[c];
+    const T part = share * from[c];
+    to[a] += part;
+    to[b] += part;
+    if (below == 0) return;
+    to[a + below] += part;
+    to[b + below] += part;
   };
   workers.ForRanges(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
                     [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t row = begin; row < end; ++row) {
-                        for (std::size_t y = 0; y < halving.step_y; ++y) {
-                          halving.ForRow(row, y, pull);
-                        }
-                      }
+                      for (std::size_t row = begin; row < end; ++row) halving.ForRow(row, pull);
                     });
 }
 
