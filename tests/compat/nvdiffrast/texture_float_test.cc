@@ -282,6 +282,36 @@ TEST_P(TextureInFloat, GradientsOfCoordinatesAreTheReferenceUpToRounding) {
   }
 }
 
+// A task finds texels for both kinds of gradients at once, and sums a part of the texels.
+TEST_P(TextureInFloat, GradientsHaveTheSameBitsTogetherAndAloneForAnyNumberOfWorkers) {
+  const auto d_out = RandomNumbers<float>(exact_.grid.pixels() * exact_.channels, 34);
+  for (const std::string target : EveryTarget()) {
+    const GradientsOf<float> one(lookups_, d_out);
+    for (const int count : {1, 2, 5}) {
+      SCOPED_TRACE(count);
+      const Workers workers(count);
+      GradientsOf<float> both(lookups_, d_out, workers);
+      EXPECT_EQ(both.d_levels, one.d_levels);
+      EXPECT_EQ(both.d_uv, one.d_uv);
+      EXPECT_EQ(both.d_da, one.d_da);
+      EXPECT_EQ(both.d_bias, one.d_bias);
+      auto alone = both;
+      for (auto* numbers : {&alone.d_uv, &alone.d_da, &alone.d_bias}) {
+        std::fill(numbers->begin(), numbers->end(), -7.0f);
+      }
+      SampleTextureBackward<float>(lookups_.input(), d_out, workers,
+                                   {{}, alone.d_uv, alone.d_da, alone.d_bias});
+      EXPECT_EQ(alone.d_uv, one.d_uv);
+      EXPECT_EQ(alone.d_da, one.d_da);
+      EXPECT_EQ(alone.d_bias, one.d_bias);
+      std::vector<std::span<float>> spans;
+      for (auto& level : alone.d_levels) spans.push_back(level);
+      SampleTextureBackward<float>(lookups_.input(), d_out, workers, {spans, {}, {}, {}});
+      EXPECT_EQ(alone.d_levels, one.d_levels);
+    }
+  }
+}
+
 constexpr auto kNearest = TextureFilter::kNearest, kLinear = TextureFilter::kLinear,
                kMipNearest = TextureFilter::kLinearMipmapNearest,
                kMipLinear = TextureFilter::kLinearMipmapLinear;
