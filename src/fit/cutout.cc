@@ -26,6 +26,13 @@ bool MayHaveCutout(const FitConfig& config) {
          !config.vertex_colors && config.loss.silhouette_weight > 0;
 }
 
+// Whether the fit has a texture, as far as its start tells; those without a mesh get one.
+bool HasTexture(const FitJob& job) {
+  const ParameterSet& set = job.config.parameters;
+  return !job.start.has_value() || !job.start->textures.empty() || set[Parameter::kTexture] ||
+         set[Parameter::kUv];
+}
+
 std::span<const float> MaskOf(const TargetImages& images, int view) {
   return std::span(images.alpha)
       .subspan(static_cast<std::size_t>(view) * images.pixels(), images.pixels());
@@ -44,9 +51,15 @@ void FillUnseen(const std::vector<bool>& seen, FitScene* scene) {
 }  // namespace
 
 Status CheckCutout(const FitJob& job) {
-  if (job.config.cutout != Cutout::kOn || MayHaveCutout(job.config)) return {};
+  if (job.config.cutout != Cutout::kOn) return {};
+  if (!MayHaveCutout(job.config)) {
+    return InvalidArgument(
+        "a cut-out texture takes masks, a texture and unlit colours: leave out --cutout on");
+  }
+  if (HasTexture(job)) return {};
   return InvalidArgument(
-      "a cut-out texture takes masks, a texture and unlit colours: leave out --cutout on");
+      "a cut-out texture takes a texture, which the mesh to start from lacks: add \"texture\" to "
+      "--optimize, or leave out --cutout on");
 }
 
 std::optional<FitJob> CutoutJob(const FitJob& job, const Workers& workers) {
