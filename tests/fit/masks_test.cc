@@ -7,6 +7,7 @@
 #include "base/rng.h"
 #include "fit/masks/find_masks.h"
 #include "fit/masks/floor.h"
+#include "fit/masks/holes.h"
 #include "fit/masks/start_masks.h"
 #include "support/temp_folder.h"
 
@@ -17,6 +18,13 @@ constexpr float kFloor = -0.35f;  // below the middle
 constexpr double kRadius = 0.3;
 
 enum class Place { kPaper, kTable, kRoom };
+enum class Thing {
+  kBall,
+  kLined,    // a ball with a blind hole, whose bottom nearly has the colour of the table
+  kDrilled,  // a ball with a straight hole, through which the first view looks
+};
+constexpr float kDrill = 0.17f, kBottom = 0.15f;  // radius of a hole; from the ball's middle
+constexpr glm::vec3 kWood = {0.65f, 0.5f, 0.35f};
 
 // Blots, by bilinear interpolation of random numbers on a lattice.
 float Blots(glm::vec3 p, float per_unit, std::uint64_t channel) {
@@ -43,7 +51,7 @@ glm::vec3 Blotted(glm::vec3 base, float strength, glm::vec3 p, float per_unit) {
 // A ball half red, half blue, above a floor with a soft shadow, in a room that is a ball, too.
 class Capture {
  public:
-  explicit Capture(Place place) : place_(place) {
+  explicit Capture(Place place, Thing thing = Thing::kBall) : place_(place), thing_(thing) {
     input_.images.width = kWide;
     input_.images.height = kHigh;
     for (int v = 0; v < kViews; ++v) AddView(v);
@@ -52,6 +60,17 @@ class Capture {
   }
 
   const FitInput& input() const { return input_; }
+
+  // Share of the pixels that show the lining, or the room through the hole, that masks hold.
+  double Held(std::span<const float> alpha) const {
+    double held = 0, all = 0;
+    for (std::size_t p = 0; p < special_.size(); ++p) {
+      all += special_[p];
+      held += special_[p] && alpha[p] >= 0.5f;
+    }
+    EXPECT_GT(all, 60);
+    return held / all;
+  }
 
   double Iou(std::span<const float> alpha) const {
     double both = 0, either = 0;
@@ -87,9 +106,14 @@ class Capture {
     for (int i = 0; i < 3; ++i) eye -= c.translation[i] * row(i);
     const glm::vec3 ray =
         glm::normalize((x - c.cx) / c.fx * row(0) - (y - c.cy) / c.fy * row(1) - row(2));
+    if (input_.cameras.size() == 1) axis_ = glm::normalize(eye);
     const float ball = Hit(eye, ray, static_cast<float>(kRadius), -1);
-    truth_.push_back(ball > 0);
-    if (ball > 0) return Ball(eye + ball * ray);
+    const bool through = ball > 0 && thing_ == Thing::kDrilled && Through(eye, ray);
+    const bool lining = ball > 0 && thing_ == Thing::kLined && IsLining(eye + ball * ray, ray);
+    truth_.push_back(ball > 0 && !through);
+    special_.push_back(through || lining);
+    if (lining) return 0.95f * kWood;
+    if (ball > 0 && !through) return Ball(eye + ball * ray);
     const float down = (kFloor - eye.y) / ray.y;
     const glm::vec3 floor = eye + down * ray;
     if (place_ != Place::kPaper && down > 0 && std::hypot(floor.x, floor.z) < FloorRadius())
@@ -102,6 +126,24 @@ class Capture {
     const float b = glm::dot(eye, ray), d = b * b - glm::dot(eye, eye) + radius * radius;
     return d > 0 ? -b + side * std::sqrt(d) : 0;
   }
+  // Whether a ray that meets the ball leaves it by the hole's other end, having entered by one.
+  bool Through(glm::vec3 eye, glm::vec3 ray) const {
+    const auto aside = [&](float side) {
+      const glm::vec3 p = eye + Hit(eye, ray, static_cast<float>(kRadius), side) * ray;
+      return glm::length(p - glm::dot(p, axis_) * axis_);
+    };
+    return std::max(aside(-1), aside(1)) < kDrill;
+  }
+  // Whether a ray that meets the ball at `p` meets the blind hole's bottom.
+  static bool IsLining(glm::vec3 p, glm::vec3 ray) {
+    const glm::vec3 axis(0.342f, 0.940f, 0);
+    const auto is_within = [&](glm::vec3 q) {
+      return glm::length(q - glm::dot(q, axis) * axis) < kDrill;
+    };
+    const float height = glm::dot(p, axis);
+    return height > kBottom && is_within(p) &&
+           is_within(p - (height - kBottom) / glm::dot(ray, axis) * ray);
+  }
   float FloorRadius() const { return place_ == Place::kTable ? 0.9f : 3.0f; }
 
   static glm::vec3 Ball(glm::vec3 p) {
@@ -111,7 +153,7 @@ class Capture {
   }
   glm::vec3 FloorColor(glm::vec3 p) const {
     const float dark = 0.55f / (1 + std::exp(8 * (std::hypot(p.x, p.z) / 0.32f - 1)));
-    const glm::vec3 wood = place_ == Place::kTable ? Blotted({0.65f, 0.5f, 0.35f}, 0.12f, p, 9)
+    const glm::vec3 wood = place_ == Place::kTable ? Blotted(kWood, 0.12f, p, 9)
                                                    : Blotted({0.5f, 0.5f, 0.45f}, 0.5f, p, 6);
     return (1 - dark) * wood;
   }
@@ -122,8 +164,10 @@ class Capture {
   }
 
   Place place_;
+  Thing thing_;
+  glm::vec3 axis_{0};  // of the hole
   FitInput input_;
-  std::vector<bool> truth_;
+  std::vector<bool> truth_, special_;
 };
 
 TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
@@ -137,6 +181,46 @@ TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
     EXPECT_GT(capture.Iou(found->alpha), least) << static_cast<int>(place);
     for (const double agreement : found->agreement) EXPECT_GT(agreement, 0.8);
   }
+}
+
+TEST(FitMasks, HoldWhatHasTheColourOfTheTable) {
+  const Capture capture(Place::kTable, Thing::kLined);
+  const auto found = FindMasks(capture.input(), Workers(2));
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_GT(capture.Held(found->alpha), 0.6);  // 0.1 without
+  EXPECT_GT(capture.Iou(found->alpha), 0.91);
+}
+
+TEST(FitMasks, KeepHolesThatShowTheFloor) {
+  const Capture capture(Place::kRoom, Thing::kDrilled);
+  const auto found = FindMasks(capture.input(), Workers(2));
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_LT(capture.Held(found->alpha), 0.3);
+  EXPECT_GT(capture.Iou(found->alpha), 0.85);
+}
+
+// A square frame of 3 pixels around 9 x 9, with a gap of `gap` pixels on the left.
+std::vector<float> Frame(int gap) {
+  std::vector<float> out(24 * 20);
+  for (int y = 3; y < 18; ++y) {
+    for (int x = 3; x < 18; ++x) {
+      const bool within = x >= 6 && x < 15 && y >= 6 && y < 15;
+      const bool open = x < 6 && y >= 8 && y < 8 + gap;
+      out[static_cast<std::size_t>(24 * y + x)] = within || open ? 0.2f : 0.9f;
+    }
+  }
+  return out;
+}
+
+TEST(MaskHoles, AreWhatOnlyNarrowGapsJoinToTheBorder) {
+  for (const int gap : {0, 4}) {
+    const std::vector<Hole> holes = HolesOf(Frame(gap), {24, 20});
+    ASSERT_EQ(holes.size(), 1u) << gap;
+    EXPECT_EQ(holes[0].core.size(), 25u);
+    EXPECT_EQ(holes[0].pixels.size(), 81u);
+  }
+  EXPECT_TRUE(HolesOf(Frame(5), {24, 20}).empty());
+  EXPECT_TRUE(HolesOf(std::vector<float>(480), {24, 20}).empty());
 }
 
 TEST(FitMasks, AreTheSameForAnyNumberOfWorkers) {

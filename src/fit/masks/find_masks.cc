@@ -9,6 +9,7 @@
 #include "fit/masks/color_odds.h"
 #include "fit/masks/common_hull.h"
 #include "fit/masks/floor.h"
+#include "fit/masks/holes.h"
 #include "fit/masks/pixel_field.h"
 #include "fit/sphere.h"
 
@@ -17,12 +18,16 @@ namespace {
 
 constexpr int kRoundSide = 192;  // pixels of the longer side, about, of all rounds but the last
 constexpr int kRounds = 10;
+constexpr int kLateRounds = 4;  // after them, where masks have false holes
 // Share of the views that may see past a cell of the hull.
 constexpr double kFirstTolerance = 0.15, kLastTolerance = 0.06;
 // ln: of a pixel that nothing of the hull covers, and of one in its silhouette, in later rounds.
 constexpr float kOutsideHull = -5, kInsideHull = 0.4f;
 constexpr float kKept = 5;  // ln: of the rounds, for the last one at full resolution
 constexpr PixelField::Relaxing kRelaxing = {.rounds = 40, .coupling = 0.5f};
+constexpr float kShowsFloor = 0.85f;  // mean agreement with the floor of a hole that shows it
+constexpr float kAgrees = 1;          // of what is beyond the floor: nothing speaks against it
+constexpr float kClosed = 2;          // ln: of what is in one that does not, at least
 constexpr float kInsideMask = 0.5f;
 const Progress kDone = {"finding masks", kRounds + 1, kRounds + 1, ""};
 
@@ -32,6 +37,19 @@ Camera Reduced(Camera c, float factor) {
   c.cx /= factor;
   c.cy /= factor;
   return c;
+}
+
+// Raises the odds of what false holes hold: `closed` is 1 there.
+void KeepClosed(std::span<const float> closed, std::vector<float>* odds) {
+  for (std::size_t p = 0; p < closed.size(); ++p) {
+    if (closed[p] > 0) (*odds)[p] = std::max((*odds)[p], kClosed);
+  }
+}
+
+float MeanOf(const std::vector<float>& values, const std::vector<std::size_t>& where) {
+  float sum = 0;
+  for (const std::size_t p : where) sum += values[p];
+  return sum / static_cast<float>(where.size());
 }
 
 class MaskSearch {
@@ -53,6 +71,10 @@ class MaskSearch {
   }
 
   void Start(glm::vec3 middle);
+  Status Settle(const Watch& watch);
+  bool CloseFalseHoles();
+  std::vector<std::vector<Hole>> FindHoles() const;
+  void RelearnFloor(const std::vector<std::vector<Hole>>& holes);
   void Round(double time);
   std::vector<float> Enlarged(std::span<const float> values) const;
   std::vector<float> FullMask(std::size_t view) const;
@@ -65,8 +87,10 @@ class MaskSearch {
   std::vector<Camera> cameras_;
   ColorOdds odds_;
   std::optional<CommonHull> hull_;
+  std::optional<Floor> floor_;
   std::vector<PixelField> fields_;
   std::vector<float> inside_, on_floor_;  // [N,H,W]
+  std::vector<float> closed_;             // [N,H,W]: 1 in false holes
 };
 
 MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers)
@@ -76,7 +100,8 @@ MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& w
       images_(Reduce(full_, factor_)),
       odds_(images_, workers),
       inside_(images_.alpha.size()),
-      on_floor_(images_.alpha.size()) {
+      on_floor_(images_.alpha.size()),
+      closed_(images_.alpha.size()) {
   for (const Camera& c : input.cameras) cameras_.push_back(Reduced(c, static_cast<float>(factor_)));
   hull_.emplace(cameras_, ImageSize{images_.width, images_.height}, middle, workers);
   for (std::size_t v = 0; v < views(); ++v)
@@ -88,7 +113,7 @@ MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& w
 // Belief falls with the distance from where all views look; the hull holds all that they see.
 void MaskSearch::Start(glm::vec3 middle) {
   hull_->Vote(std::vector<float>(inside_.size(), 1.0f), kFirstTolerance, workers_);
-  const Floor floor(images_, cameras_, {middle, hull_->reach()}, workers_);
+  floor_.emplace(images_, cameras_, Floor::Region{middle, hull_->reach()}, workers_);
   const float radius = 0.5f * static_cast<float>(std::min(images_.width, images_.height));
   workers_.For(views(), [&](std::size_t v, std::size_t) {
     const auto at = hull_->Project(v, middle);
@@ -99,7 +124,7 @@ void MaskSearch::Start(glm::vec3 middle) {
       const float d = x * x + y * y;
       inside_[v * plane() + p] = 0.9f * std::exp(-d * d);
     }
-    if (floor.found()) std::ranges::copy(floor.Agreement(v), Of(v, &on_floor_).begin());
+    if (floor_->found()) std::ranges::copy(floor_->Agreement(v), Of(v, &on_floor_).begin());
   });
 }
 
@@ -111,9 +136,48 @@ void MaskSearch::Round(double time) {
     const std::vector<float> hull = hull_->Silhouette(v);
     for (std::size_t p = 0; p < odds.size(); ++p)
       odds[p] += kOutsideHull * (1 - hull[p]) + inside_hull * hull[p];
+    KeepClosed(Of(v, closed_), &odds);
     std::ranges::copy(fields_[v].Relax(odds, kRelaxing), Of(v, &inside_).begin());
   });
   hull_->Vote(inside_, kFirstTolerance + time * (kLastTolerance - kFirstTolerance), workers_);
+}
+
+std::vector<std::vector<Hole>> MaskSearch::FindHoles() const {
+  std::vector<std::vector<Hole>> out(views());
+  workers_.For(views(), [&](std::size_t v, std::size_t) {
+    out[v] = HolesOf(Of(v, inside_), {images_.width, images_.height});
+  });
+  return out;
+}
+
+void MaskSearch::RelearnFloor(const std::vector<std::vector<Hole>>& holes) {
+  std::vector<float> in_hole(inside_.size());
+  for (std::size_t v = 0; v < views(); ++v) {
+    for (const Hole& hole : holes[v]) {
+      for (const std::size_t p : hole.pixels) Of(v, &in_hole)[p] = 1;
+    }
+  }
+  floor_->Relearn(inside_, in_hole, workers_);
+}
+
+// A hole shows the floor as other views see it there, or what lies beyond; else it is a part of the
+// object that has the background's colours. Whether there was such a part.
+bool MaskSearch::CloseFalseHoles() {
+  if (!floor_->found()) return false;
+  const std::vector<std::vector<Hole>> holes = FindHoles();
+  RelearnFloor(holes);
+  bool any = false;
+  for (std::size_t v = 0; v < views(); ++v) {
+    if (holes[v].empty()) continue;
+    const std::vector<float> agreement = floor_->Agreement(v, kAgrees);
+    for (const Hole& hole : holes[v]) {
+      if (MeanOf(agreement, hole.core) >= kShowsFloor) continue;
+      any = true;
+      for (const std::size_t p : hole.pixels) Of(v, &closed_)[p] = Of(v, &inside_)[p] = 1;
+    }
+  }
+  if (any) hull_->Vote(inside_, kLastTolerance, workers_);
+  return any;
 }
 
 Status MaskSearch::CheckReach() const {
@@ -126,6 +190,18 @@ Status MaskSearch::Run(const Watch& watch) {
   for (int round = 0; round < kRounds; ++round) {
     TILEGRAD_TRY(watch.At({"finding masks", static_cast<std::uint64_t>(round), kRounds + 1, ""}));
     Round(static_cast<double>(round) / (kRounds - 1));
+  }
+  return Settle(watch);
+}
+
+// Rounds with false holes closed. What they cover then hides others, so that all are sought again.
+Status MaskSearch::Settle(const Watch& watch) {
+  bool any = false;
+  for (int round = 0; round < kLateRounds; ++round) {
+    TILEGRAD_TRY(watch.At({"finding masks", kRounds, kRounds + 1, ""}));
+    any = CloseFalseHoles() || any;
+    if (!any) break;
+    Round(1);
   }
   return watch.At({"finding masks", kRounds, kRounds + 1, ""});
 }
@@ -143,6 +219,7 @@ std::vector<float> MaskSearch::Enlarged(std::span<const float> values) const {
 
 std::vector<float> MaskSearch::FullMask(std::size_t view) const {
   std::vector<float> odds = odds_.Of(full_, view, Enlarged(Of(view, on_floor_)));
+  KeepClosed(Enlarged(Of(view, closed_)), &odds);
   const std::vector<float> before = Enlarged(Of(view, inside_));
   for (std::size_t p = 0; p < odds.size(); ++p) odds[p] += kKept * (2 * before[p] - 1);
   const std::size_t pixels = full_.pixels();

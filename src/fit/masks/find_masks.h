@@ -9,7 +9,10 @@
 // the object by the floor that they lie on (floor.h). This is N. Campbell et al., Automatic 3D
 // object segmentation in multiple views using volumetric graph-cuts (2010), with a mean field for
 // their graph cut and a floor. All views share the colours, so that what stands behind the object
-// in one is known from those that see it beside. In the end once at full resolution.
+// in one is known from those that see it beside. Where the object itself has the background's
+// colours, masks get holes, through which the object would be lost from all views; those that do
+// not show the floor as other views see it are closed (holes.h), and some rounds follow. In the end
+// once at full resolution.
 #pragma once
 
 #include <vector>

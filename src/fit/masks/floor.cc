@@ -11,8 +11,10 @@ namespace {
 
 constexpr int kSearchSide = 40, kTexelSide = 160;  // texels along the square
 constexpr int kHeights = 48, kBetween = 4;         // heights that are tried; then between them
-constexpr float kSame = 0.05f;       // standard deviation of one place's colour over views
-constexpr float kLeastViews = 0.4f;  // share of the views whose images must have a place
+constexpr float kSame = 0.05f;           // standard deviation of one place's colour over views
+constexpr float kLeastViews = 0.4f;      // share of the views whose images must have a place
+constexpr std::size_t kLeastBeside = 2;  // views that see a place beside the object
+constexpr float kHiding = 0.5f;          // of a pixel that shows the object
 constexpr float kNoSupport = 0.25f, kFullSupport = 0.5f;  // of a colour that is believed
 
 float Likeness(glm::vec3 a, glm::vec3 b) {
@@ -37,6 +39,24 @@ bool StandsOut(std::span<const float> scores, std::ptrdiff_t best) {
   if (best < kAside || best + kAside >= std::ssize(scores)) return false;
   const auto at = [&](std::ptrdiff_t i) { return scores[static_cast<std::size_t>(i)]; };
   return at(best) > kHigher * std::max(at(best - kAside), at(best + kAside));
+}
+
+// 1 where something is inside, and next to it, where smoothed colours are partly its own.
+std::vector<std::uint8_t> Widened(std::span<const float> inside, ImageSize size) {
+  std::vector<std::uint8_t> out(inside.size());
+  const std::size_t plane =
+      static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    if (inside[i] < kHiding) continue;
+    const std::size_t view = i / plane;
+    const int x = static_cast<int>(i % plane) % size.width,
+              y = static_cast<int>(i % plane) / size.width;
+    for (int v = std::max(0, y - 1); v <= std::min(size.height - 1, y + 1); ++v) {
+      for (int u = std::max(0, x - 1); u <= std::min(size.width - 1, x + 1); ++u)
+        out[view * plane + static_cast<std::size_t>(v * size.width + u)] = 1;
+    }
+  }
+  return out;
 }
 
 std::ptrdiff_t Highest(const std::vector<float>& scores) {
@@ -116,35 +136,27 @@ glm::vec3 Floor::PointOf(float height, int side, std::size_t texel) const {
   return region_.middle + height * up_ + region_.reach * (u * along_ + v * across_);
 }
 
-glm::vec3 Floor::ColorAt(std::size_t view, std::size_t pixel) const {
-  const float* from = &smooth_[3 * (view * images_.pixels() + pixel)];
+glm::vec3 Floor::ColorAt(std::size_t pixel) const {
+  const float* from = &smooth_[3 * pixel];
   return {from[0], from[1], from[2]};
 }
 
-bool Floor::Look(std::size_t view, glm::vec3 p, glm::vec3* color) const {
+std::optional<std::size_t> Floor::PixelOf(std::size_t view, glm::vec3 p) const {
   const Camera& c = cameras_[view];
   const float depth = -(glm::dot(AxisOf(c, 2), p) + c.translation[2]);
-  if (!(depth > c.near_plane)) return false;
+  if (!(depth > c.near_plane)) return std::nullopt;
   const float x = c.cx + c.fx * (glm::dot(AxisOf(c, 0), p) + c.translation[0]) / depth;
   const float y = c.cy - c.fy * (glm::dot(AxisOf(c, 1), p) + c.translation[1]) / depth;
   const bool in = x >= 0 && y >= 0 && x < static_cast<float>(images_.width) &&
                   y < static_cast<float>(images_.height);
-  if (!in) return false;
-  *color = ColorAt(
-      view, static_cast<std::size_t>(static_cast<int>(y) * images_.width + static_cast<int>(x)));
-  return true;
+  if (!in) return std::nullopt;
+  return view * images_.pixels() +
+         static_cast<std::size_t>(static_cast<int>(y) * images_.width + static_cast<int>(x));
 }
 
-// The colour that is most like those of the other views.
-Floor::Texel Floor::Seen(glm::vec3 point) const {
-  std::vector<glm::vec3> colors;
-  for (std::size_t v = 0; v < cameras_.size(); ++v) {
-    glm::vec3 color;
-    if (Look(v, point, &color)) colors.push_back(color);
-  }
+// The colour that is most like the others. Its support is their sum of likenesses.
+Floor::Texel Floor::Agreed(std::span<const glm::vec3> colors) {
   Texel best;
-  if (static_cast<float>(colors.size()) < kLeastViews * static_cast<float>(cameras_.size()))
-    return best;
   for (const glm::vec3 a : colors) {
     float support = 0;
     glm::vec3 sum(0);
@@ -155,8 +167,46 @@ Floor::Texel Floor::Seen(glm::vec3 point) const {
     }
     if (support > best.support) best = {sum / support, support};
   }
+  return best;
+}
+
+Floor::Texel Floor::Seen(glm::vec3 point) const {
+  std::vector<glm::vec3> colors;
+  for (std::size_t v = 0; v < cameras_.size(); ++v) {
+    if (const auto pixel = PixelOf(v, point)) colors.push_back(ColorAt(*pixel));
+  }
+  if (static_cast<float>(colors.size()) < kLeastViews * static_cast<float>(cameras_.size()))
+    return {};
+  Texel best = Agreed(colors);
   best.support /= static_cast<float>(colors.size());
   return best;
+}
+
+// `hidden` [N,H,W]: 0 where a view looks past the object. Among few views, none supports itself.
+Floor::Texel Floor::SeenBeside(glm::vec3 point, const std::vector<std::uint8_t>& hidden) const {
+  std::vector<glm::vec3> colors;
+  for (std::size_t v = 0; v < cameras_.size(); ++v) {
+    const auto pixel = PixelOf(v, point);
+    if (pixel && hidden[*pixel] == 0) colors.push_back(ColorAt(*pixel));
+  }
+  if (colors.size() < kLeastBeside) return {};
+  Texel best = Agreed(colors);
+  best.support = (best.support - 1) / static_cast<float>(colors.size() - 1);
+  return best;
+}
+
+void Floor::Relearn(std::span<const float> inside, std::span<const float> holes,
+                    const Workers& workers) {
+  std::vector<std::uint8_t> hidden = Widened(inside, {images_.width, images_.height});
+  std::vector<std::uint8_t> hidden_or_hole = hidden;
+  for (std::size_t p = 0; p < hidden.size(); ++p) hidden_or_hole[p] |= holes[p] > 0;
+  workers.For(kTexelSide, [&](std::size_t y, std::size_t) {
+    for (std::size_t i = y * kTexelSide; i < (y + 1) * kTexelSide; ++i) {
+      const glm::vec3 point = PointOf(height_, kTexelSide, i);
+      texels_[i] = SeenBeside(point, hidden_or_hole);
+      if (texels_[i].support == 0) texels_[i] = SeenBeside(point, hidden);
+    }
+  });
 }
 
 float Floor::ScoreAt(float height) const {
@@ -178,7 +228,7 @@ const Floor::Texel* Floor::TexelAt(glm::vec3 eye, glm::vec3 ray) const {
   return &texels_[static_cast<std::size_t>(v) * kTexelSide + static_cast<std::size_t>(u)];
 }
 
-std::vector<float> Floor::Agreement(std::size_t view) const {
+std::vector<float> Floor::Agreement(std::size_t view, float beyond) const {
   const Camera& c = cameras_[view];
   const glm::vec3 eye = EyeOf(c);
   const auto wide = static_cast<std::size_t>(images_.width);
@@ -187,9 +237,12 @@ std::vector<float> Floor::Agreement(std::size_t view) const {
     const float x = (static_cast<float>(p % wide) + 0.5f - c.cx) / c.fx,
                 y = -(static_cast<float>(p / wide) + 0.5f - c.cy) / c.fy;
     const Texel* texel = TexelAt(eye, x * AxisOf(c, 0) + y * AxisOf(c, 1) - AxisOf(c, 2));
-    if (texel == nullptr) continue;
+    if (texel == nullptr) {
+      out[p] = beyond;
+      continue;
+    }
     const float belief = (texel->support - kNoSupport) / (kFullSupport - kNoSupport);
-    const float like = Likeness(texel->color, ColorAt(view, p));
+    const float like = Likeness(texel->color, ColorAt(view * images_.pixels() + p));
     out[p] = std::clamp(belief, 0.0f, 1.0f) * std::clamp(3 * like - 1, -1.0f, 1.0f);
   }
   return out;

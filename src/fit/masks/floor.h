@@ -4,7 +4,9 @@
 // parts before one place of it.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,13 +29,19 @@ class Floor {
   Floor(const TargetImages& images, std::span<const Camera> cameras, const Region& region,
         const Workers& workers);
 
+  // Learns its colours anew, from views that see it beside the object: where they are not `inside`
+  // [N,H,W] in [0, 1]; of a place that fewer than two such see, from those that see it through
+  // `holes`, too: [N,H,W], 1 there.
+  void Relearn(std::span<const float> inside, std::span<const float> holes, const Workers& workers);
+
   // Whether one height stands out; else nothing is known of a floor.
   bool found() const { return found_; }
   // Along UpOf, from the region's middle.
   float height() const { return height_; }
   // [H,W] in [-1, 1]: 1 where a view's pixel has the colour that most views see where it meets the
-  // floor; -1 where it has another, so that something stands before it; 0 where nothing is known.
-  std::vector<float> Agreement(std::size_t view) const;
+  // floor; -1 where it has another, so that something stands before it; 0 where nothing is known;
+  // `beyond` where it looks past the square whose colours are known.
+  std::vector<float> Agreement(std::size_t view, float beyond = 0) const;
 
  private:
   struct Texel {
@@ -45,10 +53,13 @@ class Floor {
   // Of a square of side x side texels.
   glm::vec3 PointOf(float height, int side, std::size_t texel) const;
   const Texel* TexelAt(glm::vec3 eye, glm::vec3 ray) const;
+  static Texel Agreed(std::span<const glm::vec3> colors);
   Texel Seen(glm::vec3 point) const;
+  Texel SeenBeside(glm::vec3 point, const std::vector<std::uint8_t>& hidden) const;
   float ScoreAt(float height) const;
-  glm::vec3 ColorAt(std::size_t view, std::size_t pixel) const;
-  bool Look(std::size_t view, glm::vec3 point, glm::vec3* color) const;
+  glm::vec3 ColorAt(std::size_t pixel) const;  // of [N,H,W]
+  // Where in [N,H,W] a view sees a point; none beside its image.
+  std::optional<std::size_t> PixelOf(std::size_t view, glm::vec3 point) const;
 
   const TargetImages& images_;
   const std::span<const Camera> cameras_;

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Holes of masks, true or false.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "scene/camera.h"
+
+namespace tilegrad::train {
+
+struct Hole {
+  std::vector<std::size_t> core;    // pixels so far inside that no blur mixes them with the rim
+  std::vector<std::size_t> pixels;  // all of it, the core included
+};
+
+// What `inside` [H,W] in [0, 1] does not cover and no way wider than four pixels joins to the
+// image's border, where that has a core of eight pixels.
+std::vector<Hole> HolesOf(std::span<const float> inside, ImageSize size);
+
+}  // namespace tilegrad::train
