@@ -201,22 +201,18 @@ py::dict LoadCheckpoint(const Path& path) {
 }  // namespace
 
 void BindArrayFiles(py::module_& m) {
-  m.def("load_image", &LoadImage, py::arg("path"), py::arg("max_bytes") = 0, "(H, W, C) uint8.");
-  m.def("save_png", &SavePng, py::arg("path"), py::arg("pixels"), "Writes (H, W, C) uint8.");
-  m.def("load_exr", &LoadExr, py::arg("path"), py::arg("max_bytes") = 0,
+  m.def("load_image", &LoadImage, "(H, W, C) uint8.");
+  m.def("save_png", &SavePng, "Writes (H, W, C) uint8.");
+  m.def("load_exr", &LoadExr,
         "Names of channels, (C, H, W) float32, and warnings about skipped data.");
-  m.def("save_exr", &SaveExr, py::arg("path"), py::arg("names"), py::arg("planes"),
-        "Writes (C, H, W) float32 with names of channels.");
-  m.def("load_npy", &LoadNpy, py::arg("path"), py::arg("max_bytes") = 0,
-        "The array of an .npy file.");
-  m.def("save_npy", &SaveNpy, py::arg("path"), py::arg("array"), "Writes an .npy file.");
-  m.def("load_safetensors", &LoadSafetensors, py::arg("path"), py::arg("max_bytes") = 0,
-        "Arrays and metadata by name.");
-  m.def("save_safetensors", &SaveSafetensors, py::arg("path"), py::arg("arrays"),
-        py::arg("metadata"), "Writes arrays and metadata by name.");
-  m.def("load_npz", &LoadNpz, py::arg("path"), py::arg("max_bytes") = 0, "Arrays by name.");
-  m.def("save_npz", &SaveNpz, py::arg("path"), py::arg("arrays"), "Writes arrays by name.");
-  m.def("load_checkpoint", &LoadCheckpoint, py::arg("path"),
+  m.def("save_exr", &SaveExr, "Writes (C, H, W) float32 with names of channels.");
+  m.def("load_npy", &LoadNpy, "The array of an .npy file.");
+  m.def("save_npy", &SaveNpy, "Writes an .npy file.");
+  m.def("load_safetensors", &LoadSafetensors, "Arrays and metadata by name.");
+  m.def("save_safetensors", &SaveSafetensors, "Writes arrays and metadata by name.");
+  m.def("load_npz", &LoadNpz, "Arrays by name.");
+  m.def("save_npz", &SaveNpz, "Writes arrays by name.");
+  m.def("load_checkpoint", &LoadCheckpoint,
         "A checkpoint, or the newest whole one of a run folder.");
 }
 
@@ -272,18 +268,18 @@ py::array FromGltf(const Mat4Array& node_to_world, const Vec3Array& lens, const 
 }  // namespace
 
 void BindCameraFiles(py::module_& m) {
-  m.def("load_cameras", &LoadCameras, py::arg("path"), py::arg("size"), py::arg("half"),
+  m.def("load_cameras", &LoadCameras,
         "(name, 17 numbers, (width, height)) of each camera of a file or folder.");
-  m.def("save_cameras", &SaveCameras, py::arg("path"), py::arg("format"), py::arg("views"),
+  m.def("save_cameras", &SaveCameras,
         "Writes what load_cameras returns, as \"opencv\", \"nerf\" or \"colmap\".");
-  m.def("from_gltf", &FromGltf, py::arg("node_to_world"), py::arg("lens"), py::arg("size"),
+  m.def("from_gltf", &FromGltf,
         "17 numbers of a glTF camera: 16 numbers row by row, (yfov, aspect ratio, near plane).");
   m.def(
       "rotation_from_vector",
       [](const Vec3Array& rvec) {
         return CopyOf<double>(RotationFromVector(rvec), {3, 3});
       },
-      py::arg("rvec"), "(3, 3) from OpenCV's rotation vector.");
+      "(3, 3) from OpenCV's rotation vector.");
 }
 
 }  // namespace tilegrad::python

@@ -203,18 +203,15 @@ py::array To(const std::string& name, const py::object& cameras, Size size, bool
 }  // namespace
 
 void BindCamera(py::module_& m) {
-  m.def("camera_look_at", &LookAt, py::arg("fov_y"), py::arg("size"), py::arg("eye"),
-        py::arg("target"), py::arg("up"), "Cameras (n, 17) from eyes and targets.");
-  m.def("camera_orbit", &Orbit, py::arg("fov_y"), py::arg("size"), py::arg("orbits"),
-        "Cameras (n, 17) from azimuth, elevation, distance.");
+  m.def("camera_look_at", &LookAt, "Cameras (n, 17) from eyes and targets.");
+  m.def("camera_orbit", &Orbit, "Cameras (n, 17) from azimuth, elevation, distance.");
   m.def("camera_from", &From, py::arg("convention"), py::arg("rows"), py::arg("size") = Size(0, 0),
         py::arg("half") = false,
         "Cameras (n, 17) from the concatenated arguments of Camera.from_...");
   m.def("camera_to", &To, py::arg("convention"), py::arg("cameras"), py::arg("size") = Size(0, 0),
         py::arg("half") = false, py::arg("far_plane") = 0.0,
         "The arguments of Camera.from_..., concatenated, from cameras (n, 17).");
-  m.def("camera_resize", &Resize, py::arg("cameras"), py::arg("from_size"), py::arg("to_size"),
-        "Cameras (n, 17) for images of another size.");
+  m.def("camera_resize", &Resize, "Cameras (n, 17) for images of another size.");
 }
 
 }  // namespace tilegrad::python

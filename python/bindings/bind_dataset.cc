@@ -107,22 +107,17 @@ py::tuple Batch(train::BatchOrder& order, std::int64_t step, int size, int views
 
 void BindDataset(py::module_& m) {
   py::class_<Dataset>(m, "DatasetFiles", "A dataset on disk.")
-      .def(py::init([](const Path& folder) { return ValueOrThrow(Dataset::Open(folder)); }),
-           py::arg("folder"))
+      .def(py::init([](const Path& folder) { return ValueOrThrow(Dataset::Open(folder)); }))
       .def_property_readonly("info", &InfoDict, "Source, camera and image settings.")
       .def_property_readonly("models", &ModelList, "Metadata of each model.")
       .def_property_readonly("cameras", &Cameras, "(views, 17) float64.")
-      .def("load_images", &LoadImages, py::arg("model"), "(views, 4, H, W) uint8.")
-      .def("load_all_images", &LoadAllImages, py::arg("models"), py::arg("threads"),
-           "(models, views, 4, H, W) uint8.")
-      .def("load_cameras", &LoadModelCameras, py::arg("model"),
-           "Of its views, (views, 17) float64.")
-      .def("load_truth", &LoadTruth, py::arg("model"), "Occupancy, points, mesh.");
+      .def("load_images", &LoadImages, "(views, 4, H, W) uint8.")
+      .def("load_all_images", &LoadAllImages, "(models, views, 4, H, W) uint8.")
+      .def("load_cameras", &LoadModelCameras, "Of its views, (views, 17) float64.")
+      .def("load_truth", &LoadTruth, "Occupancy, points, mesh.");
   py::class_<train::BatchOrder>(m, "BatchOrder", "Training batches, one per step.")
-      .def(py::init<int, int, std::uint64_t>(), py::arg("models"), py::arg("views"),
-           py::arg("seed"))
-      .def("batch", &Batch, py::arg("step"), py::arg("size"), py::arg("views"),
-           "Models (size,) and their views (size, views), int32.");
+      .def(py::init<int, int, std::uint64_t>())
+      .def("batch", &Batch, "Models (size,) and their views (size, views), int32.");
 }
 
 }  // namespace tilegrad::python

@@ -120,11 +120,10 @@ py::dict SceneOfMesh(const py::dict& dict, bool linear, const std::string& norma
 }  // namespace
 
 void BindMeshes(py::module_& m) {
-  m.def("load_mesh", &LoadMesh, py::arg("path"), py::arg("max_bytes") = 0,
-        "The arrays of a mesh file.");
-  m.def("save_mesh", &SaveMesh, py::arg("path"), py::arg("mesh"), "Writes a .glb file.");
+  m.def("load_mesh", &LoadMesh, "The arrays of a mesh file.");
+  m.def("save_mesh", &SaveMesh, "Writes a .glb file.");
   m.def("mesh_endings", &io::MeshFileEndings, "Endings of files that load_mesh reads.");
-  m.def("scene_of_mesh", &SceneOfMesh, py::arg("mesh"), py::arg("linear"), py::arg("normals"),
+  m.def("scene_of_mesh", &SceneOfMesh,
         "The parts of a scene that come from a mesh; normals: \"auto\", \"smooth\" or \"flat\".");
 }
 

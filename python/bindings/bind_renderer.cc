@@ -94,7 +94,7 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
   using Frame = FrameObject<T>;
   py::class_<Scene, std::shared_ptr<Scene>>(m, ("Scene" + suffix).c_str(),
                                             "The images of one tilegrad.Scene.")
-      .def(py::init<std::size_t, SceneArrays>(), py::arg("count"), py::arg("arrays"),
+      .def(py::init<std::size_t, SceneArrays>(),
            "count: images; arrays: checked by tilegrad._scene.")
       .def_property_readonly("count", &Scene::count, "How many images.");
   const auto number = [](auto member) {
@@ -116,7 +116,6 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
              const RenderOptions& options, const std::vector<bool>& outputs) {
             return r.Render(std::move(scenes), options, OutputsOf(outputs));
           },
-          py::arg("scenes"), py::arg("options"), py::arg("outputs"),
           "The frame of a list of scenes; outputs: a flag for each of IMAGES.")
       .def(
           "backward",
@@ -125,7 +124,6 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
             r.Backward(frame, CotangentsOf(frame, cotangents), gradients,
                        add ? GradientMode::kAdd : GradientMode::kOverwrite);
           },
-          py::arg("frame"), py::arg("cotangents"), py::arg("gradients"), py::arg("add") = false,
           "Fills the arrays of gradients, a dictionary by name for each scene.");
 }
 
@@ -207,8 +205,7 @@ void BindRenderer(py::module_& m) {
   BindOptions(m);
   BindSceneArrays(m);
   py::class_<RendererObject> renderer(m, "Renderer", "Threads and scratch memory.");
-  renderer
-      .def(py::init<int>(), py::arg("threads"), "threads: as of tilegrad.Renderer, checked there.")
+  renderer.def(py::init<int>(), "threads: as of tilegrad.Renderer, checked there.")
       .def_property_readonly("threads", &RendererObject::threads, "As given; 0: one a core.");
   BindNumbers<float>(m, renderer, "32");
   BindNumbers<double>(m, renderer, "64");

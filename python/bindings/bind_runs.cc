@@ -208,9 +208,8 @@ py::dict Train(const py::dict& request, const py::object& listener) {
 }  // namespace
 
 void BindRuns(py::module_& m) {
-  m.def("fit", &Fit, py::arg("views"), py::arg("request"), py::arg("listener"),
-        "listener(stage, done, total) is called at each step; returning True stops.");
-  m.def("train", &Train, py::arg("request"), py::arg("listener"), "As fit.");
+  m.def("fit", &Fit, "listener(stage, done, total) is called at each step; returning True stops.");
+  m.def("train", &Train, "As fit.");
   m.def(
       "config_names",
       [] {
@@ -300,22 +299,19 @@ class Model {
 }  // namespace
 
 void BindPredictor(py::module_& m) {
-  m.def("prepare_cutout", &PrepareCutout, py::arg("image"), py::arg("mask"), py::arg("size"),
-        py::arg("keep_framing"), "(4, size, size) uint8 of a picture (H, W, C) uint8.");
+  m.def("prepare_cutout", &PrepareCutout, "(4, size, size) uint8 of a picture (H, W, C) uint8.");
   m.attr("CUTOUT_WEIGHTS") = train::kCutoutWeights;
   m.attr("REFINE_SIZE") = train::kRefineSize;
   py::class_<Model>(m, "Model", "A trained network.")
-      .def(py::init(&Model::Load), py::arg("path"), py::arg("threads"),
-           "path: as of train::FindRun.")
+      .def(py::init(&Model::Load), "path: as of train::FindRun.")
       .def_property_readonly("image_size", &Model::image_size, "Pixels a side.")
       .def_property_readonly("description", &Model::description, "A one-line description.")
       .def_property_readonly("refine_steps", &Model::refine_steps,
                              "Of a prediction, if no number is given.")
       .def("template_mesh", &Model::TemplateMesh, "The template sphere.")
-      .def("predict", &Model::Predict, py::arg("images"),
-           "Meshes of images (N, 4, size, size) uint8.")
-      .def("predict_refined", &Model::PredictRefined, py::arg("image"), py::arg("picture"),
-           py::arg("steps"), "The mesh of image (1, 4, size, size), refined on picture (4, n, n).");
+      .def("predict", &Model::Predict, "Meshes of images (N, 4, size, size) uint8.")
+      .def("predict_refined", &Model::PredictRefined,
+           "The mesh of image (1, 4, size, size), refined on picture (4, n, n).");
 }
 
 }  // namespace tilegrad::python

@@ -59,7 +59,7 @@ struct Queries {
 template <class Tree, class T, class TreeOf, class Answer>
 void AskTrees(const Queries& how, std::span<const T> queries, const TreeOf& tree_of,
               const Answer& answer) {
-  Run(how.function, [&]() -> Status {
+  Run(how.function, [&] {
     for (std::size_t b = 0; b < how.batch; ++b) {
       const auto points = PointsOf(Part(queries, how.batch, b));
       const Tree tree(tree_of(b));
@@ -70,7 +70,6 @@ void AskTrees(const Queries& how, std::span<const T> queries, const TreeOf& tree
                               }
                             });
     }
-    return {};
   });
 }
 
@@ -160,22 +159,20 @@ double VoxelIou(const py::object& a, const py::array& b) {
 }  // namespace
 
 void BindSurfaces(py::module_& m) {
-  m.def("nearest_points", &NearestPoints, py::arg("from_points"), py::arg("to_points"),
-        py::arg("threads"),
+  m.def("nearest_points", &NearestPoints,
         "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
   m.def(
-      "nearest_faces", &NearestFaces, py::arg("points"), py::arg("face_vertices"),
-      py::arg("threads"),
+      "nearest_faces", &NearestFaces,
       "(B, N, 3), (B, F, 3, 3) -> the nearest face (B, N) int64 and the weights of its corners in\n"
       "the nearest point (B, N, 3): 0 on the opposite edge.");
-  m.def("enclosed", &Enclosed, py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
+  m.def("enclosed", &Enclosed,
         "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
-  m.def("sample_faces", &SampleFaces, py::arg("areas"), py::arg("count"), py::arg("seed"),
+  m.def("sample_faces", &SampleFaces,
         "(F,) float64 -> faces (count,) int64, distributed by area, and weights of their corners\n"
         "(count, 3) float64.");
-  m.def("surface_voxels", &SurfaceVoxels, py::arg("face_vertices"), py::arg("resolution"),
+  m.def("surface_voxels", &SurfaceVoxels,
         "(F, 3, 3) float64, in voxels -> those that the faces pass through (R, R, R) uint8.");
-  m.def("voxel_iou", &VoxelIou, py::arg("pred"), py::arg("gt"), "(N,) uint8, (N,) uint8.");
+  m.def("voxel_iou", &VoxelIou, "(N,) uint8, (N,) uint8.");
 }
 
 // The losses of training and fitting (train/losses), each as its value and its gradient: float32 or
@@ -210,11 +207,10 @@ Outcome OfMesh(const char* function, const py::array& positions, const py::array
     py::array_t<T> gradient = NewArrayLike<T>(positions);
     const std::span<T> d_p = NumbersOf(gradient);
     double value = 0;
-    Run(function, [&]() -> Status {
+    Run(function, [&] {
       std::fill(d_p.begin(), d_p.end(), T(0));
       value =
           loss(BuildTopology(triangles, p.size() / 3), std::span<const Face>(triangles), p, d_p);
-      return {};
     });
     return {value, gradient};
   });
@@ -262,7 +258,7 @@ Outcome Iou(const py::array& alpha, const py::array& truth) {
     py::array_t<T> gradient = NewArrayLike<T>(alpha);
     const std::span<T> d_alpha = NumbersOf(gradient);
     double sum = 0;
-    Run("iou", [&]() -> Status {
+    Run("iou", [&] {
       const std::size_t pixels = images == 0 ? 0 : predicted.size() / images;
       for (std::size_t i = 0; i < images; ++i) {
         const auto s = wanted.subspan(i * pixels, pixels);
@@ -271,7 +267,6 @@ Outcome Iou(const py::array& alpha, const py::array& truth) {
         train::IouBackward(sums, s, 1.0 / static_cast<double>(images),
                            d_alpha.subspan(i * pixels, pixels));
       }
-      return {};
     });
     return {sum, gradient};
   });
@@ -281,11 +276,10 @@ Outcome Iou(const py::array& alpha, const py::array& truth) {
 
 void BindLosses(py::module_& m) {
   const char* text = "(value, gradient) of a mesh: positions (V, 3), faces (F, 3) int32.";
-  m.def("edge_length", &EdgeLength, py::arg("positions"), py::arg("faces"), text);
-  m.def("normal_consistency", &NormalConsistency, py::arg("positions"), py::arg("faces"), text);
-  m.def("laplacian", &Laplacian, py::arg("movement"), py::arg("faces"), text);
-  m.def("iou", &Iou, py::arg("alpha"), py::arg("truth"),
-        "(value, gradient) of images (N, pixels).");
+  m.def("edge_length", &EdgeLength, text);
+  m.def("normal_consistency", &NormalConsistency, text);
+  m.def("laplacian", &Laplacian, text);
+  m.def("iou", &Iou, "(value, gradient) of images (N, pixels).");
 }
 
 }  // namespace tilegrad::python

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "base/array_checks.h"
@@ -85,15 +86,26 @@ std::span<const T> FiniteSpanOf(const py::object& array, const char* function, c
   throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
 }
 
-// Runs engine work without the GIL.
+// Runs engine work without the GIL; it returns a Status or nothing.
 template <class Work>
 void Run(const char* function, const Work& work) {
   Status status;
   {
     const py::gil_scoped_release released;
-    status = work();
+    if constexpr (std::is_void_v<decltype(work())>) {
+      work();
+    } else {
+      status = work();
+    }
   }
   ThrowIfError(status.Within(function));
+}
+
+// The same of work(SharedWorkers(threads)).
+template <class Work>
+void Run(const char* function, int threads, const Work& work) {
+  const Workers& workers = SharedWorkers(threads);
+  Run(function, [&] { return work(workers); });
 }
 
 }  // namespace tilegrad::python

@@ -45,8 +45,7 @@ PYBIND11_MODULE(_core, m) {
         "forces one.");
   BindRenderer(m);
   BindCamera(m);
-  m.def("icosphere", &IcosphereArrays, py::arg("level"), py::arg("radius"),
-        "(V, 3) float32, (F, 3) int32.");
+  m.def("icosphere", &IcosphereArrays, "(V, 3) float32, (F, 3) int32.");
   BindKaolin(m);
   BindNvdiffrast(m);
   BindPytorch3d(m);

@@ -315,7 +315,7 @@ def _parts(mesh: Any) -> tuple[Any, Any]:
     """Vertices, and faces or None."""
     if isinstance(mesh, (str, bytes, os.PathLike)):
         from tilegrad import _tools
-        arrays = _tools.load_mesh(name_of(mesh))
+        arrays = _tools.load_mesh(name_of(mesh), 0)
         return arrays["positions"], arrays["faces"]
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return mesh[0], mesh[1]

@@ -48,8 +48,7 @@ py::tuple RasterizeFaces(const py::array& xy, const py::array& z, const py::arra
     auto ids = NewArray<std::int32_t>({of.images, height, width});
     const auto to_image = NumbersOf(image);
     const auto to_ids = NumbersOf(ids);
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] {
+    Run(kName, threads, [&](const Workers& workers) {
       return kaolin::RasterizeProjected<T>(batch, {{width, height}, eps}, values,
                                            static_cast<std::size_t>(channels), workers, to_ids,
                                            to_image);
@@ -77,8 +76,7 @@ py::tuple RasterizeFacesBackward(const py::array& xy, const py::array& features,
     auto d_features = NewArray<T>({wants_features ? of.images : 0, of.faces, 3, channels});
     adjoint.d_xy = NumbersOf(d_xy);
     adjoint.d_features = NumbersOf(d_features);
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] {
+    Run(kName, threads, [&](const Workers& workers) {
       return kaolin::RasterizeProjectedBackward<T>(
           batch, {{static_cast<int>(width), static_cast<int>(height)}, eps}, values,
           static_cast<std::size_t>(channels), workers, adjoint);
@@ -115,8 +113,7 @@ py::tuple SoftMask(const py::array& xy, const py::array& ids,
     auto mask = NewArray<T>({in.of.images, in.height, in.width});
     const auto to = NumbersOf(mask);
     double bound = 0;
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&]() -> Status {
+    Run(kName, threads, [&](const Workers& workers) -> Status {
       TILEGRAD_ASSIGN(bound,
                       kaolin::ProjectedSoftMask<T>(in.batch, in.options, in.ids, workers, to));
       return {};
@@ -136,8 +133,7 @@ py::array SoftMaskBackward(const py::array& xy, const py::array& ids, const py::
         SpanOf<T>(d_mask, kName, "the gradient", {in.of.images, in.height, in.width});
     auto d_xy = NewArray<T>({in.of.images, in.of.faces, 3, 2});
     const auto to = NumbersOf(d_xy);
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] {
+    Run(kName, threads, [&](const Workers& workers) {
       return kaolin::ProjectedSoftMaskBackward<T>(in.batch, in.options, workers,
                                                   {in.ids, alpha, d_alpha, to});
     });
@@ -175,24 +171,17 @@ void BindMaskOptions(py::module_& m) {
 
 void BindKaolin(py::module_& m) {
   BindMaskOptions(m);
-  m.def("rasterize_projected", &RasterizeFaces, py::arg(kFaces), py::arg("face_vertices_z"),
-        py::arg("face_features"), py::arg("valid_faces"), py::arg("height"), py::arg("width"),
-        py::arg("eps"), py::arg("threads"),
+  m.def("rasterize_projected", &RasterizeFaces,
         "face_vertices_image (N, F, 3, 2), face_vertices_z (N, F, 3), face_features (N, F, 3, C),\n"
         "valid_faces (N, F) uint8 or None, eps in NDC^2 -> the image (N, H, W, C), face_idx\n"
         "(N, H, W) int32");
-  m.def("rasterize_projected_backward", &RasterizeFacesBackward, py::arg(kFaces),
-        py::arg("face_features"), py::arg("face_idx"), py::arg("gradient"), py::arg("eps"),
-        py::arg("wants_face_vertices_image"), py::arg("wants_face_features"), py::arg("threads"),
+  m.def("rasterize_projected_backward", &RasterizeFacesBackward,
         "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and "
         "face_features\n(N, F, 3, C); empty if not requested");
-  m.def("projected_soft_mask", &SoftMask, py::arg(kFaces), py::arg("selected_face_idx"),
-        py::arg("options"), py::arg("threads"),
+  m.def("projected_soft_mask", &SoftMask,
         "face_vertices_image (N, F, 3, 2), selected_face_idx (N, H, W) int32 -> the mask\n"
         "(N, H, W), and how far it may be from equation 6");
-  m.def("projected_soft_mask_backward", &SoftMaskBackward, py::arg(kFaces),
-        py::arg("selected_face_idx"), py::arg("soft_mask"), py::arg("gradient"), py::arg("options"),
-        py::arg("threads"),
+  m.def("projected_soft_mask_backward", &SoftMaskBackward,
         "soft_mask and its gradient (N, H, W) -> the gradient of face_vertices_image (N, F, 3, 2)");
 }
 
@@ -224,9 +213,9 @@ py::tuple Layers(const py::array& faces, const Ranges& ranges,
     auto bary = NewArray<T>({shape[0], shape[1], shape[2], shape[3], 3});
     const pytorch3d::LayeredImages<T> out{NumbersOf(ids), NumbersOf(z), NumbersOf(bary),
                                           NumbersOf(dists)};
-    const Workers& workers = SharedWorkers(threads);
-    Run(kForward,
-        [&] { return pytorch3d::RasterizeLayers<T>(vertices, images, options, workers, out); });
+    Run(kForward, threads, [&](const Workers& workers) {
+      return pytorch3d::RasterizeLayers<T>(vertices, images, options, workers, out);
+    });
     return py::make_tuple(ids, z, bary, dists);
   });
 }
@@ -245,9 +234,9 @@ py::array LayersBackward(const py::array& faces, const py::array& ids, const py:
         SpanOf<T>(d_bary, kBackward, "the gradient of bary_coords",
                   {kAny, shape[1], shape[2], shape[3], 3}),
         SpanOf<T>(d_dists, kBackward, "the gradient of dists", shape), NumbersOf(d_vertices)};
-    const Workers& workers = SharedWorkers(threads);
-    Run(kBackward,
-        [&] { return pytorch3d::RasterizeLayersBackward<T>(vertices, options, workers, adjoint); });
+    Run(kBackward, threads, [&](const Workers& workers) {
+      return pytorch3d::RasterizeLayersBackward<T>(vertices, options, workers, adjoint);
+    });
     return d_vertices;
   });
 }
@@ -271,14 +260,11 @@ void BindLayeredOptions(py::module_& m) {
 
 void BindPytorch3d(py::module_& m) {
   BindLayeredOptions(m);
-  m.def("rasterize_layers", &Layers, py::arg("face_vertices"), py::arg("images"),
-        py::arg("options"), py::arg("threads"),
+  m.def("rasterize_layers", &Layers,
         "face_vertices (F, 3, 3), images: the first face and the number of faces of each ->\n"
         "pix_to_face (N, H, W, K) int64, zbuf (N, H, W, K), bary_coords (N, H, W, K, 3), dists\n"
         "(N, H, W, K)");
-  m.def("rasterize_layers_backward", &LayersBackward, py::arg("face_vertices"),
-        py::arg("pix_to_face"), py::arg("d_zbuf"), py::arg("d_bary_coords"), py::arg("d_dists"),
-        py::arg("options"), py::arg("threads"),
+  m.def("rasterize_layers_backward", &LayersBackward,
         "pix_to_face and gradients in the shapes of rasterize_layers -> the gradient of\n"
         "face_vertices (F, 3, 3)");
 }

@@ -75,8 +75,7 @@ class NvdiffrastRasterizer {
       auto rast_db = NewArray<T>({n, height, width, 4});
       nvdiffrast::RasterizeOutput<T> out{NumbersOf(rast), NumbersOf(rast_db), {}};
       if (peeled) out.peeled = MutableSpanOf<float>(*peeled, kName, "peeled", {n, height, width});
-      const Workers& workers = SharedWorkers(threads);
-      Run(kName, [&] {
+      Run(kName, threads, [&](const Workers& workers) {
         const std::unique_lock lock(mutex_, std::try_to_lock);
         nvdiffrast::Rasterizer own;
         return (lock.owns_lock() ? rasterizer_ : own).Run(input, workers, out);
@@ -103,8 +102,9 @@ py::array RasterizeBackward(const py::array& pos, const py::array& tri, const py
         ImageOf<T>(d_rast_db, kName, "the gradient of rast_db", rast, 4)};
     auto d_pos = NewArrayLike<T>(pos);
     const auto to = NumbersOf(d_pos);
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] { return nvdiffrast::RasterizeBackward<T>(input, cotangents, workers, to); });
+    Run(kName, threads, [&](const Workers& workers) {
+      return nvdiffrast::RasterizeBackward<T>(input, cotangents, workers, to);
+    });
     return d_pos;
   });
 }
@@ -140,8 +140,8 @@ py::tuple Interpolate(const py::array& attr, const InterpolateCall& call) {
     shape[3] = 2 * call.diff_attrs.shape(0);
     auto out_da = NewArray<T>(shape);
     const nvdiffrast::InterpolateOutput<T> to{NumbersOf(out), NumbersOf(out_da)};
-    const Workers& workers = SharedWorkers(call.threads);
-    Run(kName, [&] { return nvdiffrast::Interpolate<T>(input, workers, to); });
+    Run(kName, call.threads,
+        [&](const Workers& workers) { return nvdiffrast::Interpolate<T>(input, workers, to); });
     return py::make_tuple(out, out_da);
   });
 }
@@ -169,8 +169,9 @@ py::tuple InterpolateBackward(const py::array& attr, const InterpolateCall& call
     auto d_rast_db = NewIf<T>(wanted.at(2), call.rast);
     const nvdiffrast::InterpolateGradients<T> to{NumbersOf(d_attr), NumbersOf(d_rast),
                                                  NumbersOf(d_rast_db)};
-    const Workers& workers = SharedWorkers(call.threads);
-    Run(kName, [&] { return nvdiffrast::InterpolateBackward<T>(input, cotangents, workers, to); });
+    Run(kName, call.threads, [&](const Workers& workers) {
+      return nvdiffrast::InterpolateBackward<T>(input, cotangents, workers, to);
+    });
     return py::make_tuple(d_attr, d_rast, d_rast_db);
   });
 }
@@ -202,8 +203,8 @@ py::array Antialias(const py::array& color, const py::array& rast, const py::arr
     const auto input = AntialiasInputOf<T>(color, {rast, pos, tri, rings}, kName);
     auto out = NewArrayLike<T>(color);
     const auto to = NumbersOf(out);
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] { return nvdiffrast::Antialias<T>(input, workers, to); });
+    Run(kName, threads,
+        [&](const Workers& workers) { return nvdiffrast::Antialias<T>(input, workers, to); });
     return out;
   });
 }
@@ -217,8 +218,9 @@ py::tuple AntialiasBackward(const py::array& color, const py::array& rast, const
     const auto d_out = ImageOf<T>(gradient, kName, "the gradient", color, color.shape(3));
     auto d_color = NewIf<T>(wanted.at(0), color), d_pos = NewIf<T>(wanted.at(1), pos);
     const nvdiffrast::AntialiasGradients<T> to{NumbersOf(d_color), NumbersOf(d_pos)};
-    const Workers& workers = SharedWorkers(threads);
-    Run(kName, [&] { return nvdiffrast::AntialiasBackward<T>(input, d_out, workers, to); });
+    Run(kName, threads, [&](const Workers& workers) {
+      return nvdiffrast::AntialiasBackward<T>(input, d_out, workers, to);
+    });
     return py::make_tuple(d_color, d_pos);
   });
 }
@@ -228,14 +230,11 @@ void BindNvdiffrastRasterize(py::module_& m) {
                                    "Scratch memory that rasterization reuses. Threads may share "
                                    "one; a thread that finds it in\nuse allocates its own.")
       .def(py::init<>())
-      .def("rasterize", &NvdiffrastRasterizer::Rasterize, py::arg("pos"), py::arg("tri"),
-           py::arg("ranges"), py::arg("height"), py::arg("width"), py::arg("peeled"),
-           py::arg("threads"),
+      .def("rasterize", &NvdiffrastRasterizer::Rasterize,
            "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n[N, "
            "2]; tri [F, 3]; peeled [N, height, width] float32: only surfaces behind this "
            "depth\nare drawn, and the depth is updated; start with infinity.");
-  m.def("nvdiffrast_rasterize_backward", &RasterizeBackward, py::arg("pos"), py::arg("tri"),
-        py::arg("rast"), py::arg("d_rast"), py::arg("d_rast_db"), py::arg("threads"),
+  m.def("nvdiffrast_rasterize_backward", &RasterizeBackward,
         "The gradient of pos from those of rast and rast_db, either of them None.");
 }
 
@@ -250,10 +249,9 @@ void BindInterpolate(py::module_& m) {
            }),
            py::kw_only(), py::arg("tri"), py::arg("rast"), py::arg("rast_db"),
            py::arg("diff_attrs"), py::arg("threads"));
-  m.def("nvdiffrast_interpolate", &Interpolate, py::arg("attr"), py::arg("call"),
+  m.def("nvdiffrast_interpolate", &Interpolate,
         "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
-  m.def("nvdiffrast_interpolate_backward", &InterpolateBackward, py::arg("attr"), py::arg("call"),
-        py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"),
+  m.def("nvdiffrast_interpolate_backward", &InterpolateBackward,
         "The gradients of attr, rast and rast_db, None if not requested.");
 }
 
@@ -261,16 +259,12 @@ void BindAntialias(py::module_& m) {
   py::class_<nvdiffrast::EdgeRings, std::shared_ptr<nvdiffrast::EdgeRings>>(
       m, "EdgeRings", "Which triangles of tri [F, 3] share an edge.")
       .def(py::init([](const py::array& tri) {
-             return std::make_shared<nvdiffrast::EdgeRings>(
-                 nvdiffrast::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
-           }),
-           py::arg("tri"));
-  m.def("nvdiffrast_antialias", &Antialias, py::arg("color"), py::arg("rast"), py::arg("pos"),
-        py::arg("tri"), py::arg("rings"), py::arg("threads"),
-        "color [N, H, W, C] with smooth silhouettes.");
-  m.def("nvdiffrast_antialias_backward", &AntialiasBackward, py::arg("color"), py::arg("rast"),
-        py::arg("pos"), py::arg("tri"), py::arg("rings"), py::arg("gradient"), py::arg("wanted"),
-        py::arg("threads"), "The gradients of color and pos, None if not requested.");
+        return std::make_shared<nvdiffrast::EdgeRings>(
+            nvdiffrast::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
+      }));
+  m.def("nvdiffrast_antialias", &Antialias, "color [N, H, W, C] with smooth silhouettes.");
+  m.def("nvdiffrast_antialias_backward", &AntialiasBackward,
+        "The gradients of color and pos, None if not requested.");
 }
 
 }  // namespace

@@ -108,10 +108,8 @@ py::array Sample(const Levels& levels, const TextureCall& call) {
     auto out =
         NewArray<T>({call.uv.shape(0), call.uv.shape(1), call.uv.shape(2), ChannelsOf(levels[0])});
     const auto to = NumbersOf(out);
-    const Workers& workers = SharedWorkers(call.threads);
-    Run(kName, [&] {
+    Run(kName, call.threads, [&](const Workers& workers) {
       nvdiffrast::SampleTexture<T>(arguments.input, workers, to);
-      return Status();
     });
     return out;
   });
@@ -139,10 +137,8 @@ py::tuple SampleBackward(const Levels& levels, const TextureCall& call, const py
     auto d_bias = new_if(wanted.at(3), call.mip_level_bias);
     const nvdiffrast::TextureGradients<T> to{spans, NumbersOf(d_uv), NumbersOf(d_uv_da),
                                              NumbersOf(d_bias)};
-    const Workers& workers = SharedWorkers(call.threads);
-    Run(kName, [&] {
+    Run(kName, call.threads, [&](const Workers& workers) {
       nvdiffrast::SampleTextureBackward<T>(arguments.input, d_out, workers, to);
-      return Status();
     });
     return py::make_tuple(d_levels, d_uv, d_uv_da, d_bias);
   });
@@ -154,15 +150,13 @@ Levels ConstructMip(const py::array& tex, int most, int threads) {
   return Dispatch(tex, kName, "tex", [&]<class T>(T) -> Levels {
     const auto sizes = ValueOrThrow(nvdiffrast::MipSizes(SizeOf(tex), most));
     const auto channels = static_cast<std::size_t>(ChannelsOf(tex));
-    const Workers& workers = SharedWorkers(threads);
     Levels out;
     for (std::size_t l = 1; l < sizes.size(); ++l) {
       const auto fine = LevelOf<T>(l == 1 ? tex : out.back(), kName);
       py::array_t<T> coarse = NewArray<T>(LevelShape(tex, sizes[l]));
       const auto to = NumbersOf(coarse);
-      Run(kName, [&] {
+      Run(kName, threads, [&](const Workers& workers) {
         nvdiffrast::HalveTexture<T>(fine, channels, workers, to);
-        return Status();
       });
       out.push_back(std::move(coarse));
     }
@@ -174,16 +168,14 @@ Levels ConstructMip(const py::array& tex, int most, int threads) {
 py::array MipBackward(const Levels& d_levels, int threads) {
   constexpr char kName[] = "texture's backward pass";
   return Dispatch(d_levels.at(0), kName, "the gradient", [&]<class T>(T) -> py::array {
-    const Workers& workers = SharedWorkers(threads);
     const auto channels = static_cast<std::size_t>(ChannelsOf(d_levels.at(0)));
     for (std::size_t l = d_levels.size() - 1; l > 0; --l) {
       const auto coarse = LevelOf<T>(d_levels[l], kName);
       py::array_t<T> fine = py::cast<py::array_t<T>>(d_levels[l - 1]);
       const nvdiffrast::MipSize size = SizeOf(fine);
       const auto to = NumbersOf(fine);
-      Run(kName, [&] {
+      Run(kName, threads, [&](const Workers& workers) {
         nvdiffrast::HalveTextureBackward<T>(coarse, size, channels, workers, to);
-        return Status();
       });
     }
     return d_levels[0];
@@ -207,15 +199,14 @@ void BindNvdiffrastTexture(py::module_& m) {
            }),
            py::kw_only(), py::arg("uv"), py::arg("uv_da"), py::arg("mip_level_bias"),
            py::arg("filter"), py::arg("boundary"), py::arg("threads"));
-  m.def("nvdiffrast_texture", &Sample, py::arg("levels"), py::arg("call"),
+  m.def("nvdiffrast_texture", &Sample,
         "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
-  m.def("nvdiffrast_texture_backward", &SampleBackward, py::arg("levels"), py::arg("call"),
-        py::arg("gradient"), py::arg("wanted"),
+  m.def("nvdiffrast_texture_backward", &SampleBackward,
         "The gradients of the levels (a list, empty if not requested), uv, uv_da and "
         "mip_level_bias.");
-  m.def("nvdiffrast_mip", &ConstructMip, py::arg("tex"), py::arg("most"), py::arg("threads"),
+  m.def("nvdiffrast_mip", &ConstructMip,
         "The levels below tex, at most `most` of them, or all if that is negative.");
-  m.def("nvdiffrast_mip_backward", &MipBackward, py::arg("d_levels"), py::arg("threads"),
+  m.def("nvdiffrast_mip_backward", &MipBackward,
         "The gradient of a texture from those of all its levels, which are overwritten.");
 }
 
