@@ -38,9 +38,7 @@ Result<std::vector<int>> Candidates(const train::Dataset& dataset, const ViewOpt
                       fmt::join(classes, ", "));
     }
     const auto wanted = static_cast<int>(found - classes.begin());
-    std::erase_if(models, [&](int m) {
-      return dataset.models()[static_cast<std::size_t>(m)].class_index != wanted;
-    });
+    std::erase_if(models, [&](int m) { return dataset.model(m).class_index != wanted; });
   }
   if (models.empty()) {
     return NotFound("{}: no models in the {} split{}", options.data, options.split,
@@ -57,9 +55,7 @@ Result<int> ChooseModel(const train::Dataset& dataset, const ViewOptions& option
   }
   for (std::size_t m = 0; m < dataset.models().size(); ++m) {
     const auto& info = dataset.models()[m];
-    if (dataset.info().classes[static_cast<std::size_t>(info.class_index)] + "/" + info.id ==
-        options.model)
-      return static_cast<int>(m);
+    if (dataset.ClassOf(info) + "/" + info.id == options.model) return static_cast<int>(m);
   }
   return NotFound("{}: no model \"{}\" (they are named CLASS/ID, as the files below models/)",
                   options.data, options.model);
@@ -91,8 +87,8 @@ Status WriteView(const ViewOptions& options) {
   TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
                             [&] { return io::SavePng(options.out, StraightRgba(image, size)); }));
   TILEGRAD_TRY(WriteVoxels(options, dataset, model));
-  const auto& info = dataset.models()[static_cast<std::size_t>(model)];
-  const std::string& of_class = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
+  const auto& info = dataset.model(model);
+  const std::string& of_class = dataset.ClassOf(info);
   Print("{}: {} ({}), view {}\n", options.out, info.name, of_class, options.view);
   PrintResult({{"image", options.out},
                {"name", info.name},

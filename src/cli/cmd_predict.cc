@@ -104,7 +104,7 @@ Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& fi
         {"rendering the moving light", static_cast<std::uint64_t>(k), kLightFrames, ""}));
     view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kLightFrames);
     TILEGRAD_ASSIGN(const auto rgba, pictures.Draw(mesh, view, train::Appearance::kLit));
-    frames.push_back(train::OnPaper(rgba, size));
+    frames.push_back(OnPaper(rgba, size));
   }
   return io::SaveWebpAnimation(
       file, frames,
@@ -143,9 +143,7 @@ Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& worke
 Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
                  const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
   constexpr int size = train::kRefineSize;
-  const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
-                                        picture.subspan(3 * size * size), size, size};
-  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
+  std::vector<ImageU8> cells = {Enlarged(OnPaper(picture, size), kTurntableSize / size)};
   for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
                                      std::pair(&refined.mesh, &refined.camera)}) {
     TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));

@@ -165,8 +165,7 @@ void WarnOfFullMasks(FitInput* input) {
 Result<int> FindModel(const Dataset& dataset, const std::string& name) {
   for (std::size_t i = 0; i < dataset.models().size(); ++i) {
     const ModelInfo& model = dataset.models()[i];
-    const std::string& of = dataset.info().classes[static_cast<std::size_t>(model.class_index)];
-    if (of + "/" + model.id == name) return static_cast<int>(i);
+    if (dataset.ClassOf(model) + "/" + model.id == name) return static_cast<int>(i);
   }
   return NotFound("{}: no model \"{}\" in it; models.jsonl lists them, as CLASS/ID",
                   dataset.folder().string(), name);

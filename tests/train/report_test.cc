@@ -133,9 +133,7 @@ TEST_F(ReportTest, DrawsTheModelsInOnePicture) {
   const std::size_t bytes = images.size() / 4;
   const auto shown = [&](int view, int left) {
     const auto image = std::span(images).subspan(bytes * static_cast<std::size_t>(view), bytes);
-    const ImageU8 expected = OverGrey(
-        PlanarRgba<std::uint8_t>{image.first(bytes / 4 * 3), image.last(bytes / 4), 32, 32},
-        kPaper);
+    const ImageU8 expected = OnPaper(image, 32);
     for (int y = 0; y < 192; ++y) {
       for (int x = 0; x < 192; ++x)
         ASSERT_EQ(sheet.at(left + x, 196 + y)[1], expected.at(x / 6, y / 6)[1]);

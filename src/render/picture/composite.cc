@@ -21,6 +21,12 @@ ImageU8 RgbOf(int width, int height, const At& at) {
 
 // 1 / scale is the unit of T.
 template <class T>
+PlanarRgba<T> SquarePlanes(std::span<const T> planes, int size) {
+  const std::size_t rgb = planes.size() / 4 * 3;
+  return {planes.first(rgb), planes.subspan(rgb), size, size};
+}
+
+template <class T>
 ImageU8 PlanarOverGrey(const PlanarRgba<T>& image, float grey, float scale) {
   const std::size_t plane = image.alpha.size();
   return RgbOf(image.width, image.height, [&](std::size_t p, std::size_t c) {
@@ -33,6 +39,14 @@ ImageU8 PlanarOverGrey(const PlanarRgba<T>& image, float grey, float scale) {
 
 std::uint8_t ToByte(float unit) {
   return static_cast<std::uint8_t>(255 * std::clamp(unit, 0.0f, 1.0f) + 0.5f);
+}
+
+ImageU8 OnPaper(std::span<const std::uint8_t> planes, int size) {
+  return OverGrey(SquarePlanes(planes, size), kPaper);
+}
+
+ImageU8 OnPaper(std::span<const float> planes, int size) {
+  return OverGrey(SquarePlanes(planes, size), kPaper);
 }
 
 ImageU8 OverGrey(const PlanarRgba<std::uint8_t>& image, float grey) {

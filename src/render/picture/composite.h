@@ -34,6 +34,9 @@ ImageU8 OverGrey(const PlanarRgba<float>& image, float grey);
 ImageU8 OverGrey(const Picture& picture, float grey);
 // Image n of a batch: colour where a face is visible, with hard edges.
 ImageU8 OverGrey(const Images& images, std::size_t n, float grey);
+// A picture [4][size][size], RGB over black and alpha, as people see it: over kPaper.
+ImageU8 OnPaper(std::span<const std::uint8_t> planes, int size);
+ImageU8 OnPaper(std::span<const float> planes, int size);
 
 std::vector<std::uint8_t> PremultipliedPlanes(const Picture& picture);  // [4,H,W], RGB over black
 ImageU8 StraightRgba(const Picture& picture);  // 4 channels; RGB is 0 where alpha is 0

@@ -60,8 +60,8 @@ std::vector<int> Dataset::Select(Split split) const {
 }
 
 Path Dataset::ModelPath(int model) const {
-  const ModelInfo& m = models_[static_cast<std::size_t>(model)];
-  return ModelFilePath(folder_, info_.classes[static_cast<std::size_t>(m.class_index)], m.id);
+  const ModelInfo& info = this->model(model);
+  return ModelFilePath(folder_, ClassOf(info), info.id);
 }
 
 Result<ModelData> Dataset::Load(int model) const { return LoadModelFile(ModelPath(model), info_); }

@@ -102,6 +102,10 @@ class Dataset {
   const Path& folder() const { return folder_; }
   const DatasetInfo& info() const { return info_; }
   const std::vector<ModelInfo>& models() const { return models_; }
+  const ModelInfo& model(int index) const { return models_[static_cast<std::size_t>(index)]; }
+  const std::string& ClassOf(const ModelInfo& model) const {  // its name
+    return info_.classes[static_cast<std::size_t>(model.class_index)];
+  }
   std::vector<int> Select(Split split) const;  // indices into models(), ascending
 
   // Errors name the file and the array: missing, of another shape than dataset.json promises, not

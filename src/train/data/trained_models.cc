@@ -16,9 +16,8 @@ namespace {
 constexpr const char* kModelList = "training_models.txt";  // of a run
 
 std::string ModelLine(const Dataset& dataset, int index) {
-  const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
-  return fmt::format("{:016x} {}/{}", model.geometry,
-                     dataset.info().classes[static_cast<std::size_t>(model.class_index)], model.id);
+  const ModelInfo& model = dataset.model(index);
+  return fmt::format("{:016x} {}/{}", model.geometry, dataset.ClassOf(model), model.id);
 }
 
 std::string TextOf(const Dataset& dataset) {
@@ -38,9 +37,8 @@ Result<std::string> ContentsOf(const Dataset& dataset) {
       info.image_size);
   for (const int model : dataset.Select(Split::kTrain)) {
     TILEGRAD_ASSIGN(const std::string file, io::ZipFingerprint(dataset.ModelPath(model)));
-    const ModelInfo& m = dataset.models()[static_cast<std::size_t>(model)];
-    text += fmt::format("file {} {}/{}\n", file,
-                        info.classes[static_cast<std::size_t>(m.class_index)], m.id);
+    const ModelInfo& m = dataset.model(model);
+    text += fmt::format("file {} {}/{}\n", file, dataset.ClassOf(m), m.id);
   }
   return text;
 }

@@ -122,7 +122,7 @@ class Evaluator {
       // The i-th is searched where the rounded share of those up to it goes up.
       if ((i + 1) * searched / train.size() > i * searched / train.size())
         TILEGRAD_TRY(AddSearched(data));
-      const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
+      const ModelInfo& info = data_.model(train[i]);
       if (seen.emplace(info.class_index, ShapeOf(info)).second) TILEGRAD_TRY(AddGrid(data));
     }
     out_.retrieval_models = static_cast<int>(searched);
@@ -220,14 +220,10 @@ class Evaluator {
     return MeanScore(scores);
   }
 
-  const std::string& ClassOf(const ModelInfo& info) const {
-    return data_.info().classes[static_cast<std::size_t>(info.class_index)];
-  }
-
   void Fill(std::span<const int> held_out) {
     for (std::size_t i = 0; i < held_out.size(); ++i) {
-      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
-      out_.models.push_back({ClassOf(info), info.id, predicted_scores_[i], info.shape});
+      const ModelInfo& info = data_.model(held_out[i]);
+      out_.models.push_back({data_.ClassOf(info), info.id, predicted_scores_[i], info.shape});
       out_.unusable_predictions += unusable_[i];
     }
     const ClassMeans means(data_, held_out);

@@ -14,7 +14,7 @@ namespace tilegrad::train {
 ClassMeans::ClassMeans(const Dataset& dataset, std::span<const int> models) {
   std::map<int, int> counts;
   for (std::size_t i = 0; i < models.size(); ++i) {
-    const ModelInfo& info = dataset.models()[static_cast<std::size_t>(models[i])];
+    const ModelInfo& info = dataset.model(models[i]);
     members_[info.class_index][ShapeOf(info)].push_back(i);
     ++counts[info.class_index];
   }

@@ -63,11 +63,9 @@ TrainingPictures TrainingPictures::Of(const Dataset& dataset, const ImageStore& 
   std::map<std::pair<int, std::string>, int> shapes;  // numbered as they come
   std::vector<int> shape_of;
   for (const int m : dataset.Select(Split::kTrain)) {
-    const ModelInfo& model = dataset.models()[static_cast<std::size_t>(m)];
-    const std::string& class_name =
-        dataset.info().classes[static_cast<std::size_t>(model.class_index)];
+    const ModelInfo& model = dataset.model(m);
     out.models_.push_back(
-        {OneLine(model.name.empty() ? model.id : model.name), OneLine(class_name)});
+        {OneLine(model.name.empty() ? model.id : model.name), OneLine(dataset.ClassOf(model))});
     const int next = static_cast<int>(shapes.size());
     shape_of.push_back(shapes.try_emplace({model.class_index, ShapeOf(model)}, next).first->second);
   }

@@ -72,11 +72,7 @@ class ShowcaseBuilder {
         DrawMesh(out.prediction, {cameras, info_.image_size, info_.image_size}, workers_));
     for (std::size_t v = 0; v < views.size(); ++v) {
       auto [left, right] = Captions(out.name, TurnTo(info_, views[v]), v == 0);
-      const int size = info_.image_size;
-      const auto planes = ImageOf(data, views[v]);
-      const std::size_t rgb = planes.size() / 4 * 3;
-      left.image = OverGrey(
-          PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), size, size}, kPaper);
+      left.image = OnPaper(ImageOf(data, views[v]), info_.image_size);
       right.image = std::move(predicted[v]);
       out.pictures.push_back(std::move(left));
       out.pictures.push_back(std::move(right));
@@ -120,8 +116,7 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   Showcase out;
   const std::size_t classes = info.classes.size();
   std::vector<ModelInfo> models;
-  for (const int m : dataset.Select(Split::kTrain))
-    models.push_back(dataset.models()[static_cast<std::size_t>(m)]);
+  for (const int m : dataset.Select(Split::kTrain)) models.push_back(dataset.model(m));
   const std::size_t shapes = CountShapes(models);
   out.data = fmt::format("It learned from {}{} in {} {}.", Count(header.training_models, "model"),
                          shapes < models.size() ? " of " + Count(shapes, "shape") : "",
@@ -135,10 +130,10 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
 }
 
 Example NamedExample(const Dataset& dataset, int index) {
-  const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
+  const ModelInfo& model = dataset.model(index);
   Example out;
   out.name = model.name.empty() ? model.id : model.name;
-  out.class_name = dataset.info().classes[static_cast<std::size_t>(model.class_index)];
+  out.class_name = dataset.ClassOf(model);
   out.id = model.id;
   out.creator = model.creator;
   out.license = model.license;
@@ -149,7 +144,7 @@ std::vector<int> ChooseModels(const Dataset& dataset, int count) {
   std::vector<std::vector<int>> rounds;  // rounds[r]: the r-th test model of each class that has it
   std::vector<std::size_t> seen(dataset.info().classes.size(), 0);
   for (const int model : dataset.Select(Split::kTest)) {
-    const ModelInfo& info = dataset.models()[static_cast<std::size_t>(model)];
+    const ModelInfo& info = dataset.model(model);
     const std::size_t round = seen[static_cast<std::size_t>(info.class_index)]++;
     if (round == rounds.size()) rounds.emplace_back();
     rounds[round].push_back(model);
@@ -161,10 +156,7 @@ std::vector<int> ChooseModels(const Dataset& dataset, int count) {
     for (std::size_t i = 0; i < taken; ++i) out.push_back(round[i * round.size() / taken]);
   }
   std::stable_sort(out.begin(), out.end(), [&](int a, int b) {
-    const auto class_of = [&](int m) {
-      return dataset.models()[static_cast<std::size_t>(m)].class_index;
-    };
-    return class_of(a) < class_of(b);
+    return dataset.model(a).class_index < dataset.model(b).class_index;
   });
   return out;
 }

@@ -55,9 +55,7 @@ Status WriteContactSheet(const Dataset& dataset) {
       for (int v = 0; v < views; ++v) {
         const auto view = static_cast<std::size_t>(v * info.views / views);
         const auto planes = std::span(images).subspan(4 * view * plane, 4 * plane);
-        const PlanarRgba<std::uint8_t> image{planes.first(3 * plane), planes.subspan(3 * plane),
-                                             size, size};
-        Paste(OverGrey(image, kPaper), kSheetGap + static_cast<int>(column) * step_x + v * size,
+        Paste(OnPaper(planes, size), kSheetGap + static_cast<int>(column) * step_x + v * size,
               kSheetGap + row * step_y, &sheet);
       }
     }

@@ -87,12 +87,8 @@ class Loader {
   }
 
  private:
-  const ModelInfo& InfoOf(int model) const {
-    return dataset_.models()[static_cast<std::size_t>(model)];
-  }
-  const std::string& ClassOf(int model) const {
-    return dataset_.info().classes[static_cast<std::size_t>(InfoOf(model).class_index)];
-  }
+  const ModelInfo& InfoOf(int model) const { return dataset_.model(model); }
+  const std::string& ClassOf(int model) const { return dataset_.ClassOf(InfoOf(model)); }
   // Of the source's, which are sorted.
   std::size_t EntryOf(int model) const {
     const auto& all = source_->entries();

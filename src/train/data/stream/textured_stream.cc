@@ -273,10 +273,7 @@ Result<ImageU8> TexturedStream::Sheet(int objects, int views) {
     const auto model = static_cast<int>(i * meshes_.size() / count);
     TILEGRAD_ASSIGN(const auto rgba, Render(model, i, 0, drawn));
     for (std::size_t v = 0; v < drawn.size(); ++v) {
-      const auto image = rgba.subspan(4 * plane * v, 4 * plane);
-      pictures.push_back(OverGrey(
-          PlanarRgba<float>{image.first(3 * plane), image.subspan(3 * plane), job_.size, job_.size},
-          kPaper));
+      pictures.push_back(OnPaper(rgba.subspan(4 * plane * v, 4 * plane), job_.size));
     }
   }
   return TileImages(pictures, views);

@@ -157,14 +157,13 @@ class Examiner {
     if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
     return {};
   }
-  const ModelInfo& Info(int model) const { return data_.models()[static_cast<std::size_t>(model)]; }
   // A training model's own picture would be found.
   bool Retrieves() const { return job_.split != Split::kTrain; }
 
   Status LearnBaselines() {
     const std::vector<int> train = data_.Select(Split::kTrain);
     std::vector<int> counts(data_.info().classes.size(), 0);
-    for (const int m : train) ++counts[static_cast<std::size_t>(Info(m).class_index)];
+    for (const int m : train) ++counts[static_cast<std::size_t>(data_.model(m).class_index)];
     most_frequent_ = static_cast<int>(std::ranges::max_element(counts) - counts.begin());
     const std::size_t searched = Retrieves() ? std::min(train.size(), kSearched) : 0;
     for (std::size_t i = 0; i < searched; ++i) {
@@ -172,14 +171,14 @@ class Examiner {
       const int model = train[i * train.size() / searched];
       TILEGRAD_ASSIGN(const auto images, data_.LoadImages(model));
       index_.Add(images, data_.info().views, data_.info().image_size);
-      searched_.push_back(Info(model).class_index);
+      searched_.push_back(data_.model(model).class_index);
     }
     out_.retrieval_models = static_cast<int>(searched);
     return {};
   }
 
   Status Examine(std::size_t i, int model) {
-    const int truth = Info(model).class_index;
+    const int truth = data_.model(model).class_index;
     TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
     const std::vector<std::uint8_t> images = SelectedViews(all, data_.info().views, views_);
     std::vector<int> said, found(views_.size());
@@ -210,7 +209,7 @@ class Examiner {
     if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieved_));
     out_.rows.push_back(means.Row("tilegrad", said_));
     for (std::size_t i = 0; i < models.size(); ++i) {
-      const ModelInfo& info = Info(models[i]);
+      const ModelInfo& info = data_.model(models[i]);
       out_.models.push_back({model_.classes()[static_cast<std::size_t>(info.class_index)], info.id,
                              said_[i], info.shape});
     }
@@ -241,15 +240,12 @@ Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& cl
   const std::vector<int> views = ShownViews(info.views);
   const std::vector<std::uint8_t> images = SelectedViews(all, info.views, views);
   TILEGRAD_ASSIGN(const auto said, classifier.Classify(images));
-  const std::size_t bytes = images.size() / views.size(), rgb = bytes / 4 * 3;
+  const std::size_t bytes = images.size() / views.size();
   for (std::size_t v = 0; v < views.size(); ++v) {
     const auto planes = std::span(images).subspan(v * bytes, bytes);
     const std::string& name = classifier.classes()[static_cast<std::size_t>(said[v])];
     out.pictures.push_back(
-        {OverGrey(PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), info.image_size,
-                                           info.image_size},
-                  kPaper),
-         "called " + name, out.name + ": called " + name});
+        {OnPaper(planes, info.image_size), "called " + name, out.name + ": called " + name});
   }
   return out;
 }
@@ -347,8 +343,7 @@ Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<in
                                     const StopFlag& stop) {
   LabelledImages out;
   TILEGRAD_ASSIGN(out.images, LoadImageStore(dataset, models, workers, progress, stop));
-  for (const int m : models)
-    out.labels.push_back(dataset.models()[static_cast<std::size_t>(m)].class_index);
+  for (const int m : models) out.labels.push_back(dataset.model(m).class_index);
   return out;
 }
 

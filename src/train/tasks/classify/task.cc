@@ -89,7 +89,7 @@ Status ClassifyTask::CheckDataset() const {
   const std::string folder = dataset_->folder().string();
   std::set<int> classes;
   for (const int m : dataset_->Select(Split::kTrain))
-    classes.insert(dataset_->models()[static_cast<std::size_t>(m)].class_index);
+    classes.insert(dataset_->model(m).class_index);
   if (classes.size() < 2) {
     return InvalidArgument(
         "{}: its training models are of {} class{}; a classifier needs two or more, as the sources "
@@ -179,11 +179,7 @@ Result<ImageU8> ClassifyTask::SamplePicture(std::int64_t /*steps*/) {
   const std::vector<int> said = MostLikely(scores.value());
   std::vector<ImageU8> cells;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto planes = store.Image(samples[i].model, samples[i].views[0]);
-    const std::size_t rgb = planes.size() / 4 * 3;
-    const ImageU8 shown = OverGrey(
-        PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), store.size, store.size},
-        kPaper);
+    const ImageU8 shown = OnPaper(store.Image(samples[i].model, samples[i].views[0]), store.size);
     cells.push_back(Framed(shown, said[i] == held_out_.labels[i] ? kRight : kWrong));
   }
   return TileImages(cells, kSampleColumns, kFrameGap);

@@ -129,10 +129,7 @@ Result<std::vector<ImageU8>> DrawObjects(std::span<const Mesh> meshes, const Cam
     const auto planes = renderers[worker].Render(meshes[i], {&camera, 1}, size);
     failures[i] = planes.status();
     if (!planes.ok()) return;
-    const std::span<const std::uint8_t> all = *planes;
-    const std::size_t rgb = all.size() / 4 * 3;
-    out[i] =
-        OverGrey(PlanarRgba<std::uint8_t>{all.first(rgb), all.subspan(rgb), size, size}, kPaper);
+    out[i] = OnPaper(*planes, size);
   });
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
   return out;

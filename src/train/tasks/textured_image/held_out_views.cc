@@ -289,9 +289,9 @@ class TexturedEvaluator {
       out_.rows.push_back(means.Row(NameOf(m), of_method));
     }
     for (std::size_t i = 0; i < models.size(); ++i) {
-      const ModelInfo& info = dataset_.models()[static_cast<std::size_t>(models[i])];
-      out_.models.push_back({dataset_.info().classes[static_cast<std::size_t>(info.class_index)],
-                             info.id, scores_[i][kTexturedOurs], info.shape});
+      const ModelInfo& info = dataset_.model(models[i]);
+      out_.models.push_back(
+          {dataset_.ClassOf(info), info.id, scores_[i][kTexturedOurs], info.shape});
       out_.unusable_predictions += unusable_[i];
     }
     out_.predictor = job_.predictor.description();

@@ -64,11 +64,6 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
   return out;
 }
 
-ImageU8 OnPaper(std::span<const float> rgba, int size) {
-  const std::size_t rgb = rgba.size() / 4 * 3;
-  return OverGrey(PlanarRgba<float>{rgba.first(rgb), rgba.subspan(rgb), size, size}, kPaper);
-}
-
 std::vector<std::uint8_t> ToBytes(std::span<const float> rgba) {
   std::vector<std::uint8_t> out(rgba.size());
   std::ranges::transform(rgba, out.begin(), ToByte);

@@ -33,9 +33,7 @@ class ObjectPictures {
   Frame frame_;
 };
 
-// Such a picture for people, over grey.
-ImageU8 OnPaper(std::span<const float> rgba, int size);
-// As bytes for the network.
+// Such a picture as bytes for the network.
 std::vector<std::uint8_t> ToBytes(std::span<const float> rgba);
 
 // Rows of pictures as in the paper's figures 5 and 6.
