@@ -75,12 +75,13 @@ DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
   info.views = options.views;
   info.camera = options.camera;
   if (const auto fixed = source.FixedInfo()) info = *fixed;
-  info.source = source.name();
-  info.credits = source.credits();
-  info.input = source.input();
+  const SourceFacts& facts = source.facts();
+  info.source = facts.name;
+  info.credits = facts.credits;
+  info.input = facts.input;
   info.up = options.up;
   info.camera.lens.width = info.camera.lens.height = info.image_size;
-  info.recipe = RecipeOf(info, source.version());
+  info.recipe = RecipeOf(info, facts.version);
   return info;
 }
 
@@ -106,7 +107,7 @@ class Builder {
         outcomes_(chosen_.size()) {}
 
   Result<BuildSummary> Run() {
-    if (chosen_.empty()) return NotFound("the source \"{}\" holds no models", source_.name());
+    if (chosen_.empty()) return NotFound("the source \"{}\" holds no models", source_.facts().name);
     ProcessGroup* const group = options_.group;
     TILEGRAD_TRY(group ? MakeTogether(*group) : Prepare());
     if (group && !group->leads()) return std::move(summary_);
@@ -297,7 +298,7 @@ class Builder {
       return DataLoss("none of {} can be used; {} says why", Count(chosen_.size(), "model"),
                       RejectedPath(folder_).string());
     }
-    if (source_.published())
+    if (source_.facts().published)
       TILEGRAD_TRY(summary_.broken.Check(chosen_.size(), options_.allow_broken));
     Split();
     // No list for a moment rather than one that does not fit the classes.

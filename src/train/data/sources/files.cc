@@ -16,24 +16,15 @@ namespace {
 class FileModels : public ModelSource {
  public:
   FileModels(std::vector<SourceEntry> entries, std::vector<IgnoredFile> ignored)
-      : entries_(std::move(entries)), ignored_(std::move(ignored)) {
+      : ModelSource({.name = "folder", .credits = {"Models of the user."}}) {
+    entries_ = std::move(entries);
+    ignored_ = std::move(ignored);
     SortEntries(&entries_);
   }
-  std::vector<IgnoredFile> ignored() const override { return ignored_; }
-  std::string name() const override { return "folder"; }
-  std::vector<std::string> credits() const override { return {"Models of the user."}; }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
-    const Path file = files_.empty() ? entries_[entry].file : files_[entry];
-    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(FileOf(entry))));
     return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
   }
-  void ForgetEntries() override { files_ = TakeFiles(&entries_); }
-
- private:
-  std::vector<SourceEntry> entries_;
-  std::vector<std::string> files_;  // in the place of entries_, if that is forgotten
-  std::vector<IgnoredFile> ignored_;
 };
 
 // Images, materials and buffers, which models name; and what file managers hide.

@@ -46,12 +46,10 @@ std::string SafeFileName(const std::string& text) {
   return hidden ? "_" + out : out;
 }
 
-std::vector<std::string> TakeFiles(std::vector<SourceEntry>* entries) {
-  std::vector<std::string> files;
-  files.reserve(entries->size());
-  for (SourceEntry& entry : *entries) files.push_back(std::move(entry.file));
-  std::vector<SourceEntry>().swap(*entries);
-  return files;
+void ModelSource::ForgetEntries() {
+  files_.reserve(entries_.size());
+  for (SourceEntry& entry : entries_) files_.push_back(std::move(entry.file));
+  std::vector<SourceEntry>().swap(entries_);
 }
 
 void SortEntries(std::vector<SourceEntry>* entries) {

@@ -39,25 +39,43 @@ struct SourceModel {
   std::vector<std::string> warnings = {};  // of its reader: a texture is missing, ...
 };
 
-class ModelSource {
- public:
-  virtual ~ModelSource() = default;
-  virtual std::string name() const = 0;                         // DatasetInfo::source
-  virtual std::vector<std::string> credits() const = 0;         // DatasetInfo::credits
-  virtual const std::vector<SourceEntry>& entries() const = 0;  // sorted by class, then id
-  // Thread-safe. Called in ascending order, give or take the number of workers.
-  virtual Result<SourceModel> Load(std::size_t entry) const = 0;
-  // Nothing but Load and name is called from now on: sources of many models free the rest.
-  virtual void ForgetEntries() {}
-  // The camera and sizes that the source dictates, where it holds images.
-  virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
-  virtual std::vector<IgnoredFile> ignored() const { return {}; }
+// What a source says of itself.
+struct SourceFacts {
+  std::string name;                  // DatasetInfo::source
+  std::vector<std::string> credits;  // DatasetInfo::credits
+  std::string input = {};            // DatasetInfo::input
   // Whether it is a published set, of which hardly any model may be unusable.
-  virtual bool published() const { return false; }
-  virtual std::string input() const { return {}; }  // DatasetInfo::input
+  bool published = false;
   // Changes whenever the same entries give other models, as after a change to a list that says how
   // to read them; 0 if that cannot happen.
-  virtual std::uint64_t version() const { return 0; }
+  std::uint64_t version = 0;
+};
+
+class ModelSource {
+ public:
+  explicit ModelSource(SourceFacts facts) : facts_(std::move(facts)) {}
+  virtual ~ModelSource() = default;
+  const SourceFacts& facts() const { return facts_; }
+  const std::vector<SourceEntry>& entries() const { return entries_; }  // sorted by class, then id
+  const std::vector<IgnoredFile>& ignored() const { return ignored_; }
+  // Thread-safe. Called in ascending order, give or take the number of workers.
+  virtual Result<SourceModel> Load(std::size_t entry) const = 0;
+  // Frees all of the entries but their files: nothing but Load and facts is called from now on.
+  void ForgetEntries();
+  // The camera and sizes that the source dictates, where it holds images.
+  virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
+
+ protected:
+  const std::string& FileOf(std::size_t entry) const {
+    return files_.empty() ? entries_[entry].file : files_[entry];
+  }
+
+  SourceFacts facts_;
+  std::vector<SourceEntry> entries_;
+  std::vector<IgnoredFile> ignored_;
+
+ private:
+  std::vector<std::string> files_;  // of entries that are forgotten
 };
 
 // Parametric furniture, lamps, cars and planes (procedural.h), `per_class` of each.
@@ -115,9 +133,6 @@ Result<std::vector<Path>> ListFolder(const Path& folder);
 
 // Turns any text into a file name: letters, digits, '.', '-' and '_' stay, the rest becomes '_'.
 std::string SafeFileName(const std::string& text);
-
-// The files of entries, which are freed.
-std::vector<std::string> TakeFiles(std::vector<SourceEntry>* entries);
 
 // Sorts by class, then id, and makes ids unique in their class by appending "-2", "-3", ...
 void SortEntries(std::vector<SourceEntry>* entries);

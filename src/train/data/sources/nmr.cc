@@ -60,34 +60,27 @@ std::vector<std::uint8_t> ToOurFrame(const std::uint8_t* grid) {
 
 class Nmr : public ModelSource {
  public:
+  Nmr()
+      : ModelSource({.name = "nmr",
+                     .credits = {"Renders of ShapeNetCore models by Kato et al. (Neural 3D Mesh "
+                                 "Renderer, 2018)."},
+                     .published = true}) {}
+
   Status Add(NmrPart part) {
     TILEGRAD_ASSIGN(const io::NpyArray voxels, LoadVoxels(part));
     if (voxels.shape[0] == 0) ignored_.push_back({part.voxels.string(), "holds no model"});
     for (std::size_t i = 0; i < voxels.shape[0]; ++i) {
       const std::string id = fmt::format("{}-{:05}", SplitName(part.split), i);
-      entries_.push_back({part.class_name,
-                          id,
-                          id,
-                          "ShapeNet terms of use",
-                          "",
-                          fmt::format("{}: [{}]", part.images.string(), i),
-                          part.split,
-                          {}});
-      places_[{part.class_name, id}] = {parts_.size(), i};
+      const std::string file = fmt::format("{}: [{}]", part.images.string(), i);
+      entries_.push_back(
+          {part.class_name, id, id, "ShapeNet terms of use", "", file, part.split, {}});
+      places_[file] = {parts_.size(), i};
     }
     parts_.push_back(std::move(part));
     failures_.emplace_back();
     return {};
   }
   void Sort() { SortEntries(&entries_); }
-
-  std::string name() const override { return "nmr"; }
-  bool published() const override { return true; }
-  std::vector<std::string> credits() const override {
-    return {"Renders of ShapeNetCore models by Kato et al. (Neural 3D Mesh Renderer, 2018)."};
-  }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
-  std::vector<IgnoredFile> ignored() const override { return ignored_; }
 
   std::optional<DatasetInfo> FixedInfo() const override {
     DatasetInfo info;
@@ -98,7 +91,7 @@ class Nmr : public ModelSource {
   }
 
   Result<SourceModel> Load(std::size_t entry) const override {
-    const auto& [part, row] = places_.at({entries_[entry].class_name, entries_[entry].id});
+    const auto& [part, row] = places_.at(FileOf(entry));
     TILEGRAD_ASSIGN(const auto arrays, Fetch(part));
     if (row >= arrays->images.shape[0]) {
       return DataLoss("{}: {} models, but its voxels are {}", parts_[part].images.string(),
@@ -141,9 +134,8 @@ class Nmr : public ModelSource {
   }
 
   std::vector<NmrPart> parts_;
-  std::vector<SourceEntry> entries_;
-  std::vector<IgnoredFile> ignored_;
-  std::map<std::pair<std::string, std::string>, std::pair<std::size_t, std::size_t>> places_;
+  // By SourceEntry::file: the part and the row in it.
+  std::map<std::string, std::pair<std::size_t, std::size_t>> places_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const Arrays> cached_;
   mutable std::size_t cached_part_ = 0;

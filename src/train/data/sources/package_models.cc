@@ -171,9 +171,10 @@ void LeaveOut(const WordList& words, io::LoadedMesh* loaded) {
 
 class Models : public ModelSource {
  public:
-  explicit Models(const PackageList& list) : name_(list.name), without_(list.without) {
-    version_ = HashText(list.text, 0);
-    for (const std::string_view word : without_) version_ = HashText(word, version_);
+  explicit Models(const PackageList& list)
+      : ModelSource({.name = list.name, .credits = {}, .version = HashText(list.text, 0)}),
+        without_(list.without) {
+    for (const std::string_view word : without_) facts_.version = HashText(word, facts_.version);
   }
 
   Status Open(const std::vector<PackageRow>& rows, const Path& games) {
@@ -186,13 +187,8 @@ class Models : public ModelSource {
     return {};
   }
 
-  std::string name() const override { return name_; }
-  std::vector<std::string> credits() const override { return credits_; }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
-  std::uint64_t version() const override { return version_; }
-
   Result<SourceModel> Load(std::size_t entry) const override {
-    const Item& item = items_.at(entries_[entry].file);
+    const Item& item = items_.at(FileOf(entry));
     const io::FileSource& files = *archives_.at(item.row.package);
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, LoadWithTextures(files, item.row.model, item.textures));
     LeaveOut(without_, &loaded);
@@ -236,7 +232,7 @@ class Models : public ModelSource {
           "{}`",
           archive.string(), package.name);
     }
-    credits_.emplace_back(package.credit);
+    facts_.credits.emplace_back(package.credit);
     return {};
   }
 
@@ -258,13 +254,9 @@ class Models : public ModelSource {
     }
   }
 
-  const std::string name_;
   const WordList without_;
-  std::uint64_t version_;                                            // a hash of the list
   std::map<std::string, std::shared_ptr<io::FileSource>> archives_;  // by package
   std::map<std::string, Item> items_;                                // by SourceEntry::file
-  std::vector<SourceEntry> entries_;
-  std::vector<std::string> credits_;
 };
 
 }  // namespace

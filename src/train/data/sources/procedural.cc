@@ -319,7 +319,11 @@ constexpr Family kFamilies[] = {
 
 class Procedural : public ModelSource {
  public:
-  Procedural(int per_class, std::uint64_t seed) : per_class_(per_class), seed_(seed) {
+  Procedural(int per_class, std::uint64_t seed)
+      : ModelSource({.name = "procedural",
+                     .credits = {fmt::format("Parametric models of tilegrad, seed {}.", seed)}}),
+        per_class_(per_class),
+        seed_(seed) {
     for (const std::string& name : ProceduralClasses()) {
       for (int i = 0; i < per_class; ++i) {
         const std::string id = fmt::format("{}-{:05}", name, i);
@@ -327,11 +331,6 @@ class Procedural : public ModelSource {
       }
     }
   }
-  std::string name() const override { return "procedural"; }
-  std::vector<std::string> credits() const override {
-    return {fmt::format("Parametric models of tilegrad, seed {}.", seed_)};
-  }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
     const auto n = static_cast<std::size_t>(per_class_);
     return SourceModel{ProceduralModel(static_cast<int>(entry / n), entry % n, seed_)};
@@ -340,7 +339,6 @@ class Procedural : public ModelSource {
  private:
   int per_class_;
   std::uint64_t seed_;
-  std::vector<SourceEntry> entries_;
 };
 
 }  // namespace

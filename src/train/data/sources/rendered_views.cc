@@ -102,7 +102,10 @@ Status CheckTogether(const ModelData& data, double half_extent, int size) {
 
 class RenderedViews : public ModelSource {
  public:
-  RenderedViews(RenderedSet set, int image_size) : set_(std::move(set)), image_size_(image_size) {}
+  RenderedViews(RenderedSet set, int image_size)
+      : ModelSource({.name = set.name, .credits = {set.credit}, .published = true}),
+        set_(std::move(set)),
+        image_size_(image_size) {}
 
   Status List(const SplitList& list) {
     TILEGRAD_ASSIGN(const auto synsets, ListFolder(set_.models));
@@ -121,11 +124,6 @@ class RenderedViews : public ModelSource {
     return {};
   }
 
-  std::string name() const override { return set_.name; }
-  std::vector<std::string> credits() const override { return {set_.credit}; }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
-  std::vector<IgnoredFile> ignored() const override { return ignored_; }
-  bool published() const override { return true; }
   std::optional<DatasetInfo> FixedInfo() const override {
     DatasetInfo info;
     info.image_size = image_size_;
@@ -136,7 +134,7 @@ class RenderedViews : public ModelSource {
   }
 
   Result<SourceModel> Load(std::size_t entry) const override {
-    TILEGRAD_ASSIGN(RenderedModel model, set_.read(entries_[entry].file));
+    TILEGRAD_ASSIGN(RenderedModel model, set_.read(FileOf(entry)));
     ModelData data = std::move(model.truth);
     for (const RenderedView& view : model.views) {
       const auto planes = LoadRenderedView(view, image_size_);
@@ -146,8 +144,7 @@ class RenderedViews : public ModelSource {
       data.cameras.push_back(
           ScaledCamera(CameraCast<float>(view.camera), static_cast<float>(image_size_)));
     }
-    TILEGRAD_TRY(
-        CheckTogether(data, set_.like.half_extent, image_size_).Within(entries_[entry].file));
+    TILEGRAD_TRY(CheckTogether(data, set_.like.half_extent, image_size_).Within(FileOf(entry)));
     return SourceModel{std::move(data)};
   }
 
@@ -179,8 +176,6 @@ class RenderedViews : public ModelSource {
 
   const RenderedSet set_;
   const int image_size_;
-  std::vector<SourceEntry> entries_;
-  std::vector<IgnoredFile> ignored_;
 };
 
 }  // namespace

@@ -25,7 +25,13 @@ constexpr std::array<float, 9> kTurnOfV1 = {0, 0, -1, 0, 1, 0, 1, 0, 0},
 
 class ShapeNet : public ModelSource {
  public:
-  explicit ShapeNet(const Path& folder) : folder_(folder) {}
+  explicit ShapeNet(const Path& folder)
+      : ModelSource({.name = "shapenet",
+                     .credits = {"3D models: ShapeNetCore (Chang et al. 2015)."},
+                     .input = std::filesystem::absolute(folder).string(),
+                     .published = true,
+                     .version = kRulesVersion}),
+        folder_(folder) {}
 
   Status List(const SplitList& list) {
     TILEGRAD_ASSIGN(const auto synsets, ListFolder(folder_));
@@ -41,19 +47,8 @@ class ShapeNet : public ModelSource {
     return {};
   }
 
-  std::string name() const override { return "shapenet"; }
-  bool published() const override { return true; }
-  std::vector<std::string> credits() const override {
-    return {"3D models: ShapeNetCore (Chang et al. 2015)."};
-  }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
-  std::vector<IgnoredFile> ignored() const override { return ignored_; }
-  std::string input() const override { return std::filesystem::absolute(folder_).string(); }
-  std::uint64_t version() const override { return kRulesVersion; }
-  void ForgetEntries() override { files_ = TakeFiles(&entries_); }
-
   Result<SourceModel> Load(std::size_t entry) const override {
-    const Path file = files_.empty() ? entries_[entry].file : files_[entry];
+    const Path file = FileOf(entry);
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
     if (!loaded.lost_appearance.empty())
       return loaded.lost_appearance.front().Within(file.string());
@@ -87,9 +82,6 @@ class ShapeNet : public ModelSource {
   }
 
   const Path folder_;
-  std::vector<SourceEntry> entries_;
-  std::vector<std::string> files_;  // in the place of entries_, if that is forgotten
-  std::vector<IgnoredFile> ignored_;
 };
 
 }  // namespace

@@ -46,6 +46,11 @@ Result<Library> OpenLibrary(const Path& path) {
 
 class SweetHome3d : public ModelSource {
  public:
+  SweetHome3d()
+      : ModelSource({.name = "sweethome3d",
+                     .credits = {"3D models: eTeks & Scopia (CC-BY 3.0), Kator Legaz (CC-BY 3.0 "
+                                 "US), BlendSwap contributors (CC0 / CC-BY 3.0)."}}) {}
+
   static Result<std::unique_ptr<ModelSource>> Open(const Path& folder) {
     auto source = std::make_unique<SweetHome3d>();
     for (const FurnitureRow& row : ReadList()) TILEGRAD_TRY(source->Add(folder, row));
@@ -53,16 +58,8 @@ class SweetHome3d : public ModelSource {
     return std::unique_ptr<ModelSource>(std::move(source));
   }
 
-  std::string name() const override { return "sweethome3d"; }
-  std::vector<std::string> credits() const override {
-    return {
-        "3D models: eTeks & Scopia (CC-BY 3.0), Kator Legaz (CC-BY 3.0 US), BlendSwap contributors "
-        "(CC0 / CC-BY 3.0)."};
-  }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
-
   Result<SourceModel> Load(std::size_t entry) const override {
-    const auto& [library_name, model] = models_.at(entries_[entry].file);
+    const auto& [library_name, model] = models_.at(FileOf(entry));
     const Library& library = libraries_.at(library_name);
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(*library.files, model));
     const auto rotation = library.rotations.find(model);
@@ -99,7 +96,6 @@ class SweetHome3d : public ModelSource {
 
   std::map<std::string, Library> libraries_;
   std::map<std::string, std::pair<std::string, std::string>> models_;  // file -> library, model
-  std::vector<SourceEntry> entries_;
 };
 
 }  // namespace

@@ -102,7 +102,7 @@ class Loader {
   Status Changed(int model, const char* how) const {
     return InvalidArgument(
         "{}: the model {}/{} of {} {} there; rebuild the dataset from the current files",
-        dataset_.folder().string(), ClassOf(model), InfoOf(model).id, source_->name(), how);
+        dataset_.folder().string(), ClassOf(model), InfoOf(model).id, source_->facts().name, how);
   }
 
   Result<Mesh> FromDataset(int model) const {

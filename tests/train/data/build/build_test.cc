@@ -212,14 +212,11 @@ TEST_F(BuildTest, OptionsOutOfRangeAreErrors) {
 // A sphere, the same in red, and three that cannot be used.
 class MixedSource : public ModelSource {
  public:
-  MixedSource() {
+  MixedSource() : ModelSource({.name = "mixed", .credits = {}}) {
     for (const char* id : {"broken", "empty", "flat-point", "red", "white"}) {
       entries_.push_back({"ball", id, id, "", "", std::string(id) + ".obj", {}});
     }
   }
-  std::string name() const override { return "mixed"; }
-  std::vector<std::string> credits() const override { return {}; }
-  const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
     const std::string& id = entries_[entry].id;
     if (id == "broken") return DataLoss("broken.obj: line 3: no number");
@@ -233,9 +230,6 @@ class MixedSource : public ModelSource {
     if (id == "red") model.warnings = {"texture \"red.png\" not found"};
     return model;
   }
-
- private:
-  std::vector<SourceEntry> entries_;
 };
 
 TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {

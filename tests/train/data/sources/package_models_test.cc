@@ -74,7 +74,7 @@ TEST_F(PackageModelsTest, EachLiveryIsAnEntryOfItsShape) {
   EXPECT_EQ(source->entries()[2].name, "Plane one, L2");
   EXPECT_EQ(source->entries()[2].shape, "one");
   EXPECT_EQ(source->entries()[3].shape, "two");
-  EXPECT_EQ(source->credits().size(), 1u);
+  EXPECT_EQ(source->facts().credits.size(), 1u);
   for (std::size_t i = 0; i < 3; ++i) {
     const auto model = source->Load(i);
     ASSERT_TRUE(model.ok()) << model.status().message();
@@ -238,7 +238,7 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   EXPECT_NE(again.status().message().find("other settings"), std::string::npos);
   std::vector<std::unique_ptr<ModelSource>> one;
   one.push_back(std::move(*turned));
-  EXPECT_NE(CombineSources("planes", std::move(one))->version(), source->version());
+  EXPECT_NE(CombineSources("planes", std::move(one))->facts().version, source->facts().version);
 }
 
 TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
@@ -250,8 +250,8 @@ TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
     sources.push_back(std::move(*source));
   }
   const auto both = CombineSources("both", std::move(sources));
-  EXPECT_EQ(both->name(), "both");
-  EXPECT_EQ(both->credits().size(), 1u);
+  EXPECT_EQ(both->facts().name, "both");
+  EXPECT_EQ(both->facts().credits.size(), 1u);
   ASSERT_EQ(both->entries().size(), 6u);
   EXPECT_EQ(both->entries()[0].id, "one-L0");
   const auto model = both->Load(4);
