@@ -103,11 +103,11 @@ Status CheckNetwork(const PhotographNetworkConfig& config, int image_size) {
   if (config.texture != "direct" && config.texture != "flow")
     return InvalidArgument("network.texture is \"{}\", but must be \"direct\" or \"flow\"",
                            config.texture);
-  if (nn::CanHalve(image_size, config.levels)) return {};
+  if (nn::CanHalve(image_size, config.code.levels)) return {};
   return InvalidArgument(
       "pictures of {} pixels a side cannot be halved {} times to at least two "
       "pixels: choose another network.levels or photographs.size",
-      image_size, config.levels);
+      image_size, config.code.levels);
 }
 
 void PhotographNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
@@ -123,28 +123,22 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
                                      std::uint64_t seed)
     : context_(context),
       config_(config),
-      texture_size_(image_size << config.enlarge),
+      texture_size_(image_size << config.code.enlarge),
       sphere_(context, config.sphere) {
   Rng rng(seed, /*stream=*/0x70686f74);
   const bool flow = config.texture == "flow";
-  const nn::UNetShape unet{.in = 3,
-                           .out = flow ? 2 : 3,
-                           .base = config.base,
-                           .most = config.most,
-                           .levels = static_cast<int>(config.levels),
-                           .skips = config.skips,
-                           .enlarge = static_cast<int>(config.enlarge),
-                           .output = flow ? &nn::Tanh : &nn::Sigmoid};
+  const nn::UNetShape unet = UNetOf(
+      config.code, {.in = 3, .out = flow ? 2 : 3, .output = flow ? &nn::Tanh : &nn::Sigmoid});
   all_.code.emplace(
       context, unet,
-      PictureCodeShape{.image_size = image_size, .latent = config.latent, .layers = 2}, rng);
+      PictureCodeShape{.image_size = image_size, .latent = config.code.latent, .layers = 2}, rng);
   BuildHeads(rng);
   StartShape(start);
   if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
 }
 
 void PhotographNetwork::BuildHeads(Rng& rng) {
-  const std::int64_t latent = config_.latent;
+  const std::int64_t latent = config_.code.latent;
   auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, sphere_.numbers(), rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);

@@ -18,14 +18,9 @@
 namespace tilegrad::train {
 
 struct PhotographNetworkConfig {
-  std::int64_t base = 24;          // U-Net: channels of the first level; they double to at most
-  std::int64_t most = 192;         // this many
-  std::int64_t levels = 4;         // halvings
-  std::int64_t enlarge = 1;        // the texture is 2^this times as large as the picture
-  bool skips = true;               // the U-Net's skip connections
-  std::int64_t latent = 200;       // width of the code that feeds all heads
-  std::string texture = "direct";  // or "flow"
-  bool symmetric_texture = true;   // the map is symmetric at x = 0
+  PictureCodeConfig code = {.most = 192, .latent = 200};
+  std::string texture = "direct";                       // or "flow"
+  bool symmetric_texture = true;                        // the map is symmetric at x = 0
   SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
   double output_deviation = 1e-4;  // initial weights of the movement head are N(0, this^2)
   // Camera hypotheses per picture, initially spread evenly around the object, with a logit each.

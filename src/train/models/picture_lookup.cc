@@ -254,6 +254,15 @@ nn::Tensor PictureLookup::Colors(nn::Context& context, const Job& job) const {
   return Run(context, job, 3);
 }
 
+nn::UNetShape UNetOf(const PictureCodeConfig& config, nn::UNetShape ends) {
+  ends.base = config.base;
+  ends.most = config.most;
+  ends.levels = static_cast<int>(config.levels);
+  ends.skips = config.skips;
+  ends.enlarge = static_cast<int>(config.enlarge);
+  return ends;
+}
+
 PictureCode::PictureCode(nn::Context& context, const nn::UNetShape& unet,
                          const PictureCodeShape& shape, Rng& rng)
     : unet_(context, unet, rng) {

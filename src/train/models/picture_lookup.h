@@ -67,6 +67,20 @@ class PictureLookup {
 // The common part of the networks of sections 5.2 to 5.4: a U-Net from a picture to a map of the
 // sphere, whose bottleneck passes through a code that also feeds the other heads.
 
+// What runs configure of it. The defaults are those of section 5.2.
+struct PictureCodeConfig {
+  std::int64_t base = 24;     // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 256;    // this many
+  std::int64_t levels = 4;    // halvings
+  std::int64_t enlarge = 1;   // the texture is 2^this times as large as the picture
+  bool skips = true;          // the U-Net's skip connections
+  std::int64_t latent = 384;  // width of the fully connected code that feeds all heads
+};
+
+// `ends`, which has the channels of picture and map and the map's output function, with the rest
+// as configured.
+nn::UNetShape UNetOf(const PictureCodeConfig& config, nn::UNetShape ends);
+
 struct PictureCodeShape {
   std::int64_t image_size = 64;  // pixels a side, a multiple of 2^levels of the U-Net
   std::int64_t latent = 384;     // width of the code

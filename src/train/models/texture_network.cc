@@ -46,7 +46,7 @@ nn::Var Facing(const nn::Var& raw) {
 
 }  // namespace
 
-Status CheckImageSize(const TextureNetworkConfig& config, int image_size) {
+Status CheckImageSize(const PictureCodeConfig& config, int image_size) {
   if (nn::CanHalve(image_size, config.levels)) return {};
   return InvalidArgument(
       "images of {} pixels a side cannot be halved {} times to at least two pixels: choose a "
@@ -68,19 +68,16 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
     : context_(context),
       config_(config),
       light_(light),
-      texture_size_(image_size << config.enlarge),
+      texture_size_(image_size << config.code.enlarge),
       sphere_(context, config.sphere) {
   Rng rng(seed, /*stream=*/0x74657874);
-  const nn::UNetShape unet{.in = 4,
+  nn::UNetShape unet =
+      UNetOf(config.code, {.in = 4,
                            .out = config.lookup ? config.lookup_width : 3,
-                           .base = config.base,
-                           .most = config.most,
-                           .levels = static_cast<int>(config.levels),
-                           .skips = config.skips,
-                           .enlarge = config.lookup ? 0 : static_cast<int>(config.enlarge),
-                           .output = config.lookup ? &nn::LeakyRelu02 : &nn::Sigmoid};
+                           .output = config.lookup ? &nn::LeakyRelu02 : &nn::Sigmoid});
+  if (config.lookup) unet.enlarge = 0;
   all_.code.emplace(context, unet,
-                    PictureCodeShape{.image_size = image_size, .latent = config.latent}, rng);
+                    PictureCodeShape{.image_size = image_size, .latent = config.code.latent}, rng);
   BuildHeads(rng);
   if (config.lookup) BuildLookup(image_size, rng);
   if (config.cubes) cubes_ = FaceCubes(context, sphere_.mesh(), texture_size_);
@@ -88,7 +85,7 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
 }
 
 void TextureNetwork::BuildHeads(Rng& rng) {
-  const std::int64_t latent = config_.latent;
+  const std::int64_t latent = config_.code.latent;
   nn::AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
   all_.shape.Add<nn::Activation>("act", &nn::Relu);
   auto& offsets =
@@ -112,7 +109,7 @@ void TextureNetwork::BuildHeads(Rng& rng) {
 }
 
 void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
-  nn::AddLinear(all_.pose, "fc1", context_, config_.latent, config_.light_width, rng);
+  nn::AddLinear(all_.pose, "fc1", context_, config_.code.latent, config_.light_width, rng);
   all_.pose.Add<nn::Activation>("act", &nn::Relu);
   nn::AddLinear(all_.pose, "fc2", context_, config_.light_width, kPoseNumbers, rng);
   const TexturePainterShape painter{.image_size = image_size,

@@ -67,12 +67,7 @@ class TexturePainter {
 nn::Var PaletteColors(const nn::Var& kinds, const nn::Tensor& seen, const nn::Var& guess);
 
 struct TextureNetworkConfig {
-  std::int64_t base = 24;          // U-Net: channels of the first level; they double to at most
-  std::int64_t most = 256;         // this many
-  std::int64_t levels = 4;         // halvings
-  std::int64_t enlarge = 1;        // the texture is 2^this times as large as the image
-  bool skips = true;               // the U-Net's skip connections
-  std::int64_t latent = 384;       // width of the fully connected code that feeds all heads
+  PictureCodeConfig code = {};
   std::int64_t hidden = 512;       // width of the vertex head
   std::int64_t light_width = 128;  // of the six layers of the light head
   SphereConfig sphere = {};
@@ -136,6 +131,6 @@ class TextureNetwork {
 };
 
 // InvalidArgument names the key that does not fit images of that size.
-Status CheckImageSize(const TextureNetworkConfig& config, int image_size);
+Status CheckImageSize(const PictureCodeConfig& config, int image_size);
 
 }  // namespace tilegrad::train

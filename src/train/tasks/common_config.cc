@@ -32,14 +32,14 @@ ConfigFields FieldsOf(SphereConfig* c) {
   };
 }
 
-ConfigFields FieldsOf(const UNetKeys& keys) {
+ConfigFields FieldsOf(PictureCodeConfig* c) {
   return {
-      {"network.base", keys.base, 1, 4096, "U-Net: channels of the first level; they double"},
-      {"network.most", keys.most, 1, 4096, "up to this many channels"},
-      {"network.levels", keys.levels, 1, 10, "halvings"},
-      {"network.enlarge", keys.enlarge, 0, 4, "the texture is 2^this times as large as the image"},
-      {"network.skips", keys.skips, 0, 1, "the U-Net's skip connections"},
-      {"network.latent", keys.latent, 1, 65536, "width of the code that all heads start from"},
+      {"network.base", &c->base, 1, 4096, "U-Net: channels of the first level; they double"},
+      {"network.most", &c->most, 1, 4096, "up to this many channels"},
+      {"network.levels", &c->levels, 1, 10, "halvings"},
+      {"network.enlarge", &c->enlarge, 0, 4, "the texture is 2^this times as large as the image"},
+      {"network.skips", &c->skips, 0, 1, "the U-Net's skip connections"},
+      {"network.latent", &c->latent, 1, 65536, "width of the code that all heads start from"},
   };
 }
 

@@ -9,6 +9,7 @@
 
 #include "train/losses/loss_sum.h"
 #include "train/losses/regularizers.h"
+#include "train/models/picture_lookup.h"
 #include "train/models/sphere_model.h"
 #include "train/run/config_fields.h"
 #include "train/run/run.h"
@@ -51,13 +52,7 @@ ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view
 
 ConfigFields FieldsOf(SphereConfig* config);  // of [network]; without n3mr_vertices
 
-// [network] of a U-Net whose output is a texture map.
-struct UNetKeys {
-  std::int64_t *base, *most, *levels, *enlarge;
-  bool* skips;
-  std::int64_t* latent;
-};
-ConfigFields FieldsOf(const UNetKeys& keys);
+ConfigFields FieldsOf(PictureCodeConfig* config);  // of [network]
 
 // Standard deviation of the vertex head's initial weights, N(0, value^2).
 ConfigField OutputDeviation(double* value);

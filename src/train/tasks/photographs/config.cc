@@ -8,7 +8,7 @@ namespace {
 
 ConfigFields FieldsOf(PhotographNetworkConfig* c) {
   return Joined(
-      {FieldsOf(UNetKeys{&c->base, &c->most, &c->levels, &c->enlarge, &c->skips, &c->latent}),
+      {FieldsOf(&c->code),
        {{"network.texture", &c->texture, 0, 0,
          "\"direct\": a texture map; \"flow\": the position of each texel in the photograph (CMR)"},
         {"network.symmetric_texture", &c->symmetric_texture, 0, 1,

@@ -8,7 +8,7 @@ namespace {
 
 ConfigFields FieldsOf(TextureNetworkConfig* c) {
   return Joined(
-      {FieldsOf(UNetKeys{&c->base, &c->most, &c->levels, &c->enlarge, &c->skips, &c->latent}),
+      {FieldsOf(&c->code),
        {{"network.hidden", &c->hidden, 1, 65536, "width of the vertex head"},
         {"network.light_width", &c->light_width, 1, 65536,
          "width of the six layers of the light head"}},

@@ -61,7 +61,7 @@ Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
                                                  const Checkpoint& checkpoint) {
   TILEGRAD_TRY(CheckConfig(config));
   const std::int64_t size = checkpoint.info.image_size;
-  TILEGRAD_TRY(CheckImageSize(config.network, static_cast<int>(size)));
+  TILEGRAD_TRY(CheckImageSize(config.network.code, static_cast<int>(size)));
   TexturedImageConfig sized = config;
   sized.network.sphere.half_extent = checkpoint.info.half_extent;
   auto model = std::make_unique<TexturedModel>(context, sized, static_cast<int>(size));

@@ -60,7 +60,7 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckConfig(config_));
   TILEGRAD_TRY(BeginStart(start, config_.batch));
   TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
-  TILEGRAD_TRY(CheckImageSize(config_.network, image_size()));
+  TILEGRAD_TRY(CheckImageSize(config_.network.code, image_size()));
   const std::vector<int> train = dataset_->Select(Split::kTrain);
   lesson_.source = dataset_->info().source;
   lesson_.half_extent = dataset_->info().camera.half_extent;

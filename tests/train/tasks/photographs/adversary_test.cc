@@ -81,10 +81,7 @@ TEST_F(PhotographsWithACritic, StartsAsARunThatIsThere) {
 // task_test.cc.
 TEST_F(PhotographsWithACritic, GradientsOfAStep) {
   PhotographsConfig config;
-  config.network = {.base = 4,
-                    .most = 8,
-                    .levels = 2,
-                    .latent = 8,
+  config.network = {.code = {.base = 4, .most = 8, .levels = 2, .latent = 8},
                     .sphere = {.level = 1, .radius = 1, .smoothing = 2}};
   config.adversary = {.weight = 0.5, .features = 1, .base = 2, .halvings = 2};
   config.loss = {.keypoint = 0,

@@ -278,10 +278,7 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
 TEST_F(PhotographsTask, GradientsOfAStep) {
   for (const char* texture : {"direct", "flow"}) {
     PhotographsConfig config;
-    config.network = {.base = 4,
-                      .most = 8,
-                      .levels = 2,
-                      .latent = 8,
+    config.network = {.code = {.base = 4, .most = 8, .levels = 2, .latent = 8},
                       .texture = texture,
                       .sphere = {.level = 1, .radius = 1, .smoothing = 2}};
     config.size = 16;
@@ -342,10 +339,7 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
   nn::Context context(workers, nn::DType::kF64);
   const auto shape = MiniatureShape(CubMirror());
   PhotographNetwork network(context,
-                            {.base = 4,
-                             .most = 8,
-                             .levels = 2,
-                             .latent = 8,
+                            {.code = {.base = 4, .most = 8, .levels = 2, .latent = 8},
                              .sphere = {.level = 2, .radius = 1, .smoothing = 2},
                              .output_deviation = 0.5},
                             {shape, 15}, 16, 1);
@@ -381,10 +375,11 @@ TEST(PhotographNetworks, RowsStartWhereQuaternionsDo) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
   for (const char* rotation : {"quaternion", "rows"}) {
-    PhotographNetwork network(
-        context,
-        {.base = 4, .most = 8, .levels = 2, .latent = 8, .azimuths = 3, .rotation = rotation}, {},
-        16, 1);
+    PhotographNetwork network(context,
+                              {.code = {.base = 4, .most = 8, .levels = 2, .latent = 8},
+                               .azimuths = 3,
+                               .rotation = rotation},
+                              {}, 16, 1);
     const nn::Var input = nn::Constant(context, context.Full({1, 3, 16, 16}, 0.0));
     // The code's own weights say a little, as the last layer's do.
     const auto out = network.Forward(input, nn::Mode::kTrain);

@@ -21,11 +21,7 @@ constexpr int kSize = 16;
 
 TexturedImageConfig TinyConfig(const std::string& light) {
   TexturedImageConfig config;
-  config.network = {.base = 2,
-                    .most = 4,
-                    .levels = 2,
-                    .enlarge = 1,
-                    .latent = 6,
+  config.network = {.code = {.base = 2, .most = 4, .levels = 2, .enlarge = 1, .latent = 6},
                     .hidden = 5,
                     .light_width = 4,
                     .sphere = {.level = 1, .smoothing = 1},
@@ -119,7 +115,7 @@ TEST(TexturedStep, GradientsUnderHarmonics) {
 
 TEST(TexturedStep, GradientsWithoutLightAndSkips) {
   TexturedImageConfig config = TinyConfig("none");
-  config.network.skips = false;
+  config.network.code.skips = false;
   config.network.sphere.symmetric = false;
   ExpectGradientsAgreeWithDifferences(config);
 }
@@ -128,7 +124,7 @@ TexturedImageConfig LookupConfig() {
   TexturedImageConfig config = TinyConfig("lambert");
   config.network.lookup = true;
   config.network.lookup_width = 4;
-  config.network.skips = false;
+  config.network.code.skips = false;
   config.network.normalize = false;
   config.color = {.masked = true, .soft = 0.3, .own = 0.3, .pose = 2};
   return config;
