@@ -30,8 +30,7 @@ struct Data {
 Result<Data> Load(const train::Dataset& dataset, train::Split split, const Workers& workers) {
   const std::vector<int> models = dataset.Select(split);
   Data data;
-  TILEGRAD_ASSIGN(data.images, train::LoadImageStore(
-                                   dataset, models, workers, [](const Progress&) {}, false));
+  TILEGRAD_ASSIGN(data.images, train::LoadImageStore(dataset, models, workers, {}));
   for (const int m : models) {
     data.labels.push_back(dataset.models()[static_cast<std::size_t>(m)].class_index);
   }

@@ -40,11 +40,10 @@ struct Data {
 };
 
 Result<Pictures> Draw(const Data& data, TexturedModel& model) {
-  const StopFlag stop = false;
   const TexturedImageConfig& config = model.config();
   TILEGRAD_ASSIGN(HeldOutViews held_out,
                   HeldOutViews::Load({config, data.dataset, data.dataset.Select(Split::kTest)},
-                                     data.workers, nullptr, stop));
+                                     data.workers, {}));
   ObjectPictures pictures(config.light, data.size(), static_cast<int>(config.stream.draw.samples));
   Pictures out;
   for (std::size_t i = 0; i < held_out.models().size(); ++i) {

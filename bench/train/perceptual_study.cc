@@ -131,7 +131,7 @@ Status Run(const Path& run, const Path& folder) {
   nn::Context context(workers);
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
   TILEGRAD_ASSIGN(const LabelledImages data,
-                  LoadLabelled(dataset, dataset.Select(Split::kTest), workers, nullptr, false));
+                  LoadLabelled(dataset, dataset.Select(Split::kTest), workers, {}));
   TILEGRAD_TRY(
       Study("plain L1", context, data, [](const nn::Var& x) { return std::vector<nn::Var>{x}; }));
   TILEGRAD_ASSIGN(const FeatureFunction trained,

@@ -30,10 +30,9 @@ std::vector<Path> PhotographsBelow(const Path& folder) {
 Status Run(int argc, char** argv) {
   if (argc < 4) return InvalidArgument("photograph_set DATASET BACKGROUNDS OUT [TRAIN] [TEST]");
   const Workers workers(0);
-  const StopFlag stop = false;
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(argv[1]));
   const auto open = [&](Split split) {
-    return OpenTexturedMeshes(dataset, dataset.Select(split), {}, workers, nullptr, stop);
+    return OpenTexturedMeshes(dataset, dataset.Select(split), {}, workers, {});
   };
   TILEGRAD_ASSIGN(const MeshCache train, open(Split::kTrain));
   TILEGRAD_ASSIGN(const MeshCache test, open(Split::kTest));
@@ -42,7 +41,7 @@ Status Run(int argc, char** argv) {
   if (argc > 5) job.test_count = std::atoi(argv[5]);
   fmt::print("{} training and {} test models, {} backgrounds\n", job.train.size(), job.test.size(),
              job.backgrounds.size());
-  return MakeRenderedSet(job, {}, argv[3], workers, nullptr, stop);
+  return MakeRenderedSet(job, {}, argv[3], workers, {});
 }
 
 }  // namespace

@@ -166,7 +166,6 @@ Status Run(const Job& job, Change change, const char* name) {
 
 Status RunAll(const Path& run, const Path& folder, const std::string& out) {
   const Workers workers;
-  const StopFlag stop = false;
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(run, workers));
   auto* model = predictor.model().textured();
   if (model == nullptr)
@@ -174,9 +173,9 @@ Status RunAll(const Path& run, const Path& folder, const std::string& out) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
   TILEGRAD_TRY(predictor.CheckImageSize(dataset));
   const TexturedImageConfig& config = model->config();
-  TILEGRAD_ASSIGN(HeldOutViews held_out,
-                  HeldOutViews::Load({config, dataset, ChooseModels(dataset, kModels)}, workers,
-                                     nullptr, stop));
+  TILEGRAD_ASSIGN(
+      HeldOutViews held_out,
+      HeldOutViews::Load({config, dataset, ChooseModels(dataset, kModels)}, workers, {}));
   const Job job{config, dataset, *model, held_out, out};
   fmt::print(
       "| what changes | spread of the texture | texture L1 | angle of the light | "

@@ -74,7 +74,7 @@ py::array LoadAllImages(const Dataset& d, const std::vector<int>& models, int th
   for (const int model : models) CheckedModel(d, model);
   auto store = ValueOrThrow(WithoutGil([&] {
     const Workers workers(threads);
-    return train::LoadImageStore(d, models, workers, {}, {});
+    return train::LoadImageStore(d, models, workers, {});
   }));
   return OwnedArray<std::uint8_t>(std::move(store.bytes),
                                   {store.models, store.views, 4, store.size, store.size});

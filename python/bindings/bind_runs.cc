@@ -197,8 +197,7 @@ py::dict Train(const py::dict& request, const py::object& listener) {
   job.max_minutes = request["max_minutes"].cast<double>();
   Listener listening(listener);
   const Workers workers(request["threads"].cast<int>());
-  auto outcome =
-      listening.Run([&] { return train::Train(job, workers, listening.Sink(), listening.stop()); });
+  auto outcome = listening.Run([&] { return train::Train(job, workers, listening.watch()); });
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
   return py::dict(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,

@@ -35,6 +35,7 @@ class Listener {
     return [this](const Progress& progress) { Pass(progress); };
   }
   const StopFlag& stop() const { return stop_; }
+  Watch watch() { return {Sink(), &stop_}; }
 
   // After the work: propagates the function's exception; its request to stop is no error.
   void Settle(const Status& status) const;

@@ -29,18 +29,25 @@ using WarningSink = std::function<void(const std::string&)>;
 // returns StatusCode::kCancelled.
 using StopFlag = std::atomic<bool>;
 
-// Both, for work in many parts. Either may be absent.
+// Both. Either may be absent.
 struct Watch {
   ProgressSink progress = nullptr;
   const StopFlag* stop = nullptr;
 
   bool stopped() const { return stop != nullptr && *stop; }
-  // Reports progress; returns kCancelled, naming the stage, if the work should stop.
-  Status At(const Progress& now) const {
-    if (stopped()) return Cancelled("stopped while {}", now.stage);
+  void Report(const Progress& now) const {
     if (progress) progress(now);
+  }
+  // Reports progress; returns kCancelled, "stopped while <stage>" and `left`, if the work should
+  // stop.
+  Status At(const Progress& now, const char* left = "") const {
+    if (stopped()) return Cancelled("stopped while {}{}", now.stage, left);
+    Report(now);
     return {};
   }
 };
+
+// What stopped work has left, if it writes only at its end.
+inline constexpr const char* kNothingWritten = "; nothing was written";
 
 }  // namespace tilegrad

@@ -222,8 +222,9 @@ Status Make(const DatasetOptions& options) {
   for (const std::string& name : options.classes) build.classes.push_back(train::SynsetName(name));
   const Workers workers(ranks.Workers(options.workers));
   ProgressLine line;
-  auto made = train::BuildDataset(**source, build, folder, workers,
-                                  ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
+  auto made =
+      train::BuildDataset(**source, build, folder, workers,
+                          ranks.follows() ? Watch{nullptr, &StopOnSignals()} : line.Watching());
   line.Finish();
   if (!made.ok() || ranks.follows()) return ranks.Reportable(made.status());
   const train::BuildSummary summary = std::move(*made);

@@ -138,7 +138,7 @@ Status RunEvaluation(const EvalOptions& options) {
                                   RuleOf(options.voxels)};
   ProgressLine line;
   auto evaluation = subject.predictor->task().Evaluate(
-      job, workers, ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
+      job, workers, ranks.follows() ? Watch{nullptr, &StopOnSignals()} : line.Watching());
   line.Finish();
   ranks.EndIfFailed(evaluation.status());
   if (!evaluation.ok()) return evaluation.status();

@@ -73,7 +73,7 @@ Status RunProfile(const ProfileOptions& options) {
                                 .start_seconds = 1e-6 * options.start};
   for (const double workers : options.workers) request.workers.push_back(static_cast<int>(workers));
   TILEGRAD_ASSIGN(const train::StepProfile profile,
-                  train::ProfileSteps(job, request, line.Sink(), StopOnSignals()));
+                  train::ProfileSteps(job, request, line.Watching()));
   line.Finish();
   PrintMeasured(profile);
   nlohmann::ordered_json result = {{"one", profile.one},

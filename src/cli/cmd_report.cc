@@ -36,7 +36,7 @@ Status RunReport(const ReportOptions& options) {
   if (!options.out.empty()) TILEGRAD_TRY(guard.CheckAll(files));  // else the run's own
   const Workers workers(options.on.workers);
   ProgressLine line;
-  const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
+  const auto summary = train::WriteReport(job, workers, line.Watching());
   line.Finish();
   if (!summary.ok()) return summary.status();
   for (const std::string& warning : summary->warnings)

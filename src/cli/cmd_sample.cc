@@ -180,9 +180,8 @@ Status Score(const SampleOptions& options, const SampleFiles& files, const Path&
              train::GeneratorModel& model, nlohmann::ordered_json* json) {
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
   ProgressLine line;
-  const auto scores =
-      train::ScoreGenerator(model, {run, data, options.score_count, options.seed, options.judge},
-                            line.Sink(), StopOnSignals());
+  const auto scores = train::ScoreGenerator(
+      model, {run, data, options.score_count, options.seed, options.judge}, line.Watching());
   line.Finish();
   if (!scores.ok()) return scores.status();
   const std::string text = train::FormatScores(*scores);

@@ -81,7 +81,7 @@ Status RunTradeoff(const TradeoffOptions& options) {
       job.options.delta = delta;
       job.errors = options.errors;
       job.repetitions = options.repetitions;
-      auto tradeoff = MeasureTradeoff(job, line.Sink(), StopOnSignals());
+      auto tradeoff = MeasureTradeoff(job, line.Watching());
       if (!tradeoff.ok()) {
         return tradeoff.status().Within(fmt::format("{}, delta = {:g}", scene.name, delta));
       }
@@ -91,7 +91,7 @@ Status RunTradeoff(const TradeoffOptions& options) {
   std::vector<StudyTraining> training;
   if (!options.data.empty()) {
     const Workers workers(options.workers);
-    TILEGRAD_ASSIGN(training, RunTrainingStudy(study, workers, line.Sink(), StopOnSignals()));
+    TILEGRAD_ASSIGN(training, RunTrainingStudy(study, workers, line.Watching()));
   }
   line.Finish();
   return WriteStudy(options.out, results, training);

@@ -116,14 +116,14 @@ Status RunTraining(const TrainOptions& given) {
   job.group = ranks.group();
   const Workers workers(ranks.Workers(options.workers));
   if (ranks.follows())
-    return ranks.Reportable(train::Train(job, workers, nullptr, StopOnSignals()).status());
+    return ranks.Reportable(train::Train(job, workers, {nullptr, &StopOnSignals()}).status());
   Live live;
   if (options.live)
     job.begun = [&] { return live.Start({options.out, options.data, job.config.schedule.steps}); };
   ProgressLine line;
   job.warn = line.Warnings();
   job.drawn = AnnounceSheets(&line, job.config.schedule.sample_every);
-  auto outcome = train::Train(job, workers, live.Sink(line.Sink()), StopOnSignals());
+  auto outcome = train::Train(job, workers, {live.Sink(line.Sink()), &StopOnSignals()});
   line.Finish();
   live.Finish(outcome.status());
   ranks.EndIfBroken(outcome.status());

@@ -34,7 +34,7 @@ Status MakeSet(const train::CollectionJob& job, const Path& folder, const Worker
                bool force) {
   TILEGRAD_TRY(CheckOut(folder, job.source, force));
   ProgressLine line;
-  const auto made = train::CollectPhotographs(job, folder, workers, line.Sink(), StopOnSignals());
+  const auto made = train::CollectPhotographs(job, folder, workers, line.Watching());
   line.Finish();
   if (!made.ok()) return made.status();
   PrintSummary(*made, folder);

@@ -256,8 +256,7 @@ Result<FitOutcome> RunFit(const FitJob& asked, const Workers& workers, const Pro
   nn::Context context(workers);
   FitWork work(job, start, context, *fitter);
   const RunPlan plan = PlanOf(job);
-  TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
-                  ExecuteRun(plan, &work, context, progress, stop));
+  TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome), ExecuteRun(plan, &work, context, watch));
   FitScene scene = work.scene();
   if (progress) progress({"filling the texture", 0, 0, ""});
   TILEGRAD_TRY(FillTexture(job, workers, &scene));

@@ -62,8 +62,7 @@ std::vector<int> SpreadRows(const TradeoffJob& job, std::size_t faces) {
 
 class Measurement {
  public:
-  Measurement(const TradeoffJob& job, const ProgressSink& progress, const StopFlag& stop)
-      : job_(job), progress_(progress), stop_(stop) {
+  Measurement(const TradeoffJob& job, const Watch& watch) : job_(job), watch_(watch) {
     for (const double error : job.errors) settings_.push_back(WithError(error));
     if (job.paper_rule) {
       settings_.push_back(job.options);
@@ -94,8 +93,8 @@ class Measurement {
     return options;
   }
   Status Step(const char* stage, std::size_t done, std::size_t total) {
-    if (stop_) return Cancelled("stopped");
-    if (progress_) progress_({stage, done, total, {}});
+    if (watch_.stopped()) return Cancelled("stopped");
+    watch_.Report({stage, done, total, {}});
     return {};
   }
   std::size_t pixels() const {
@@ -118,8 +117,7 @@ class Measurement {
   }
 
   const TradeoffJob& job_;
-  const ProgressSink& progress_;
-  const StopFlag& stop_;
+  const Watch& watch_;
   const Workers one_{1};
   Renderer renderer_ = RendererOn(one_);
   std::vector<RenderOptions> settings_;
@@ -252,8 +250,7 @@ Status Measurement::Time() {
 
 }  // namespace
 
-Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const ProgressSink& progress,
-                                 const StopFlag& stop) {
+Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const Watch& watch) {
   if (job.errors.empty()) return InvalidArgument("no max_alpha_error to try");
   for (const double error : job.errors) {
     if (!(error >= 0 && error <= 1)) {
@@ -261,7 +258,7 @@ Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const ProgressSink& pro
     }
   }
   if (job.repetitions < 1) return InvalidArgument("repetitions is {}; at least 1", job.repetitions);
-  return Measurement(job, progress, stop).Run();
+  return Measurement(job, watch).Run();
 }
 
 namespace {
@@ -393,7 +390,7 @@ Result<StudyScene> SceneFromFile(const Path& file, int size) {
 namespace {
 
 Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, const Workers& workers,
-                                const ProgressSink& progress, const StopFlag& stop) {
+                                const Watch& watch) {
   train::TrainJob job;
   TILEGRAD_ASSIGN(job.config, train::FindConfig(study.config));
   TILEGRAD_TRY(
@@ -403,11 +400,10 @@ Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, con
   job.run = study.out / fmt::format("training_{:g}", error);
   job.existing = train::ExistingRun::kContinue;
   job.warn = study.warn;
-  TILEGRAD_ASSIGN(const train::RunOutcome outcome, train::Train(job, workers, progress, stop));
+  TILEGRAD_ASSIGN(const train::RunOutcome outcome, train::Train(job, workers, watch));
   TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(job.run, workers));
-  TILEGRAD_ASSIGN(
-      const train::Evaluation evaluation,
-      predictor.task().Evaluate({job.run, study.data, predictor}, workers, progress, stop));
+  TILEGRAD_ASSIGN(const train::Evaluation evaluation,
+                  predictor.task().Evaluate({job.run, study.data, predictor}, workers, watch));
   const train::Score& mean = evaluation.rows.back().mean;
   return StudyTraining{error, outcome.seconds, outcome.last_step, mean.iou,
                        mean.f_score.value_or(0)};
@@ -421,12 +417,10 @@ Status CheckTrainingStudy(const TrainingStudyJob& job) {
 }
 
 Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
-                                                    const Workers& workers,
-                                                    const ProgressSink& progress,
-                                                    const StopFlag& stop) {
+                                                    const Workers& workers, const Watch& watch) {
   std::vector<StudyTraining> out;
   for (const double error : job.errors) {
-    TILEGRAD_ASSIGN(out.emplace_back(), TrainWith(job, error, workers, progress, stop));
+    TILEGRAD_ASSIGN(out.emplace_back(), TrainWith(job, error, workers, watch));
   }
   return out;
 }

@@ -50,8 +50,7 @@ struct Tradeoff {
 // Errors: those of Renderer::Render, an empty or invalid list of errors, a scene without gradient
 // (nothing near background); kCancelled when `stop` is set. Random numbers are seeded: accuracies
 // are reproducible.
-Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const ProgressSink& progress,
-                                 const StopFlag& stop);
+Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const Watch& watch);
 
 // Something to render: one mesh from one camera.
 struct StudyScene {
@@ -93,9 +92,7 @@ struct TrainingStudyJob {
 // minutes.
 Status CheckTrainingStudy(const TrainingStudyJob& job);
 Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
-                                                    const Workers& workers,
-                                                    const ProgressSink& progress,
-                                                    const StopFlag& stop);
+                                                    const Workers& workers, const Watch& watch);
 
 // Tables in Markdown, the same numbers in CSV, and the Pareto plot in SVG (log-log: CPU time of
 // forward and backward against the largest error of alpha).

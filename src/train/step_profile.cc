@@ -21,8 +21,8 @@ class Measured {
   Measured(int workers, LoopMachine machine)
       : workers_(workers, &trace_), machine_(machine), recorded_(true) {}
 
-  Status Start(const TrainJob& job, const ProgressSink& progress, const StopFlag& stop) {
-    TILEGRAD_ASSIGN(rehearsal_, Rehearse(job, workers_, progress, stop));
+  Status Start(const TrainJob& job, const Watch& watch) {
+    TILEGRAD_ASSIGN(rehearsal_, Rehearse(job, workers_, watch));
     return {};
   }
   Status Step(bool counts) {
@@ -65,16 +65,15 @@ LoopMachine MachineOf(int workers, const ProfileRequest& request, const StepProf
   return machine;
 }
 
-Status StartAll(std::deque<Measured>* all, const TrainJob& job, const ProgressSink& progress,
-                const StopFlag& stop) {
-  for (Measured& one : *all) TILEGRAD_TRY(one.Start(job, progress, stop));
+Status StartAll(std::deque<Measured>* all, const TrainJob& job, const Watch& watch) {
+  for (Measured& one : *all) TILEGRAD_TRY(one.Start(job, watch));
   return {};
 }
 
 }  // namespace
 
 Result<StepProfile> ProfileSteps(const TrainJob& job, const ProfileRequest& request,
-                                 const ProgressSink& progress, const StopFlag& stop) {
+                                 const Watch& watch) {
   StepProfile out;
   out.cores = AvailableCores();
   out.costs = MeasureLoopCosts(Workers(out.cores));
@@ -83,16 +82,16 @@ Result<StepProfile> ProfileSteps(const TrainJob& job, const ProfileRequest& requ
   all.emplace_back(out.cores);
   for (const int workers : request.workers)
     all.emplace_back(workers, MachineOf(workers, request, out));
-  TILEGRAD_TRY(StartAll(&all, job, progress, stop));
+  TILEGRAD_TRY(StartAll(&all, job, watch));
   const int steps = kWarmUp + request.steps;
   for (int step = 0; step < steps; ++step) {
     for (Measured& one : all) {
-      if (stop) return Cancelled("stopped at step {} of {}; nothing was written", step, steps);
+      if (watch.stopped())
+        return Cancelled("stopped at step {} of {}; nothing was written", step, steps);
       TILEGRAD_TRY(one.Step(step >= kWarmUp).Within(fmt::format("step {}", step)));
     }
-    if (progress)
-      progress({"profiling", static_cast<std::uint64_t>(step + 1),
-                static_cast<std::uint64_t>(steps), ""});
+    watch.Report(
+        {"profiling", static_cast<std::uint64_t>(step + 1), static_cast<std::uint64_t>(steps), ""});
   }
   out.one = all[0].seconds();
   out.all = all[1].seconds();

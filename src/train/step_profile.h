@@ -31,6 +31,6 @@ struct StepProfile {
 // Alternates between numbers of workers and takes the fastest step of each, so that time lost to
 // other programs does not count. kCancelled when `stop` is set.
 Result<StepProfile> ProfileSteps(const TrainJob& job, const ProfileRequest& request,
-                                 const ProgressSink& progress, const StopFlag& stop);
+                                 const Watch& watch);
 
 }  // namespace tilegrad::train

@@ -224,10 +224,10 @@ class Training : public RunWork {
   }
 
   // Data, networks and all else; on every rank.
-  Status Start(nn::Context& context, const ProgressSink& progress, const StopFlag& stop) {
+  Status Start(nn::Context& context, const Watch& watch) {
     context.MakeLanes(GradientSums::MostLanes(
         {config_.schedule.portions, job_.group ? &job_.group->ranks() : nullptr}));
-    TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
+    TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, watch, job_.warn}));
     TILEGRAD_TRY(context.TakeStatus());
     if (!job_.group && config_.schedule.portions == 1) return {};
     TILEGRAD_ASSIGN(portioned_,
@@ -348,9 +348,7 @@ class TrainingRehearsal : public Rehearsal {
   TrainingRehearsal(const TrainJob& job, TrainConfig config, const Workers& workers)
       : config_(std::move(config)), context_(workers), training_(job, &config_) {}
 
-  Status Start(const ProgressSink& progress, const StopFlag& stop) {
-    return training_.Start(context_, progress, stop);
-  }
+  Status Start(const Watch& watch) { return training_.Start(context_, watch); }
   Status Step() override {
     values_.Clear();
     TILEGRAD_TRY(training_.Updates(step_++, &values_));
@@ -369,15 +367,14 @@ class TrainingRehearsal : public Rehearsal {
 }  // namespace
 
 Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
-                                            const ProgressSink& progress, const StopFlag& stop) {
+                                            const Watch& watch) {
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(WriteConfig(job.config), "configuration"));
   auto rehearsal = std::make_unique<TrainingRehearsal>(job, std::move(config), workers);
-  TILEGRAD_TRY(rehearsal->Start(progress, stop));
+  TILEGRAD_TRY(rehearsal->Start(watch));
   return std::unique_ptr<Rehearsal>(std::move(rehearsal));
 }
 
-Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const ProgressSink& progress,
-                         const StopFlag& stop) {
+Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Watch& watch) {
   RunPlan plan{.stage = "training",
                .folder = job.run,
                .settings = WriteConfig(job.config),
@@ -392,7 +389,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   // A separate task: that of the job stays unchanged for the next call.
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(plan.settings, "configuration"));
   Training training(job, &config);
-  const auto start = [&] { return training.Start(context, progress, stop); };
+  const auto start = [&] { return training.Start(context, watch); };
   if (job.group) {
     TILEGRAD_TRY(StartTogether(plan, job, workers, &training, start));
     if (!job.group->leads()) return training.Follow(context);
@@ -402,7 +399,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   }
   plan.image_size = config.task->image_size();
   plan.half_extent = config.task->half_extent();
-  auto outcome = ExecuteRun(plan, &training, context, progress, stop);
+  auto outcome = ExecuteRun(plan, &training, context, watch);
   if (job.group && !job.group->broken()) job.group->Order(kEnd);
   return outcome;
 }

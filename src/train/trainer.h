@@ -43,13 +43,12 @@ class Rehearsal {
 };
 // Of job.config and job.data, on one process. Job and workers outlive it.
 Result<std::unique_ptr<Rehearsal>> Rehearse(const TrainJob& job, const Workers& workers,
-                                            const ProgressSink& progress, const StopFlag& stop);
+                                            const Watch& watch);
 
 // As ExecuteRun. With a group, every rank calls it and rank 0's result counts; after an error with
 // ProcessGroup::broken() the ranks can only be aborted. Two runs have the same configuration if all
 // keys but these are equal: name, schedule.log_every, sample_every, checkpoint_every,
 // keep_checkpoints.
-Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const ProgressSink& progress,
-                         const StopFlag& stop);
+Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Watch& watch);
 
 }  // namespace tilegrad::train

@@ -261,11 +261,9 @@ struct SphereJob {
   }
 };
 
-const StopFlag kGo{false};
-
 TEST(Tradeoff, ErrorsStayBelowWhatIsReportedAndWhatIsAsked) {
   SphereJob sphere;
-  const auto result = Ok(MeasureTradeoff(sphere.job, {}, kGo));
+  const auto result = Ok(MeasureTradeoff(sphere.job, {}));
   ASSERT_EQ(result->rows.size(), 4u);
   EXPECT_EQ(result->rows[3].rule, AlphaRule::kPaper);
   EXPECT_GT(result->rows[3].largest, 1e-3);  // it leaves out what is farther than its box
@@ -289,7 +287,7 @@ TEST(Tradeoff, ErrorsStayBelowWhatIsReportedAndWhatIsAsked) {
 TEST(Tradeoff, EvenlySpreadRowsStandForTheWholeImage) {
   SphereJob sphere;
   sphere.job.truth_pairs = 8 * 32 * 320;
-  const auto result = Ok(MeasureTradeoff(sphere.job, {}, kGo));
+  const auto result = Ok(MeasureTradeoff(sphere.job, {}));
   EXPECT_EQ(result->truth_rows, 8);
   EXPECT_LT(result->rows[0].gradient_error, 1e-4);
 }
@@ -297,15 +295,15 @@ TEST(Tradeoff, EvenlySpreadRowsStandForTheWholeImage) {
 TEST(Tradeoff, RefusesWhatHasNoAnswer) {
   SphereJob sphere;
   sphere.job.errors = {};
-  EXPECT_FALSE(MeasureTradeoff(sphere.job, {}, kGo).ok());
+  EXPECT_FALSE(MeasureTradeoff(sphere.job, {}).ok());
   sphere.job.errors = {2};
-  EXPECT_FALSE(MeasureTradeoff(sphere.job, {}, kGo).ok());
+  EXPECT_FALSE(MeasureTradeoff(sphere.job, {}).ok());
   sphere.job.errors = {0};
   const StopFlag stop{true};
-  const auto stopped = MeasureTradeoff(sphere.job, {}, stop);
+  const auto stopped = MeasureTradeoff(sphere.job, {nullptr, &stop});
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
   sphere.job.scene.camera = OrbitCamera({30.0, 32, 32}, 30, 20, -50);  // far behind the camera
-  const auto nothing = MeasureTradeoff(sphere.job, {}, kGo);
+  const auto nothing = MeasureTradeoff(sphere.job, {});
   ExpectIn(nothing.status().message(), "no gradient");
 }
 

@@ -59,7 +59,7 @@ class Portions : public TempFolderTest, public testing::WithParamInterface<Kind>
     const std::vector<std::string> own = {"schedule.steps=2"};
     TrainJob job = JobOf(run, config, own);
     job.data = folder_ / "data";
-    ASSERT_TRUE(Train(job, Workers(1), nullptr, stop_).ok());
+    ASSERT_TRUE(Train(job, Workers(1), {}).ok());
     settings_.push_back(key + (folder_ / run).string());
   }
 
@@ -84,12 +84,10 @@ class Portions : public TempFolderTest, public testing::WithParamInterface<Kind>
     settings.push_back("schedule.steps=" + std::to_string(kSteps));
     const TrainJob job = JobOf(how.run, GetParam().config, settings);
     StopFlag stop = false;
-    const auto outcome = Train(
-        job, Workers(how.workers),
-        [&](const Progress& p) {
-          if (p.stage == "training" && p.done >= static_cast<std::size_t>(how.stop)) stop = true;
-        },
-        stop);
+    const auto stop_after = [&](const Progress& p) {
+      if (p.stage == "training" && p.done >= static_cast<std::size_t>(how.stop)) stop = true;
+    };
+    const auto outcome = Train(job, Workers(how.workers), {stop_after, &stop});
     const bool whole = how.stop > kSteps;
     EXPECT_EQ(outcome.ok(), whole) << outcome.status().message();
   }
@@ -100,7 +98,6 @@ class Portions : public TempFolderTest, public testing::WithParamInterface<Kind>
 
   Workers workers_{1};
   nn::Context context_{workers_};
-  StopFlag stop_ = false;
   std::vector<std::string> settings_;
 };
 

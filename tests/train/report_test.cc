@@ -52,16 +52,12 @@ class ReportTest : public TempFolderTest {
     job.config.schedule.steps = 3;
     job.data = data;
     job.run = job_.run = folder_ / "run";
-    const auto trained = Ok(Train(
-        job, workers_, [](const Progress&) {}, stop_));
+    const auto trained = Ok(Train(job, workers_, watch_));
     job_.data = data;
     job_.out = folder_ / "page.html";
   }
 
-  Result<ReportSummary> Make() {
-    return WriteReport(
-        job_, workers_, [](const Progress&) {}, stop_);
-  }
+  Result<ReportSummary> Make() { return WriteReport(job_, workers_, watch_); }
   std::string Page() {
     const auto summary = Ok(Make());
     return summary.ok() ? ReadText(job_.out).value() : "";
@@ -86,6 +82,7 @@ class ReportTest : public TempFolderTest {
 
   Workers workers_;
   StopFlag stop_ = false;
+  const Watch watch_ = {[](const Progress&) {}, &stop_};
   ReportJob job_;
 };
 
@@ -189,9 +186,7 @@ TEST_F(ReportTest, ComparesPicturesUnderTheirLights) {
 TEST_F(ReportTest, SameRunSameBytes) {
   const std::string first = Page();
   const Workers three(3);
-  ASSERT_TRUE(WriteReport(
-                  job_, three, [](const Progress&) {}, stop_)
-                  .ok());
+  ASSERT_TRUE(WriteReport(job_, three, watch_).ok());
   EXPECT_EQ(ReadText(job_.out).value(), first);
 }
 

@@ -21,11 +21,10 @@ class StepProfileTest : public TempFolderTest {
   }
   void Run(const std::string& name, const Workers& workers) {
     job_.run = folder_ / name;
-    const auto outcome = Ok(Train(job_, workers, nullptr, stop_));
+    const auto outcome = Ok(Train(job_, workers, {}));
     EXPECT_TRUE(outcome->finished);
   }
 
-  StopFlag stop_ = false;
   TrainJob job_;
 };
 
@@ -41,7 +40,7 @@ TEST_F(StepProfileTest, ARecordedRunHasTheSameBits) {
 }
 
 TEST_F(StepProfileTest, PredictsForEachNumberOfWorkersAndWritesNothing) {
-  const auto profile = Ok(ProfileSteps(job_, {.steps = 2, .workers = {2, 16}}, nullptr, stop_));
+  const auto profile = Ok(ProfileSteps(job_, {.steps = 2, .workers = {2, 16}}, {}));
   EXPECT_GT(profile->one, 0);
   EXPECT_GT(profile->all, 0);
   ASSERT_EQ(profile->forecasts.size(), 2u);
@@ -61,8 +60,8 @@ TEST_F(StepProfileTest, PredictsForEachNumberOfWorkersAndWritesNothing) {
 }
 
 TEST_F(StepProfileTest, Stops) {
-  stop_ = true;
-  EXPECT_EQ(ProfileSteps(job_, {.steps = 2, .workers = {2}}, nullptr, stop_).status().code(),
+  const StopFlag stop{true};
+  EXPECT_EQ(ProfileSteps(job_, {.steps = 2, .workers = {2}}, {nullptr, &stop}).status().code(),
             StatusCode::kCancelled);
 }
 

@@ -52,9 +52,11 @@ class TrainerTest : public TempFolderTest {
 
   Result<RunOutcome> Run(const ProgressSink& progress, int workers = 1) {
     const Workers count(workers);
-    return Train(job_, count, progress, stop_);
+    return Train(job_, count, {progress, &stop_});
   }
-  Result<RunOutcome> Run() { return Run(kSilent); }
+  Result<RunOutcome> Run(int workers = 1) {
+    return Run([](const Progress&) {}, workers);
+  }
   // Stops by the flag once `step` steps are done.
   void StopAfter(std::uint64_t step) {
     const auto outcome = Run([&](const Progress& p) {
@@ -67,7 +69,7 @@ class TrainerTest : public TempFolderTest {
   // Starts anew in `name`, undisturbed.
   void RunWhole(const std::string& name, int workers) {
     const Path before = std::exchange(job_.run, folder_ / name);
-    const auto outcome = Ok(Run(kSilent, workers));
+    const auto outcome = Ok(Run(workers));
     EXPECT_TRUE(outcome->finished);
     job_.run = before;
   }
@@ -84,7 +86,6 @@ class TrainerTest : public TempFolderTest {
     std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   }
 
-  static inline const ProgressSink kSilent = [](const Progress&) {};
   Workers workers_;
   nn::Context context_;
   StopFlag stop_{false};

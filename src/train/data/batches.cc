@@ -29,9 +29,8 @@ Result<std::vector<Camera>> LoadStoreCameras(const Dataset& dataset,
 }  // namespace
 
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
-                                  const Workers& workers, const ProgressSink& progress,
-                                  const StopFlag& stop, std::size_t in_memory) {
-  const Watch watch{progress, &stop};
+                                  const Workers& workers, const Watch& watch,
+                                  std::size_t in_memory) {
   ImageStore store;
   store.models = static_cast<int>(models.size());
   store.views = dataset.info().views;

@@ -43,8 +43,7 @@ struct ImageStore {
 // Loads the images of these models, in order; errors name the file. Stops between models when
 // `stop` is set. Maps more than `in_memory` bytes from the dataset's picture pack (picture_pack.h).
 Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
-                                  const Workers& workers, const ProgressSink& progress,
-                                  const StopFlag& stop,
+                                  const Workers& workers, const Watch& watch,
                                   std::size_t in_memory = ScratchBytes::kInMemory);
 
 // One object of a batch: the view that the network sees comes first, then the other views, all

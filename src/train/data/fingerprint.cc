@@ -3,6 +3,7 @@
 
 #include "base/file.h"
 #include "base/hash.h"
+#include "base/try_all.h"
 #include "train/data/dataset_files.h"
 #include "train/data/photographs/photographs.h"
 
@@ -18,16 +19,12 @@ Result<std::string> HashOfFile(const Path& path) {
 
 Status AddFiles(const std::vector<Path>& files, const Workers& workers, Hash* all) {
   std::vector<std::string> hashes(files.size());
-  std::vector<Status> failures(files.size());
-  workers.For(files.size(), [&](std::size_t i, std::size_t) {
-    auto hash = HashOfFile(files[i]);
-    failures[i] = hash.status();
-    if (hash.ok()) hashes[i] = *hash;
-  });
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    TILEGRAD_TRY(failures[i]);
-    all->Add(hashes[i]);
-  }
+  const auto read = [&](std::size_t i, std::size_t) -> Status {
+    TILEGRAD_ASSIGN(hashes[i], HashOfFile(files[i]));
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, files.size(), read));
+  for (const auto& hash : hashes) all->Add(hash);
   return {};
 }
 

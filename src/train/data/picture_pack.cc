@@ -3,12 +3,12 @@
 
 #include <chrono>
 #include <fstream>
-#include <mutex>
 #include <thread>
 
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/parts_file.h"
+#include "base/try_all.h"
 #include "io/archive.h"
 #include "train/data/dataset_files.h"
 
@@ -31,17 +31,13 @@ std::vector<int> AllModels(const Dataset& dataset) {
 // The line at the end of the file.
 Result<std::string> LastLine(const Dataset& dataset, const Workers& workers) {
   std::vector<std::string> prints(dataset.models().size());
-  std::vector<Status> failures(prints.size());
-  workers.For(prints.size(), [&](std::size_t m, std::size_t) {
-    auto print = io::ZipFingerprint(dataset.ModelPath(static_cast<int>(m)));
-    failures[m] = print.status();
-    if (print.ok()) prints[m] = std::move(*print);
-  });
+  const auto read = [&](std::size_t m, std::size_t) -> Status {
+    TILEGRAD_ASSIGN(prints[m], io::ZipFingerprint(dataset.ModelPath(static_cast<int>(m))));
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, prints.size(), read));
   Hash all;
-  for (std::size_t m = 0; m < prints.size(); ++m) {
-    TILEGRAD_TRY(failures[m]);
-    all.Add(prints[m]);
-  }
+  for (const auto& print : prints) all.Add(print);
   return fmt::format("\ntilegrad-pictures-1 {}\n", all.Text());
 }
 
@@ -71,19 +67,12 @@ Status WritePack(const Dataset& dataset, const std::string& line, const Workers&
 Status UnpackPictures(const Dataset& dataset, const std::vector<int>& models,
                       const Workers& workers, const Watch& watch,
                       FunctionRef<Status(std::size_t, std::span<const std::uint8_t>)> take) {
-  std::vector<Status> failures(models.size());
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  workers.For(models.size(), [&](std::size_t i, std::size_t) {
-    if (watch.stopped()) return;
-    const auto images = dataset.LoadImages(models[i]);
-    failures[i] = images.ok() ? take(i, *images) : images.status();
-    const std::scoped_lock lock(mutex);
-    if (watch.progress) watch.progress({"loading images", ++done, models.size(), ""});
-  });
-  if (watch.stopped()) return Cancelled("stopped while loading the dataset");
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
-  return {};
+  const auto load = [&](std::size_t i, std::size_t) -> Status {
+    TILEGRAD_ASSIGN(const auto images, dataset.LoadImages(models[i]));
+    return take(i, images);
+  };
+  const Status loaded = TryAll(workers, models.size(), {"loading images", watch}, load);
+  return watch.stopped() ? Cancelled("stopped while loading the dataset") : loaded;
 }
 
 Result<std::optional<ScratchBytes>> OpenPicturePack(const Dataset& dataset, const Workers& workers,

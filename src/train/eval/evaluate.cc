@@ -26,14 +26,8 @@ struct TrainingShapes {
 
 class Evaluator {
  public:
-  Evaluator(const EvaluationJob& job, const Workers& workers, const ProgressSink& progress,
-            const StopFlag& stop)
-      : job_(job),
-        data_(*job.dataset),
-        workers_(workers),
-        progress_(progress),
-        stop_(stop),
-        share_(job.group) {}
+  Evaluator(const EvaluationJob& job, const Workers& workers, const Watch& watch)
+      : job_(job), data_(*job.dataset), workers_(workers), watch_(watch), share_(job.group) {}
 
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);
@@ -52,7 +46,7 @@ class Evaluator {
     for (auto* scores : AllScores()) scores->resize(held_out.size());
     unusable_.resize(held_out.size());
     for (std::size_t i = 0; i < held_out.size(); ++i) {
-      TILEGRAD_TRY(Tick("evaluating", i, held_out.size()));
+      TILEGRAD_TRY(watch_.At({"evaluating", i, held_out.size(), ""}, kNothingWritten));
       if (share_.Has(i)) TILEGRAD_TRY(ScoreModel(i, held_out[i], {undeformed, single}));
     }
     for (auto* scores : AllScores()) TILEGRAD_TRY(share_.Gather(scores));
@@ -62,12 +56,6 @@ class Evaluator {
   }
 
  private:
-  Status Tick(const char* stage, std::size_t done, std::size_t total) const {
-    if (stop_.load()) return Cancelled("stopped while {}; nothing was written", stage);
-    if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
-    return {};
-  }
-
   std::vector<std::vector<Score>*> AllScores() {
     return {&template_scores_, &single_scores_, &retrieval_scores_, &oracle_scores_,
             &predicted_scores_};
@@ -117,7 +105,7 @@ class Evaluator {
             : 0;
     std::set<std::pair<int, std::string>> seen;
     for (std::size_t i = 0; i < train.size(); ++i) {
-      TILEGRAD_TRY(Tick("training shapes", i, train.size()));
+      TILEGRAD_TRY(watch_.At({"training shapes", i, train.size(), ""}, kNothingWritten));
       TILEGRAD_ASSIGN(const ModelData data, data_.Load(train[i]));
       // The i-th is searched where the rounded share of those up to it goes up.
       if ((i + 1) * searched / train.size() > i * searched / train.size())
@@ -244,8 +232,7 @@ class Evaluator {
   const EvaluationJob& job_;
   const Dataset& data_;
   const Workers& workers_;
-  const ProgressSink& progress_;
-  const StopFlag& stop_;
+  const Watch& watch_;
   const Share share_;  // of held-out models
   std::vector<int> views_, color_views_;
   std::vector<std::unique_ptr<PredictionPictures>> pictures_;  // by worker
@@ -258,9 +245,8 @@ class Evaluator {
 
 }  // namespace
 
-Result<Evaluation> Evaluate(const EvaluationJob& job, const Workers& workers,
-                            const ProgressSink& progress, const StopFlag& stop) {
-  return Evaluator(job, workers, progress, stop).Run();
+Result<Evaluation> Evaluate(const EvaluationJob& job, const Workers& workers, const Watch& watch) {
+  return Evaluator(job, workers, watch).Run();
 }
 
 }  // namespace tilegrad::train

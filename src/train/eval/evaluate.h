@@ -43,7 +43,6 @@ struct EvaluationJob {
 // (ShapeOf), over the shapes of a class, and over classes. Same bits for any worker count. Errors:
 // no model in the split or none to train on, a model file that cannot be read, a failed prediction;
 // kCancelled when `stop` is set.
-Result<Evaluation> Evaluate(const EvaluationJob& job, const Workers& workers,
-                            const ProgressSink& progress, const StopFlag& stop);
+Result<Evaluation> Evaluate(const EvaluationJob& job, const Workers& workers, const Watch& watch);
 
 }  // namespace tilegrad::train

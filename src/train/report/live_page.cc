@@ -199,8 +199,7 @@ Result<Json> LivePage::Predicted() const {
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(source_.run, workers));
   TILEGRAD_ASSIGN(const RunHeader header, ReadHeader(source_.run));
   const ShowcaseRequest request{source_.run, source_.data, header, predictor, /*examples=*/1};
-  const StopFlag go_on = false;
-  TILEGRAD_ASSIGN(Showcase show, predictor.task().Show(request, workers, nullptr, go_on));
+  TILEGRAD_ASSIGN(Showcase show, predictor.task().Show(request, workers, {}));
   Json json = {{"mesh", nullptr}, {"truth", nullptr}};
   if (show.examples.empty()) return json;
   TILEGRAD_ASSIGN(json["mesh"], MeshOf(std::move(show.examples[0].prediction)));

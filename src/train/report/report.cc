@@ -260,7 +260,7 @@ Result<std::string> Page(const ReportFacts& facts) {
 }  // namespace
 
 Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
-                                  const ProgressSink& progress, const StopFlag& stop) {
+                                  const Watch& watch) {
   ReportFacts facts;
   TILEGRAD_ASSIGN(facts.run, ReadRun(job.run));
   facts.data = job.data.string();
@@ -269,7 +269,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   facts.predictor = predictor.description();
   facts.step = predictor.step();
   const ShowcaseRequest request{job.run, job.data, facts.run.header, predictor, job.models};
-  TILEGRAD_ASSIGN(facts.showcase, predictor.task().Show(request, workers, progress, stop));
+  TILEGRAD_ASSIGN(facts.showcase, predictor.task().Show(request, workers, watch));
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
   ReportSummary summary;
   summary.bytes = page.size();

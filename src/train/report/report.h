@@ -55,7 +55,6 @@ struct ReportSummary {
 
 // Page and sheet appear whole or not at all, the page first. The same run and dataset give the
 // same bytes. Errors name the file of the run or dataset that is missing or broken.
-Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
-                                  const ProgressSink& progress, const StopFlag& stop);
+Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers, const Watch& watch);
 
 }  // namespace tilegrad::train

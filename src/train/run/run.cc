@@ -50,7 +50,7 @@ class Session {
       : plan_(plan), work_(*work), context_(context) {}
 
   Status Open();
-  Status Loop(const ProgressSink& progress, const StopFlag& stop);
+  Status Loop(const Watch& watch);
   RunOutcome outcome() const;
 
  private:
@@ -214,19 +214,18 @@ Status Session::OneStep() {
   return {};
 }
 
-Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
+Status Session::Loop(const Watch& watch) {
   loop_start_ = last_log_ = Clock::now();
   process_seconds_ = ProcessSeconds();
   if (done_ == 0) TILEGRAD_TRY(Draw());
-  while (done_ < End() && !stop && !OutOfTime()) {
+  while (done_ < End() && !watch.stopped() && !OutOfTime()) {
     TILEGRAD_TRY(OneStep());
-    if (!progress) continue;
-    progress(
+    watch.Report(
         {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(End()), note_});
   }
   TILEGRAD_TRY(Save());
   TILEGRAD_TRY(AwaitSave());
-  if (!stop || done_ >= End()) return {};
+  if (!watch.stopped() || done_ >= End()) return {};
   return Cancelled("stopped at step {} of {}; everything is saved", done_, End());
 }
 
@@ -253,10 +252,10 @@ Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
 }
 
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
-                              const ProgressSink& progress, const StopFlag& stop) {
+                              const Watch& watch) {
   Session session(plan, work, context);
   TILEGRAD_TRY(session.Open());
-  TILEGRAD_TRY(session.Loop(progress, stop));
+  TILEGRAD_TRY(session.Loop(watch));
   return session.outcome();
 }
 

@@ -137,7 +137,7 @@ Status CheckExistingRun(const RunPlan& plan, const RunWork& work);
 // another process works in the folder; settings or image size are not those that the run was
 // started with, naming the first line that differs; what `work` returns.
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
-                              const ProgressSink& progress, const StopFlag& stop);
+                              const Watch& watch);
 
 Path PictureFile(const RunPlan& plan, std::int64_t steps);
 

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "base/try_all.h"
 #include "render/picture/composite.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
@@ -99,13 +100,11 @@ Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
   TILEGRAD_ASSIGN(std::vector<Mesh> meshes, job.predictor.Predict(images));
   if (!job.change) return meshes;
   const std::size_t bytes = images.size() / meshes.size();
-  std::vector<Status> failures(meshes.size());
-  workers.For(meshes.size(), [&](std::size_t i, std::size_t) {
-    auto changed = job.change(meshes[i], images.subspan(i * bytes, bytes));
-    failures[i] = changed.status();
-    if (changed.ok()) meshes[i] = std::move(*changed);
-  });
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  const auto change = [&](std::size_t i, std::size_t) -> Status {
+    TILEGRAD_ASSIGN(meshes[i], job.change(meshes[i], images.subspan(i * bytes, bytes)));
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, meshes.size(), change));
   return meshes;
 }
 
@@ -169,7 +168,7 @@ std::vector<int> ShownViews(int views) {
 }
 
 Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
-                             const ProgressSink& progress, const StopFlag& stop) {
+                             const Watch& watch) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
   TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
@@ -181,18 +180,16 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
   const ShowcaseBuilder builder(dataset, request.predictor, workers);
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int model : chosen) {
-    if (stop) return Cancelled("stopped while predicting; nothing was written");
+    TILEGRAD_TRY(watch.At({"predicting", out.examples.size(), chosen.size(), ""}, kNothingWritten));
     TILEGRAD_ASSIGN(Example example, builder.Show(model));
     out.examples.push_back(std::move(example));
-    if (progress) progress({"predicting", out.examples.size(), chosen.size(), ""});
   }
   TILEGRAD_TRY(AddSheet(dataset.info().image_size, workers, &out));
   return out;
 }
 
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop,
-                                     const MakeFitFunction& fit) {
+                                     const Watch& watch, const MakeFitFunction& fit) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.oracle_steps > 0 && !fit)
     return InvalidArgument("--oracle fits meshes; this task predicts none");
@@ -209,7 +206,7 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
   evaluation.group = job.group;
   evaluation.voxels = {job.voxels.value_or(OwnVoxelRule(dataset.info().source)),
                        job.predictor.half_extent()};
-  return train::Evaluate(evaluation, workers, progress, stop);
+  return train::Evaluate(evaluation, workers, watch);
 }
 
 namespace {

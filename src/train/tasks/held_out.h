@@ -20,13 +20,12 @@ using MakeFitFunction = std::function<FitFunction(const DatasetInfo&, int steps,
 // Scores of eval/evaluate.h. Errors: as CheckHeldOut and Evaluate; images of another size.
 // `fit`: for TaskEvaluation::oracle_steps, which are an error without it.
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop,
-                                     const MakeFitFunction& fit = nullptr);
+                                     const Watch& watch, const MakeFitFunction& fit = nullptr);
 
 // Showcase::data ("It learned from 299 models in 11 classes ..."), note, credits, camera and
 // examples of the test split: the truth of each shown view beside the prediction from the first.
 Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
-                             const ProgressSink& progress, const StopFlag& stop);
+                             const Watch& watch);
 
 // Its parts. Showcase::data, credits and camera:
 Showcase AboutDataset(const Dataset& dataset, const RunHeader& header);

@@ -41,8 +41,7 @@ struct TaskStart {
   nn::Context& context;  // outlives the task
   Schedule schedule;
   Path data;  // dataset folder
-  const ProgressSink& progress;
-  const StopFlag& stop;
+  const Watch& watch;
   WarningSink warn = nullptr;  // for likely mistakes of the user
 };
 
@@ -211,9 +210,9 @@ class Task {
                                                    const Checkpoint& checkpoint) = 0;
   // kCancelled when `stop` is set.
   virtual Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                                      const ProgressSink& progress, const StopFlag& stop) = 0;
+                                      const Watch& watch) = 0;
   virtual Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                                const ProgressSink& progress, const StopFlag& stop) = 0;
+                                const Watch& watch) = 0;
 };
 
 }  // namespace tilegrad::train

@@ -134,8 +134,7 @@ class IndexTest : public TempFolderTest {
     BuildOptions options;
     options.image_size = 8;
     options.views = 1;
-    const StopFlag stop = false;
-    ASSERT_TRUE(BuildDataset(*ProceduralSource(1, 0), options, folder_, Workers(1), {}, stop).ok());
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(1, 0), options, folder_, Workers(1), {}).ok());
   }
 
   // Replaces the first `from` in a file of the dataset.

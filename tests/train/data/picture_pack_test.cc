@@ -17,7 +17,7 @@ class PicturePack : public TempFolderTest {
 
   Result<ImageStore> Load(std::size_t in_memory, Split split = Split::kTrain) const {
     const Dataset dataset = Ok(Dataset::Open(Data())).value();
-    return LoadImageStore(dataset, dataset.Select(split), Workers(2), {}, stop_, in_memory);
+    return LoadImageStore(dataset, dataset.Select(split), Workers(2), {nullptr, &stop_}, in_memory);
   }
   static void ExpectSame(const ImageStore& a, const ImageStore& b) {
     ASSERT_EQ(a.models, b.models);

@@ -288,8 +288,7 @@ class EvaluateShapesTest : public TempFolderTest {
     BuildOptions options;
     options.image_size = 8;
     options.views = 1;
-    const StopFlag stop = false;
-    ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, folder_, Workers(1), {}, stop).ok());
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(6, 0), options, folder_, Workers(1), {}).ok());
   }
 
   // Of each class: models 0 and 1 to train on, 2 to 5 to test with, of which 2, 3 and 4 are
@@ -319,8 +318,7 @@ class EvaluateShapesTest : public TempFolderTest {
       return Result<std::vector<Mesh>>({Box(glm::vec3(0), {1, height, 1})});
     };
     change(job);
-    const StopFlag stop = false;
-    return Evaluate(job, Workers(1), {}, stop);
+    return Evaluate(job, Workers(1), {});
   }
 };
 

@@ -99,20 +99,18 @@ Status WriteBoxes(const Path& folder, double half_extent, double said) {
 // `said`.
 Result<double> LearnBoxes(const Path& folder, double half_extent, double said) {
   const Workers workers(2);
-  const StopFlag stop = false;
   TILEGRAD_TRY(WriteBoxes(folder / "data", half_extent, said));
   TrainJob job;
   job.data = folder / "data";
   job.run = folder / "run";
   TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "boxes"));
-  TILEGRAD_TRY(Train(job, workers, {}, stop).status());
+  TILEGRAD_TRY(Train(job, workers, {}).status());
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(job.run, workers));
   EXPECT_EQ(predictor.half_extent(), said);
   EXPECT_NEAR(MeshBounds(predictor.template_mesh()).high.x, said, 1e-6);
   const TaskEvaluation evaluation{
       .run = job.run, .data = job.data, .predictor = predictor, .split = Split::kTrain};
-  TILEGRAD_ASSIGN(const Evaluation scores,
-                  predictor.task().Evaluate(evaluation, workers, {}, stop));
+  TILEGRAD_ASSIGN(const Evaluation scores, predictor.task().Evaluate(evaluation, workers, {}));
   return scores.rows.back().mean.iou;
 }
 
@@ -233,8 +231,7 @@ class PaperConfigs : public TempFolderTest {
     job.data = data;
     job.run = folder_ / "runs" / name;
     const Workers workers(2);
-    const StopFlag stop = false;
-    const auto outcome = Ok(Train(job, workers, {}, stop));
+    const auto outcome = Ok(Train(job, workers, {}));
     EXPECT_EQ(outcome->last_step, 20);
   }
   std::string Of(const std::string& key, const std::string& run) const {

@@ -165,9 +165,9 @@ class ToyTask : public Task {
     return std::unique_ptr<Model>(std::move(model));
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override;
+                              const Watch& watch) override;
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                        const ProgressSink& progress, const StopFlag& stop) override;
+                        const Watch& watch) override;
 
  private:
   nn::Adam& Moved(const UpdateIndex& at) { return at.update == 0 ? *weight_ : *bias_; }
@@ -203,7 +203,7 @@ Result<nn::StepVector<nn::Gradient>> ToyTask::Backward(const UpdateIndex& at, St
 }
 
 Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /*workers*/,
-                                     const ProgressSink& /*progress*/, const StopFlag& stop) {
+                                     const Watch& watch) {
   Evaluation out;
   out.predictor = job.predictor.description();
   out.split = "test";
@@ -214,7 +214,7 @@ Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /
   Rng rng(0, kTestStream);
   double untrained = 0, predicted = 0;
   for (int i = 0; i < out.class_models[0]; ++i) {
-    if (stop) return Cancelled("stopped while evaluating; nothing was written");
+    if (watch.stopped()) return Cancelled("stopped while evaluating; nothing was written");
     const Numbers box = RandomBox(rng);
     TILEGRAD_ASSIGN(const auto meshes, job.predictor.Predict(ImageOf(box)));
     untrained += BoxIou(SizeOf(job.predictor.template_mesh()), box) / out.class_models[0];
@@ -228,7 +228,7 @@ Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /
 }
 
 Result<Showcase> ToyTask::Show(const ShowcaseRequest& request, const Workers& /*workers*/,
-                               const ProgressSink& /*progress*/, const StopFlag& stop) {
+                               const Watch& watch) {
   Showcase out;
   out.purpose = "to tell the size of a box by its colour";
   out.data = "It saw random colours.";
@@ -236,7 +236,7 @@ Result<Showcase> ToyTask::Show(const ShowcaseRequest& request, const Workers& /*
   out.credits = {"nobody"};
   Rng rng(0, kTestStream);
   for (int i = 0; i < request.examples; ++i) {
-    if (stop) return Cancelled("stopped while predicting; nothing was written");
+    if (watch.stopped()) return Cancelled("stopped while predicting; nothing was written");
     const Numbers box = RandomBox(rng);
     TILEGRAD_ASSIGN(auto meshes, request.predictor.Predict(ImageOf(box)));
     Example& example = out.examples.emplace_back();

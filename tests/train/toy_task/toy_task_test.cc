@@ -33,15 +33,14 @@ sample_every = 200
 checkpoint_every = 7
 )";
 
-const ProgressSink kSilent = [](const Progress&) {};
+const Watch kSilent = {[](const Progress&) {}};
 
-Result<RunOutcome> TrainToy(const Path& run, int workers, const ProgressSink& progress = kSilent) {
-  const StopFlag stop = false;
+Result<RunOutcome> TrainToy(const Path& run, int workers, const Watch& watch = kSilent) {
   TrainJob job;
   TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "toy.toml"));
   job.run = run;
   job.existing = ExistingRun::kContinue;
-  return Train(job, Workers(workers), progress, stop);
+  return Train(job, Workers(workers), watch);
 }
 
 class ToyTaskTest : public TempFolderTest {
@@ -62,7 +61,6 @@ class ToyTaskTest : public TempFolderTest {
 
   Workers workers_{2};
   nn::Context context_;
-  StopFlag stop_ = false;
 };
 
 // A run that takes long enough to be killed in it.
@@ -72,7 +70,7 @@ TEST_F(ToyTaskTest, DISABLED_Child) {
   const auto wait = [](const Progress&) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   };
-  EXPECT_TRUE(TrainToy(folder, 1, wait).ok());
+  EXPECT_TRUE(TrainToy(folder, 1, {wait}).ok());
 }
 
 TEST_F(ToyTaskTest, IsConfiguredByItsOwnKeys) {
@@ -112,14 +110,13 @@ TEST_F(ToyTaskTest, LearnsPredictsIsEvaluatedAndReported) {
 
   const auto predictor = Ok(Predictor::Load(run, workers_));
   EXPECT_EQ(predictor->description(), "toy network, 12 parameters, step 400");
-  const auto evaluation =
-      Ok(predictor->task().Evaluate({run, {}, *predictor}, workers_, kSilent, stop_));
+  const auto evaluation = Ok(predictor->task().Evaluate({run, {}, *predictor}, workers_, kSilent));
   EXPECT_GT(evaluation->rows[1].mean.iou, 0.8);
   EXPECT_GT(evaluation->rows[1].mean.iou, evaluation->rows[0].mean.iou);
   ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
 
   const ReportJob job{run, {}, folder_ / "page.html", 3};
-  const auto report = Ok(WriteReport(job, workers_, kSilent, stop_));
+  const auto report = Ok(WriteReport(job, workers_, kSilent));
   EXPECT_EQ(report->models, 3);
   const std::string page = ReadText(job.out).value();
   ExpectIn(page, "to tell the size of a box by its colour", "Squared error of sizes",

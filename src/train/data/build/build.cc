@@ -95,13 +95,12 @@ std::vector<std::string> ClassesOf(const ModelSource& source,
 class Builder {
  public:
   Builder(const ModelSource& source, const BuildOptions& options, const Path& folder,
-          const Workers& workers, const ProgressSink& progress, const StopFlag& stop)
+          const Workers& workers, const Watch& watch)
       : source_(source),
         options_(options),
         folder_(folder),
         workers_(workers),
-        progress_(progress),
-        stop_(stop),
+        watch_(watch),
         info_(MakeInfo(source, options)),
         chosen_(ChooseEntries(source.entries(), options)),
         outcomes_(chosen_.size()) {}
@@ -235,15 +234,16 @@ class Builder {
   Status ForEachModel(const char* stage, Task task) {
     std::atomic<std::size_t> next = 0, done = 0;
     workers_.For(static_cast<std::size_t>(workers_.count()), [&](std::size_t, std::size_t worker) {
-      for (std::size_t i = next++; i < chosen_.size() && !stop_ && !failed_; i = next++) {
+      for (std::size_t i = next++; i < chosen_.size() && !watch_.stopped() && !failed_;
+           i = next++) {
         task(i, worker);
         const std::lock_guard lock(mutex_);
-        if (progress_) progress_({stage, ++done, chosen_.size(), entry(i).class_name});
+        watch_.Report({stage, ++done, chosen_.size(), entry(i).class_name});
       }
     });
     const bool cancelled = failure_.code() == StatusCode::kCancelled;
     if (!failure_.ok() && !cancelled) return failure_;
-    if (!cancelled && (!stop_ || done == chosen_.size())) return {};
+    if (!cancelled && (!watch_.stopped() || done == chosen_.size())) return {};
     return Cancelled("stopped; finished models are in {}; the same command resumes",
                      folder_.string());
   }
@@ -320,8 +320,7 @@ class Builder {
   const BuildOptions& options_;
   const Path& folder_;
   const Workers& workers_;
-  const ProgressSink& progress_;
-  const StopFlag& stop_;
+  const Watch& watch_;
   FolderLock lock_;
   DatasetInfo info_;
   std::vector<std::size_t> chosen_;  // entries of the source, ascending
@@ -336,11 +335,10 @@ class Builder {
 }  // namespace
 
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
-                                  const Path& folder, const Workers& workers,
-                                  const ProgressSink& progress, const StopFlag& stop) {
+                                  const Path& folder, const Workers& workers, const Watch& watch) {
   TILEGRAD_TRY(CheckOptions(options));
   TILEGRAD_TRY(CheckClasses(source.entries(), options.classes));
-  return Builder(source, options, folder, workers, progress, stop).Run();
+  return Builder(source, options, folder, workers, watch).Run();
 }
 
 namespace {

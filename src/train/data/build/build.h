@@ -58,8 +58,7 @@ struct BuildSummary {
 // disk. With a group every rank calls it and rank 0 gets the summary, without warnings of models
 // that others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
-                                  const Path& folder, const Workers& workers,
-                                  const ProgressSink& progress, const StopFlag& stop);
+                                  const Path& folder, const Workers& workers, const Watch& watch);
 
 // Chooses the models of a source for a dataset.
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/photographs/collect.h"
 
-#include <mutex>
-
 #include "base/error.h"
 #include "base/file.h"
 #include "base/read_budget.h"
+#include "base/try_all.h"
 #include "io/image_file.h"
 #include "train/data/photographs/cmr_writer.h"
 #include "train/data/photographs/pascal3d.h"
@@ -62,12 +61,10 @@ Result<PhotographSet> CollectSet(const CollectionJob& job, const Path& folder,
 }  // namespace
 
 Result<CollectionSummary> CollectPhotographs(const CollectionJob& job, const Path& folder,
-                                             const Workers& workers, const ProgressSink& progress,
-                                             const StopFlag& stop) {
+                                             const Workers& workers, const Watch& watch) {
   if (!IsFolder(job.input)) return NotFound("{}: no such folder", job.input.string());
   CollectionSummary summary;
-  TILEGRAD_ASSIGN(const PhotographSet set,
-                  CollectSet(job, folder, {workers, progress, stop}, &summary));
+  TILEGRAD_ASSIGN(const PhotographSet set, CollectSet(job, folder, {workers, watch}, &summary));
   for (const Photograph& photo : set.photographs)
     ++summary.photographs[static_cast<std::size_t>(photo.split)];
   if (set.Select(Split::kTrain).empty())
@@ -81,15 +78,11 @@ Status TakeMembers(const std::vector<std::string>& names, const MemberWork& work
                    FunctionRef<Status(std::size_t, std::size_t)> take, BrokenMembers* broken) {
   const ShortageWatch shortage;
   std::vector<Status> failures(names.size());
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  work.workers.For(names.size(), [&](std::size_t i, std::size_t worker) {
-    if (work.stop) return;
-    failures[i] = take(i, worker);
-    const std::scoped_lock lock(mutex);
-    if (work.progress) work.progress({"reading photographs", ++done, names.size(), ""});
-  });
-  if (work.stop) return Cancelled("stopped while reading photographs");
+  TILEGRAD_TRY(TryAll(work.workers, names.size(), {"reading photographs", work.watch},
+                      [&](std::size_t i, std::size_t worker) {
+                        failures[i] = take(i, worker);
+                        return Status();
+                      }));
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (failures[i].ok()) continue;
     TILEGRAD_TRY(shortage.Check(names[i]));

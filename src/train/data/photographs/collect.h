@@ -37,15 +37,13 @@ struct CollectionSummary {
 // annotations. Copies pictures, but keeps those of an earlier call. The same bytes for any number
 // of workers. Errors: neither form is there, nothing to train on, too many are broken.
 Result<CollectionSummary> CollectPhotographs(const CollectionJob& job, const Path& folder,
-                                             const Workers& workers, const ProgressSink& progress,
-                                             const StopFlag& stop);
+                                             const Workers& workers, const Watch& watch);
 
 // Processes the members of a set of photographs: files of annotations or of pictures.
 
 struct MemberWork {
   const Workers& workers;
-  const ProgressSink& progress;
-  const StopFlag& stop;
+  const Watch& watch;
 };
 
 // Calls take(index, worker) for each name; adds those that fail to `broken`, in order. Errors:

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "base/error.h"
+#include "base/try_all.h"
 #include "io/image_file.h"
 
 namespace tilegrad::train {
@@ -78,7 +78,7 @@ PhotoWindow WindowOf(const PhotoBox& box, const CropRule& rule, Rng* rng) {
 
 Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<int>& photographs,
                                     const CropRule& rule, int size, const Workers& workers,
-                                    const ProgressSink& progress, const StopFlag& stop) {
+                                    const Watch& watch) {
   PhotoStore store;
   store.rule_ = rule;
   store.mirror_ = set.mirror;
@@ -88,28 +88,17 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
     store.photos_.push_back(&set.photographs[static_cast<std::size_t>(i)]);
   store.windows_.resize(photographs.size());
   store.bytes_.Resize(photographs.size() * store.stored_bytes());
-  std::vector<Status> failures(photographs.size());
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  workers.For(photographs.size(), [&](std::size_t i, std::size_t) {
-    if (stop) return;
-    failures[i] = store.LoadOne(i, stop);
-    const std::scoped_lock lock(mutex);
-    if (progress) progress({"reading photographs", ++done, photographs.size(), ""});
-  });
-  if (stop) return Cancelled("stopped while reading photographs");
+  const Status read = TryAll(workers, photographs.size(), {"reading photographs", watch},
+                             [&](std::size_t i, std::size_t) { return store.LoadOne(i, watch); });
+  if (read.ok()) return store;
   const bool published = set.source == "cub" || set.source == "pascal3d";
-  for (const Status& failure : failures) {
-    if (failure.ok()) continue;
-    if (!published) return failure;
-    return Status(failure.code(),
-                  fmt::format("{}; tilegrad dataset --source {} leaves out what is broken",
-                              failure.message(), set.source));
-  }
-  return store;
+  if (!published || watch.stopped()) return read;
+  return Status(read.code(),
+                fmt::format("{}; tilegrad dataset --source {} leaves out what is broken",
+                            read.message(), set.source));
 }
 
-Status PhotoStore::LoadOne(std::size_t i, const StopFlag& stop) {
+Status PhotoStore::LoadOne(std::size_t i, const Watch& watch) {
   const Photograph& photo = *photos_[i];
   // Masks and boxes count pixels as the file stores them.
   TILEGRAD_ASSIGN(io::StoredImage read, io::LoadStoredImage(photo.image));
@@ -123,7 +112,7 @@ Status PhotoStore::LoadOne(std::size_t i, const StopFlag& stop) {
   const double step = windows_[i].side / stored_;
   std::uint8_t* const out = &bytes_[i * stored_bytes()];
   const std::size_t plane = stored_bytes() / 4;
-  for (int y = 0; y < stored_ && !stop; ++y) {
+  for (int y = 0; y < stored_ && !watch.stopped(); ++y) {
     for (int x = 0; x < stored_; ++x) {
       const auto mean =
           averager.Mean(windows_[i].left + x * step, windows_[i].top + y * step, step);

@@ -54,7 +54,7 @@ class PhotoStore {
   // cannot be read, or whose size is not its mask's.
   static Result<PhotoStore> Load(const PhotographSet& set, const std::vector<int>& photographs,
                                  const CropRule& rule, int size, const Workers& workers,
-                                 const ProgressSink& progress, const StopFlag& stop);
+                                 const Watch& watch);
 
   int count() const { return static_cast<int>(photos_.size()); }
   int size() const { return size_; }
@@ -67,7 +67,7 @@ class PhotoStore {
   struct Sub;  // a crop within what is stored
   void Resample(int i, const PhotoWindow& window, bool mirrored, std::span<float> rgb,
                 std::span<float> mask) const;
-  Status LoadOne(std::size_t i, const StopFlag& stop);
+  Status LoadOne(std::size_t i, const Watch& watch);
   std::size_t stored_bytes() const {
     return 4 * static_cast<std::size_t>(stored_) * static_cast<std::size_t>(stored_);
   }

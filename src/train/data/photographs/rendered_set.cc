@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <mutex>
 
 #include "base/error.h"
+#include "base/try_all.h"
 #include "io/image_file.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
@@ -227,7 +227,7 @@ void TellTruth(PhotographSet* set) {
 }  // namespace
 
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
-                       const Workers& workers, const ProgressSink& progress, const StopFlag& stop) {
+                       const Workers& workers, const Watch& watch) {
   if (job.train.size() == 0 || job.test.size() == 0)
     return InvalidArgument("photographs need models to train on and models to test on");
   TILEGRAD_ASSIGN(const auto backgrounds, LoadBackgrounds(job.backgrounds));
@@ -241,21 +241,13 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
   set.mirror = ExtremeMirror();
   for (const ExtremePoint& point : kExtremePoints) set.keypoint_names.emplace_back(point.name);
   std::vector<Photograph> all(count);
-  std::vector<Status> failures(count);
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  workers.For(count, [&](std::size_t i, std::size_t worker) {
-    if (stop) return;
-    auto drawn = photographers[worker]->Take(static_cast<int>(i));
-    failures[i] = drawn.status();
-    if (!drawn.ok()) return;
-    failures[i] = io::SavePng(folder / "Images" / drawn->photo.id, drawn->picture);
-    all[i] = std::move(drawn->photo);
-    const std::scoped_lock lock(mutex);
-    if (progress) progress({"rendering photographs", ++done, count, ""});
-  });
-  if (stop) return Cancelled("stopped while rendering photographs");
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  const auto take = [&](std::size_t i, std::size_t worker) -> Status {
+    TILEGRAD_ASSIGN(auto drawn, photographers[worker]->Take(static_cast<int>(i)));
+    TILEGRAD_TRY(io::SavePng(folder / "Images" / drawn.photo.id, drawn.picture));
+    all[i] = std::move(drawn.photo);
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, count, {"rendering photographs", watch}, take));
   // A camera needs four keypoints, and its fit is poor below five.
   for (Photograph& photo : all) {
     if (std::ranges::count_if(photo.keypoints, &Keypoint::visible) >= 5)

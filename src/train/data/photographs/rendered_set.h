@@ -34,7 +34,7 @@ struct AnnotationNoise {
 // hides them. Cameras of the training part: factorization.h, from the keypoints alone. The same for
 // any number of workers.
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
-                       const Workers& workers, const ProgressSink& progress, const StopFlag& stop);
+                       const Workers& workers, const Watch& watch);
 
 // The mask with its outline moved in and out by smooth noise of `deviation` pixels, plus a constant
 // shift of half that deviation. Never empty.

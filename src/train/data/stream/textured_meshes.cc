@@ -140,7 +140,7 @@ class Loader {
 
 Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<int>& models,
                                      const TexturedMeshRequest& request, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop) {
+                                     const Watch& watch) {
   const auto bytes = ParseByteCount(request.cache);
   if (!bytes.ok()) return bytes.status().Within("stream.cache");
   const auto loader = std::make_shared<Loader>(dataset, request, models);
@@ -152,15 +152,15 @@ Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<i
   std::atomic<std::size_t> next = 0;
   std::size_t done = 0;
   workers.For(static_cast<std::size_t>(workers.count()), [&](std::size_t, std::size_t) {
-    for (std::size_t n = next++; n < order.size() && !stop && !meshes.full(); n = next++) {
+    for (std::size_t n = next++; n < order.size() && !watch.stopped() && !meshes.full();
+         n = next++) {
       failures[order[n]] = meshes.Get(order[n]).status();
       const std::scoped_lock lock(mutex);
-      if (progress)
-        progress({"loading meshes", ++done, order.size(),
-                  fmt::format("{:.1f} MB", static_cast<double>(meshes.bytes()) / 1e6)});
+      watch.Report({"loading meshes", ++done, order.size(),
+                    fmt::format("{:.1f} MB", static_cast<double>(meshes.bytes()) / 1e6)});
     }
   });
-  if (stop) return Cancelled("stopped while loading meshes");
+  if (watch.stopped()) return Cancelled("stopped while loading meshes");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
   ReturnFreeMemory();  // of lists of all files
   return meshes;

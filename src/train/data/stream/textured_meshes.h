@@ -34,6 +34,6 @@ struct TexturedMeshRequest {
 // is set.
 Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<int>& models,
                                      const TexturedMeshRequest& request, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop);
+                                     const Watch& watch);
 
 }  // namespace tilegrad::train

@@ -121,13 +121,12 @@ Score Accuracy(std::span<const int> said, int truth) {
 class Examiner {
  public:
   Examiner(const Dataset& dataset, const TaskEvaluation& job, ClassifierModel& model,
-           const Workers& workers, const ProgressSink& progress, const StopFlag& stop)
+           const Workers& workers, const Watch& watch)
       : data_(dataset),
         job_(job),
         model_(model),
         workers_(workers),
-        progress_(progress),
-        stop_(stop),
+        watch_(watch),
         share_(job.group),
         views_(SpreadViews(dataset.info().views,
                            std::clamp(job.views_per_model, 1, dataset.info().views))) {}
@@ -142,7 +141,7 @@ class Examiner {
     TILEGRAD_TRY(LearnBaselines());
     for (auto* scores : {&frequent_, &retrieved_, &said_}) scores->resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
-      TILEGRAD_TRY(Tick("evaluating", i, models.size()));
+      TILEGRAD_TRY(watch_.At({"evaluating", i, models.size(), ""}, kNothingWritten));
       if (share_.Has(i)) TILEGRAD_TRY(Examine(i, models[i]));
     }
     for (auto* scores : {&frequent_, &retrieved_, &said_}) TILEGRAD_TRY(share_.Gather(scores));
@@ -152,11 +151,6 @@ class Examiner {
   }
 
  private:
-  Status Tick(const char* stage, std::size_t done, std::size_t total) const {
-    if (stop_.load()) return Cancelled("stopped while {}; nothing was written", stage);
-    if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
-    return {};
-  }
   // A training model's own picture would be found.
   bool Retrieves() const { return job_.split != Split::kTrain; }
 
@@ -167,7 +161,7 @@ class Examiner {
     most_frequent_ = static_cast<int>(std::ranges::max_element(counts) - counts.begin());
     const std::size_t searched = Retrieves() ? std::min(train.size(), kSearched) : 0;
     for (std::size_t i = 0; i < searched; ++i) {
-      TILEGRAD_TRY(Tick("training pictures", i, searched));
+      TILEGRAD_TRY(watch_.At({"training pictures", i, searched, ""}, kNothingWritten));
       const int model = train[i * train.size() / searched];
       TILEGRAD_ASSIGN(const auto images, data_.LoadImages(model));
       index_.Add(images, data_.info().views, data_.info().image_size);
@@ -222,8 +216,7 @@ class Examiner {
   const TaskEvaluation& job_;
   ClassifierModel& model_;
   const Workers& workers_;
-  const ProgressSink& progress_;
-  const StopFlag& stop_;
+  const Watch& watch_;
   const Share share_;  // of models
   std::vector<int> views_;
   int most_frequent_ = 0;
@@ -253,8 +246,7 @@ Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& cl
 }  // namespace
 
 Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
-                                      const Workers& workers, const ProgressSink& progress,
-                                      const StopFlag& stop) {
+                                      const Workers& workers, const Watch& watch) {
   if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
@@ -263,11 +255,11 @@ Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   TILEGRAD_TRY(CheckClasses(dataset, model));
-  return Examiner(dataset, job, model, workers, progress, stop).Run();
+  return Examiner(dataset, job, model, workers, watch).Run();
 }
 
 Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
-                                const ProgressSink& progress, const StopFlag& stop) {
+                                const Watch& watch) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
   TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
@@ -279,10 +271,10 @@ Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel&
       "The models are spread over the classes in the dataset's order, not picked by hand.";
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int m : chosen) {
-    if (stop) return Cancelled("stopped while classifying; nothing was written");
+    TILEGRAD_TRY(
+        watch.At({"classifying", out.examples.size(), chosen.size(), ""}, kNothingWritten));
     TILEGRAD_ASSIGN(Example example, ExampleOf(dataset, m, model));
     out.examples.push_back(std::move(example));
-    if (progress) progress({"classifying", out.examples.size(), chosen.size(), ""});
   }
   return out;
 }
@@ -339,10 +331,9 @@ struct Gathering {
 }  // namespace
 
 Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<int>& models,
-                                    const Workers& workers, const ProgressSink& progress,
-                                    const StopFlag& stop) {
+                                    const Workers& workers, const Watch& watch) {
   LabelledImages out;
-  TILEGRAD_ASSIGN(out.images, LoadImageStore(dataset, models, workers, progress, stop));
+  TILEGRAD_ASSIGN(out.images, LoadImageStore(dataset, models, workers, watch));
   for (const int m : models) out.labels.push_back(dataset.model(m).class_index);
   return out;
 }

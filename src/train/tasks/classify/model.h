@@ -49,12 +49,11 @@ std::vector<int> MostLikely(const nn::Tensor& scores);
 // training picture. Errors: as CheckHeldOut; images of another size or other classes than it was
 // trained on; an empty split; a job with a change, since there are no meshes.
 Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
-                                      const Workers& workers, const ProgressSink& progress,
-                                      const StopFlag& stop);
+                                      const Workers& workers, const Watch& watch);
 
 // Showcase of the test split: three views of each model and their predicted classes.
 Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
-                                const ProgressSink& progress, const StopFlag& stop);
+                                const Watch& watch);
 
 // Pictures of a dataset with their classes, as tensors.
 
@@ -64,8 +63,7 @@ struct LabelledImages {
 };
 
 Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<int>& models,
-                                    const Workers& workers, const ProgressSink& progress,
-                                    const StopFlag& stop);
+                                    const Workers& workers, const Watch& watch);
 
 // Augmentation by translation, in pixels to the right and down; black fills in.
 struct Shift {

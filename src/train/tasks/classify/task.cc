@@ -60,12 +60,12 @@ class ClassifyTask : public NetworkTask {
     return std::unique_ptr<Model>(std::move(model));
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluateClassifier(job, *job.predictor.model().classifier(), workers, progress, stop);
+                              const Watch& watch) override {
+    return EvaluateClassifier(job, *job.predictor.model().classifier(), workers, watch);
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& /*workers*/,
-                        const ProgressSink& progress, const StopFlag& stop) override {
-    return ShowClassified(request, *request.predictor.model().classifier(), progress, stop);
+                        const Watch& watch) override {
+    return ShowClassified(request, *request.predictor.model().classifier(), watch);
   }
 
  private:
@@ -106,10 +106,10 @@ Status ClassifyTask::CheckDataset() const {
 
 Status ClassifyTask::LoadPictures(const TaskStart& start) {
   const Workers& workers = start.context.workers();
-  TILEGRAD_ASSIGN(train_, LoadLabelled(*dataset_, dataset_->Select(Split::kTrain), workers,
-                                       start.progress, start.stop));
+  TILEGRAD_ASSIGN(train_,
+                  LoadLabelled(*dataset_, dataset_->Select(Split::kTrain), workers, start.watch));
   TILEGRAD_ASSIGN(held_out_, LoadLabelled(*dataset_, ChooseModels(*dataset_, kSampleModels),
-                                          workers, start.progress, start.stop));
+                                          workers, start.watch));
   return {};
 }
 

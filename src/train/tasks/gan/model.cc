@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/try_all.h"
 #include "nn/nn.h"
 #include "render/picture/composite.h"
 #include "render/picture/mesh_pictures.h"
@@ -124,14 +125,12 @@ Result<std::vector<ImageU8>> DrawObjects(std::span<const Mesh> meshes, const Cam
                                          int size, const Workers& workers) {
   std::vector<LitRenderer> renderers(static_cast<std::size_t>(workers.count()));
   std::vector<ImageU8> out(meshes.size());
-  std::vector<Status> failures(meshes.size());
-  workers.For(meshes.size(), [&](std::size_t i, std::size_t worker) {
-    const auto planes = renderers[worker].Render(meshes[i], {&camera, 1}, size);
-    failures[i] = planes.status();
-    if (!planes.ok()) return;
-    out[i] = OnPaper(*planes, size);
-  });
-  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  const auto draw = [&](std::size_t i, std::size_t worker) -> Status {
+    TILEGRAD_ASSIGN(const auto planes, renderers[worker].Render(meshes[i], {&camera, 1}, size));
+    out[i] = OnPaper(planes, size);
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, meshes.size(), draw));
   return out;
 }
 

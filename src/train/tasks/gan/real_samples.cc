@@ -212,7 +212,7 @@ Result<TexturedModel*> TexturedModelOf(const Predictor& predictor, const Dataset
 }  // namespace
 
 Result<TextureBank> TextureBank::Extract(const Job& job, const Data& data, const Workers& workers,
-                                         const ProgressSink& progress, const StopFlag& stop) {
+                                         const Watch& watch) {
   TextureBank out;
   out.seed_ = job.seed;
   out.rows_ = job.maps.texture_size;
@@ -227,11 +227,10 @@ Result<TextureBank> TextureBank::Extract(const Job& job, const Data& data, const
   const auto count = static_cast<std::size_t>(job.count);
   out.bytes_.reserve(count * out.map_bytes_);
   for (std::size_t at = 0; at < count; at += Model::kImagesAtOnce) {
-    if (stop) return Cancelled("stopped while extracting textures; nothing was written");
+    TILEGRAD_TRY(watch.At({"extracting textures", at, count, ""}, kNothingWritten));
     const std::size_t end = std::min(count, at + Model::kImagesAtOnce);
     const Status status = extraction.Append(at, end, &out.bytes_);
     if (!status.ok()) return status.Within(place);
-    if (progress) progress({"extracting textures", end, count, ""});
   }
   return out;
 }

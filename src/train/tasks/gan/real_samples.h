@@ -92,7 +92,7 @@ class TextureBank {
   };
   // Errors name the run: it is missing, of another task, or has images or textures of another size.
   static Result<TextureBank> Extract(const Job& job, const Data& data, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop);
+                                     const Watch& watch);
 
   // `count` maps, chosen by `number`: [count, 3, texture_size, map_width] in [0, 1].
   nn::Tensor Draw(nn::Context& context, std::uint64_t number, int count) const;

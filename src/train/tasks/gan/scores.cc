@@ -29,13 +29,13 @@ class Scorer {
   Scorer(GeneratorModel& model, const GanScoreJob& job)
       : context_(model.context()), model_(model), job_(job) {}
 
-  Result<GanScores> Run(const ProgressSink& progress, const StopFlag& stop) {
+  Result<GanScores> Run(const Watch& watch) {
     TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job_.data));
     TILEGRAD_TRY(CheckHeldOut(job_.run, dataset));
     TILEGRAD_ASSIGN(Judge judge, Judge::Make(context_, job_.judge));
     judge_ = std::make_unique<Judge>(std::move(judge));
-    TILEGRAD_ASSIGN(const ObjectViews train, True(dataset, Split::kTrain, progress, stop));
-    TILEGRAD_ASSIGN(const ObjectViews test, True(dataset, Split::kTest, progress, stop));
+    TILEGRAD_ASSIGN(const ObjectViews train, True(dataset, Split::kTrain, watch));
+    TILEGRAD_ASSIGN(const ObjectViews test, True(dataset, Split::kTest, watch));
     step_.emplace(context_, model_.config(), dataset.info().camera);
     TILEGRAD_ASSIGN(const ObjectViews made, Generated(false));
     out_.judge = judge_->name();
@@ -47,15 +47,14 @@ class Scorer {
 
  private:
   // Twice `count`, for the floor.
-  Result<ObjectViews> True(const Dataset& dataset, Split split, const ProgressSink& progress,
-                           const StopFlag& stop) {
+  Result<ObjectViews> True(const Dataset& dataset, Split split, const Watch& watch) {
     const GanConfig& config = model_.config();
     const std::vector<int> models = dataset.Select(split);
     if (models.empty())
       return InvalidArgument("{}: a split has no models", dataset.folder().string());
-    TILEGRAD_ASSIGN(const MeshCache meshes,
-                    OpenTexturedMeshes(dataset, models, config.stream.meshes, context_.workers(),
-                                       progress, stop));
+    TILEGRAD_ASSIGN(
+        const MeshCache meshes,
+        OpenTexturedMeshes(dataset, models, config.stream.meshes, context_.workers(), watch));
     RealPictures pictures(
         context_,
         {config.stream, dataset.info().camera, config.views, dataset.info().image_size,
@@ -198,8 +197,8 @@ nlohmann::ordered_json JsonOf(const std::vector<GanScoreRow>& rows) {
 }  // namespace
 
 Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
-                                 const ProgressSink& progress, const StopFlag& stop) {
-  return Scorer(model, job).Run(progress, stop);
+                                 const Watch& watch) {
+  return Scorer(model, job).Run(watch);
 }
 
 std::string FormatScores(const GanScores& scores) {

@@ -41,8 +41,7 @@ struct GanScores {
 };
 
 // Errors: as CheckHeldOut; an unreadable judge; too few objects.
-Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
-                                 const ProgressSink& progress, const StopFlag& stop);
+Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job, const Watch& watch);
 std::string FormatScores(const GanScores& scores);  // Markdown tables
 nlohmann::ordered_json ScoresJson(const GanScores& scores);
 

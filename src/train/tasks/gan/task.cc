@@ -51,9 +51,9 @@ class GanTask : public Task {
     return std::unique_ptr<Model>(std::move(model));
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override;
+                              const Watch& watch) override;
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                        const ProgressSink& progress, const StopFlag& stop) override;
+                        const Watch& watch) override;
 
  private:
   Status ExtractTextures(const TaskStart& start);
@@ -73,7 +73,7 @@ Status GanTask::ExtractTextures(const TaskStart& start) {
                              static_cast<std::uint64_t>(config_.schedule.seed), config_.stream,
                              config_.network};
   TILEGRAD_ASSIGN(bank_, TextureBank::Extract(job, {*dataset_, *meshes_}, start.context.workers(),
-                                              start.progress, start.stop));
+                                              start.watch));
   return {};
 }
 
@@ -85,7 +85,7 @@ Status GanTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(dataset_, OpenTrainingData(start));
   TILEGRAD_ASSIGN(
       meshes_, OpenTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.meshes,
-                                  start.context.workers(), start.progress, start.stop));
+                                  start.context.workers(), start.watch));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   const CameraRule& camera = dataset_->info().camera;
   pictures_.emplace(*context_,
@@ -130,13 +130,13 @@ Result<ImageU8> GanTask::SamplePicture(std::int64_t steps) {
 }
 
 Result<Evaluation> GanTask::Evaluate(const TaskEvaluation& /*job*/, const Workers& /*workers*/,
-                                     const ProgressSink& /*progress*/, const StopFlag& /*stop*/) {
+                                     const Watch& /*watch*/) {
   return InvalidArgument(
       "a generator is scored by tilegrad sample --score, which compares sets of objects");
 }
 
 Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& workers,
-                               const ProgressSink& progress, const StopFlag& stop) {
+                               const Watch& watch) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   Showcase out = AboutDataset(dataset, request.header);
   out.purpose = "to generate textured objects from noise";
@@ -144,9 +144,10 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
   out.data += " Critics saw only pictures of the training models, no 3D data.";
   out.note = "Objects of the first latent codes, not picked by hand.";
   auto& model = *request.predictor.model().generator();
-  for (int i = 0; i < request.examples; ++i) {
-    if (stop) return Cancelled("stopped while generating; nothing was written");
-    TILEGRAD_ASSIGN(auto meshes, model.Generate(model.Code(0, static_cast<std::uint64_t>(i))));
+  const auto count = static_cast<std::size_t>(request.examples);
+  for (std::size_t i = 0; i < count; ++i) {
+    TILEGRAD_TRY(watch.At({"generating", i, count, ""}, kNothingWritten));
+    TILEGRAD_ASSIGN(auto meshes, model.Generate(model.Code(0, i)));
     Example& example = out.examples.emplace_back();
     example.name = fmt::format("sample {}", i + 1);
     example.id = fmt::format("{}", i + 1);
@@ -158,9 +159,6 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
       example.pictures.push_back({std::move(pictures[0]), where, example.name + " " + where});
     }
     example.prediction = std::move(meshes[0]);
-    if (progress)
-      progress({"generating", static_cast<std::size_t>(i) + 1,
-                static_cast<std::size_t>(request.examples), ""});
   }
   return out;
 }

@@ -218,26 +218,24 @@ class PhotographJudge {
       mean_keypoints_.push_back({k[i], k[i + 1], k[i + 2]});
   }
 
-  Result<Evaluation> Run(const Workers& workers, const ProgressSink& progress,
-                         const StopFlag& stop) {
+  Result<Evaluation> Run(const Workers& workers, const Watch& watch) {
     const std::vector<int> chosen = set_.Select(job_.split);
     if (chosen.empty())
       return InvalidArgument("{}: no photographs in its {} split", set_.folder.string(),
                              SplitName(job_.split));
     const PhotographsConfig& config = model_.config();
-    TILEGRAD_ASSIGN(const PhotoStore store,
-                    PhotoStore::Load(set_, chosen, config.crop, static_cast<int>(config.size),
-                                     workers, progress, stop));
+    TILEGRAD_ASSIGN(
+        const PhotoStore store,
+        PhotoStore::Load(set_, chosen, config.crop, static_cast<int>(config.size), workers, watch));
     const std::size_t keypoints = set_.keypoint_names.size();
     for (Tally& tally : tallies_) {
       tally.scores.resize(chosen.size());
       tally.errors.resize(chosen.size() * keypoints, std::numeric_limits<double>::quiet_NaN());
     }
     for (int at = 0; at < store.count(); at += static_cast<int>(Model::kImagesAtOnce)) {
-      if (stop) return Cancelled("stopped while evaluating; nothing was written");
-      if (progress)
-        progress({"evaluating", static_cast<std::uint64_t>(at),
-                  static_cast<std::uint64_t>(store.count()), ""});
+      TILEGRAD_TRY(watch.At({"evaluating", static_cast<std::uint64_t>(at),
+                             static_cast<std::uint64_t>(store.count()), ""},
+                            kNothingWritten));
       if (share_.Has(static_cast<std::size_t>(at))) TILEGRAD_TRY(ScoreSome(store, at));
     }
     for (Tally& tally : tallies_) {
@@ -385,7 +383,7 @@ std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int co
 }
 
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
-                                       const ProgressSink& progress, const StopFlag& stop) {
+                                       const Watch& watch) {
   if (job.change)
     return InvalidArgument(
         "--refine needs cameras; predictions from photographs cannot be refined");
@@ -401,7 +399,7 @@ Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers&
   if (learned != set.keypoint_names.size())
     return InvalidArgument("{}: {} keypoints, but the network has learned {}", job.data.string(),
                            set.keypoint_names.size(), learned);
-  return PhotographJudge(job, set).Run(workers, progress, stop);
+  return PhotographJudge(job, set).Run(workers, watch);
 }
 
 namespace {

@@ -54,7 +54,7 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
 // PCK at 0.1 (metrics/metrics.h), where there are keypoints. Errors: a set without cameras, one
 // whose photographs were trained on, a job with a change or an oracle.
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
-                                       const ProgressSink& progress, const StopFlag& stop);
+                                       const Watch& watch);
 
 // Records in the run folder which photographs a new run is trained on; a resumed run compares them.
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new);

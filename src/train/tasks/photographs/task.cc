@@ -30,11 +30,11 @@ class PhotographsTask : public NetworkTask {
     return LoadPhotographModel(context, config_, checkpoint);
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluatePhotographs(job, workers, progress, stop);
+                              const Watch& watch) override {
+    return EvaluatePhotographs(job, workers, watch);
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                        const ProgressSink& progress, const StopFlag& stop) override;
+                        const Watch& watch) override;
 
  private:
   LearnedWeights& weights() override { return step_->weights(); }
@@ -70,11 +70,11 @@ Status PhotographsTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckCameras());
   const Workers& workers = start.context.workers();
   const std::vector<int> train = set_.Select(Split::kTrain);
-  TILEGRAD_ASSIGN(train_, PhotoStore::Load(set_, train, config_.crop, image_size(), workers,
-                                           start.progress, start.stop));
-  TILEGRAD_ASSIGN(
-      held_out_, PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kPhotographRows),
-                                  config_.crop, image_size(), workers, start.progress, start.stop));
+  TILEGRAD_ASSIGN(train_,
+                  PhotoStore::Load(set_, train, config_.crop, image_size(), workers, start.watch));
+  TILEGRAD_ASSIGN(held_out_,
+                  PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kPhotographRows),
+                                   config_.crop, image_size(), workers, start.watch));
   lesson_.source = set_.source;
   lesson_.objects = train_->count();
   batches_.emplace(*context_);
@@ -134,7 +134,7 @@ Result<ImageU8> PhotographsTask::SamplePicture(std::int64_t /*steps*/) {
 }
 
 Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Workers& workers,
-                                       const ProgressSink& progress, const StopFlag& stop) {
+                                       const Watch& watch) {
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(request.data));
   TILEGRAD_TRY(CheckHeldOutPhotographs(request.run, set, Split::kTest));
   auto& model = *request.predictor.model().photographs();
@@ -146,10 +146,10 @@ Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Wor
   out.note =
       "The network saw none of these in training. Dots are annotated keypoints, rings predicted "
       "ones. Photographs are spread evenly over the held-out ones, not picked by hand.";
-  TILEGRAD_ASSIGN(const PhotoStore store,
-                  PhotoStore::Load(set, ChoosePhotographs(set, Split::kTest, request.examples),
-                                   model.config().crop, static_cast<int>(model.config().size),
-                                   workers, progress, stop));
+  TILEGRAD_ASSIGN(
+      const PhotoStore store,
+      PhotoStore::Load(set, ChoosePhotographs(set, Split::kTest, request.examples),
+                       model.config().crop, static_cast<int>(model.config().size), workers, watch));
   TILEGRAD_ASSIGN(auto rows, RowsOf(model.context(), model.config(), model.network(), store));
   for (int i = 0; i < store.count(); ++i) {
     const PhotographBatch batch =

@@ -38,14 +38,14 @@ class SingleImageTask : public NetworkTask {
     return LoadSingleImageModel(context, config_.network, checkpoint);
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluateOnDataset(job, workers, progress, stop,
+                              const Watch& watch) override {
+    return EvaluateOnDataset(job, workers, watch,
                              [this](const DatasetInfo& info, int steps, const Workers& on) {
                                return FitTemplates(config_, info, steps, on);
                              });
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                        const ProgressSink& progress, const StopFlag& stop) override;
+                        const Watch& watch) override;
 
  private:
   LearnedWeights& weights() override { return step_->weights(); }
@@ -135,9 +135,9 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
     test.resize(kSingleImageRows);
   }
   const Workers& workers = start.context.workers();
-  TILEGRAD_ASSIGN(train_, LoadImageStore(*dataset_, dataset_->Select(Split::kTrain), workers,
-                                         start.progress, start.stop));
-  TILEGRAD_ASSIGN(held_out_, LoadImageStore(*dataset_, test, workers, start.progress, start.stop));
+  TILEGRAD_ASSIGN(train_,
+                  LoadImageStore(*dataset_, dataset_->Select(Split::kTrain), workers, start.watch));
+  TILEGRAD_ASSIGN(held_out_, LoadImageStore(*dataset_, test, workers, start.watch));
   for (int m = 0; m < held_out_.models; ++m) samples_.push_back({m, ShownViews(held_out_.views)});
   return {};
 }
@@ -149,9 +149,8 @@ Status SingleImageTask::LoadMeshes(const TaskStart& start) {
       .meshes = {
           .max_faces = config_.stream.max_faces, .colored = true, .cache = config_.stream.cache}};
   const Workers& workers = start.context.workers();
-  TILEGRAD_ASSIGN(MeshCache meshes,
-                  OpenTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain), stream.meshes,
-                                     workers, start.progress, start.stop));
+  TILEGRAD_ASSIGN(MeshCache meshes, OpenTexturedMeshes(*dataset_, dataset_->Select(Split::kTrain),
+                                                       stream.meshes, workers, start.watch));
   const DatasetInfo& info = dataset_->info();
   stream_.emplace(TexturedStream::Job{.config = stream,
                                       .light = {},
@@ -182,8 +181,8 @@ Result<nn::Var> SingleImageTask::Loss(const UpdateIndex& at, const Slots& slots,
 }
 
 Result<Showcase> SingleImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
-                                       const ProgressSink& progress, const StopFlag& stop) {
-  TILEGRAD_ASSIGN(Showcase out, ShowHeldOut(request, workers, progress, stop));
+                                       const Watch& watch) {
+  TILEGRAD_ASSIGN(Showcase out, ShowHeldOut(request, workers, watch));
   out.purpose = "to predict shape and colour of an object from one image";
   out.data += " It saw only rendered views, no 3D data.";
   return out;

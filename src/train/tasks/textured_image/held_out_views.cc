@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/try_all.h"
 #include "train/data/dataset_files.h"
 #include "train/data/trained_models.h"
 #include "train/eval/scores.h"
@@ -29,12 +30,12 @@ std::vector<float> Copied(std::span<const float> pictures) {
 }  // namespace
 
 Result<HeldOutViews> HeldOutViews::Load(const Request& request, const Workers& workers,
-                                        const ProgressSink& progress, const StopFlag& stop) {
+                                        const Watch& watch) {
   HeldOutViews out;
   out.models_ = request.models;
   TILEGRAD_ASSIGN(MeshCache meshes,
                   OpenTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
-                                     workers, progress, stop));
+                                     workers, watch));
   const DatasetInfo& info = request.dataset.info();
   out.stream_.emplace(
       TexturedStream::Job{WithoutChanges(request.config.stream), request.config.light, info.camera,
@@ -201,7 +202,7 @@ class TexturedEvaluator {
       judges_.push_back(std::make_unique<Judge>(config, dataset.info().image_size));
   }
 
-  Result<Evaluation> Run(const ProgressSink& progress, const StopFlag& stop) {
+  Result<Evaluation> Run(const Watch& watch) {
     const std::vector<int> models = dataset_.Select(job_.split);
     out_.split = SplitName(job_.split);
     if (models.empty()) {
@@ -209,12 +210,11 @@ class TexturedEvaluator {
                              out_.split);
     }
     TILEGRAD_ASSIGN(HeldOutViews views,
-                    HeldOutViews::Load({config_, dataset_, models}, workers_, progress, stop));
+                    HeldOutViews::Load({config_, dataset_, models}, workers_, watch));
     scores_.resize(models.size());
     unusable_.resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
-      if (stop) return Cancelled("stopped while evaluating; nothing was written");
-      if (progress) progress({"evaluating", i, models.size(), ""});
+      TILEGRAD_TRY(watch.At({"evaluating", i, models.size(), ""}, kNothingWritten));
       if (share_.Has(i)) TILEGRAD_TRY(Score(views, i));
     }
     TILEGRAD_TRY(share_.Gather(&scores_));
@@ -242,20 +242,18 @@ class TexturedEvaluator {
     TILEGRAD_ASSIGN(const Shape shape, TruthShape(data));
     TILEGRAD_ASSIGN(const auto objects, Predict(truth.lit));
     std::vector<MethodScores> scores(objects.size());
-    std::vector<Status> failures(objects.size());
     std::vector<std::uint8_t> unusable(objects.size());
     const train::Score perfect = train::Compare(shape, shape);
-    workers_.For(objects.size(), [&](std::size_t v, std::size_t worker) {
-      auto compared = judges_[worker]->Compare({objects[v], truth, v});
-      failures[v] = compared.status();
-      if (compared.ok()) scores[v] = *compared;
+    const auto score = [&](std::size_t v, std::size_t worker) -> Status {
+      TILEGRAD_ASSIGN(scores[v], judges_[worker]->Compare({objects[v], truth, v}));
       const auto seed = static_cast<std::uint64_t>(held_out.models()[i]) * 4096 + v;
       const auto predicted = ShapeOf(objects[v].mesh, seed);
       unusable[v] = !predicted.ok();
       AddShape(predicted.ok() ? train::Compare(*predicted, shape) : WorstScore(shape), perfect,
                &scores[v]);
-    });
-    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+      return {};
+    };
+    TILEGRAD_TRY(TryAll(workers_, objects.size(), score));
     for (const auto flag : unusable) unusable_[i] += flag;
     for (int m = 0; m < kLightMethods; ++m) {
       std::vector<train::Score> of_method;
@@ -314,8 +312,7 @@ class TexturedEvaluator {
 }  // namespace
 
 Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
-                                    const Workers& workers, const ProgressSink& progress,
-                                    const StopFlag& stop) {
+                                    const Workers& workers, const Watch& watch) {
   if (job.change)
     return InvalidArgument(
         "--refine fits shapes only; predictions of textures and lights cannot be refined");
@@ -324,7 +321,7 @@ Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const Tas
   if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
-  return TexturedEvaluator(config, job, dataset, workers).Run(progress, stop);
+  return TexturedEvaluator(config, job, dataset, workers).Run(watch);
 }
 
 }  // namespace tilegrad::train

@@ -19,7 +19,7 @@ class HeldOutViews {
     std::vector<int> models;  // indices into the dataset's
   };
   static Result<HeldOutViews> Load(const Request& request, const Workers& workers,
-                                   const ProgressSink& progress, const StopFlag& stop);
+                                   const Watch& watch);
 
   // Pictures of `count` views of models[i], [count][4][size][size] each. The same model
   // of one dataset is always seen in the same views.
@@ -54,7 +54,6 @@ class HeldOutViews {
 // light's error to shape and texture. Without a light model only the last row. Errors: as
 // CheckHeldOut and OpenTexturedMeshes; a job with a change.
 Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
-                                    const Workers& workers, const ProgressSink& progress,
-                                    const StopFlag& stop);
+                                    const Workers& workers, const Watch& watch);
 
 }  // namespace tilegrad::train

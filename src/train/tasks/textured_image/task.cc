@@ -32,11 +32,11 @@ class TexturedImageTask : public NetworkTask {
     return LoadTexturedModel(context, config_, checkpoint);
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
-                              const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluateTextured(config_, job, workers, progress, stop);
+                              const Watch& watch) override {
+    return EvaluateTextured(config_, job, workers, watch);
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
-                        const ProgressSink& progress, const StopFlag& stop) override;
+                        const Watch& watch) override;
 
  private:
   LearnedWeights& weights() override { return step_->weights(); }
@@ -68,10 +68,10 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   lesson_.objects = static_cast<int>(train.size());
   const Workers& workers = start.context.workers();
   TILEGRAD_ASSIGN(MeshCache meshes, OpenTexturedMeshes(*dataset_, train, config_.stream.meshes,
-                                                       workers, start.progress, start.stop));
+                                                       workers, start.watch));
   TILEGRAD_ASSIGN(HeldOutViews held_out,
                   HeldOutViews::Load({config_, *dataset_, ChooseModels(*dataset_, kTexturedRows)},
-                                     workers, start.progress, start.stop));
+                                     workers, start.watch));
   held_out_.emplace(std::move(held_out));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   batches_.emplace(*context_);
@@ -136,7 +136,7 @@ void AddTexturedSheet(int size, Showcase* showcase) {
 }
 
 Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
-                                         const ProgressSink& progress, const StopFlag& stop) {
+                                         const Watch& watch) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
   TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
@@ -153,9 +153,9 @@ Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const W
   ObjectPictures pictures = Pictures(size);
   TILEGRAD_ASSIGN(HeldOutViews held_out,
                   HeldOutViews::Load({config_, dataset, ChooseModels(dataset, request.examples)},
-                                     workers, progress, stop));
+                                     workers, watch));
   for (std::size_t i = 0; i < held_out.models().size(); ++i) {
-    if (stop) return Cancelled("stopped while predicting; nothing was written");
+    TILEGRAD_TRY(watch.At({"predicting", i, held_out.models().size(), ""}, kNothingWritten));
     Example example = NamedExample(dataset, held_out.models()[i]);
     TILEGRAD_ASSIGN(const HeldOutViews::Views truth, held_out.Draw(i, kRowViews));
     TILEGRAD_ASSIGN(auto objects, model.PredictObjects(ToBytes(truth.Of(truth.lit, 0))));
@@ -165,7 +165,6 @@ Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const W
     TILEGRAD_ASSIGN(ModelData data, dataset.Load(held_out.models()[i]));
     example.truth = std::move(data.mesh);
     out.examples.push_back(std::move(example));
-    if (progress) progress({"predicting", out.examples.size(), held_out.models().size(), ""});
   }
   AddTexturedSheet(size, &out);
   return out;

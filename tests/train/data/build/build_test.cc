@@ -26,7 +26,7 @@ class BuildTest : public TempFolderTest {
  protected:
   Result<BuildSummary> Build(const ModelSource& source, const Path& folder, int workers = 1,
                              const ProgressSink& progress = {}) {
-    return BuildDataset(source, options_, folder, Workers(workers), progress, stop_);
+    return BuildDataset(source, options_, folder, Workers(workers), {progress, &stop_});
   }
 
   BuildOptions options_ = SmallOptions();

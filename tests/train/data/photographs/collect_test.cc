@@ -31,7 +31,7 @@ class CollectTest : public TempFolderTest {
  protected:
   Result<CollectionSummary> Collect(const CollectionJob& job, const std::string& out,
                                     int workers = 2) const {
-    return CollectPhotographs(job, folder_ / out, Workers(workers), nullptr, stop_);
+    return CollectPhotographs(job, folder_ / out, Workers(workers), {});
   }
 
   // Twenty steps, and the scores of the test part.
@@ -41,12 +41,12 @@ class CollectTest : public TempFolderTest {
     job.config.schedule.steps = 20;
     job.data = folder_ / data;
     job.run = folder_ / (data + "_run");
-    const auto trained = train::Train(job, workers_, nullptr, stop_);
+    const auto trained = train::Train(job, workers_, {});
     ASSERT_TRUE(trained.ok()) << trained.status().message();
     const auto predictor = Predictor::Load(job.run, workers_);
     ASSERT_TRUE(predictor.ok()) << predictor.status().message();
     const TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
-    const auto scores = predictor->task().Evaluate(evaluation, workers_, nullptr, stop_);
+    const auto scores = predictor->task().Evaluate(evaluation, workers_, {});
     ASSERT_TRUE(scores.ok()) << scores.status().message();
     EXPECT_LT(*scores->rows[0].mean.mask_loss, 0.95);
   }
@@ -57,7 +57,6 @@ class CollectTest : public TempFolderTest {
   }
 
   Workers workers_{2};
-  StopFlag stop_ = false;
 };
 
 TEST_F(CollectTest, ReadsPascal3dByItsOwnAnnotations) {

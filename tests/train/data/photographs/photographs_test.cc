@@ -14,7 +14,6 @@ namespace tilegrad::train::photographs_test {
 class PhotographsTest : public TempFolderTest {
  protected:
   Workers workers_{2};
-  StopFlag stop_ = false;
 };
 
 void ExpectSame(const PhotographSet& want, const PhotographSet& got) {
@@ -162,11 +161,11 @@ TEST_F(PhotographsTest, WhatIsFarFromAnyPictureNamesThePhotograph) {
 TEST_F(PhotographsTest, PicturesAreReadWithTheirMasks) {
   PhotographSet set = WriteMiniature(folder_, "cub");
   std::filesystem::remove(set.photographs[1].image);
-  const auto missing = PhotoStore::Load(set, {0, 1}, {}, 16, workers_, nullptr, stop_);
+  const auto missing = PhotoStore::Load(set, {0, 1}, {}, 16, workers_, {});
   ExpectMessage(missing.status(), "bar_1.png", "dataset --source cub leaves out");
   set.photographs[0].mask = {3, 3, std::vector<bool>(9, true)};
-  ExpectMessage(PhotoStore::Load(set, {0}, {}, 16, workers_, nullptr, stop_).status(),
-                "60 x 48 pixels", "3 x 3");
+  ExpectMessage(PhotoStore::Load(set, {0}, {}, 16, workers_, {}).status(), "60 x 48 pixels",
+                "3 x 3");
 }
 
 // By hand: a box of 10 x 20 is padded to 11 x 22, made 22 x 22 about its middle (15, 30).
@@ -189,7 +188,7 @@ TEST(PhotoWindows, ArePaddedSquares) {
 // at the keypoints, and mirroring twice is nothing.
 TEST_F(PhotographsTest, CamerasAndKeypointsGoWithTheCrop) {
   const PhotographSet set = WriteMiniature(folder_, "cub");
-  const auto store = PhotoStore::Load(set, {0, 1, 2, 3}, {}, 32, workers_, nullptr, stop_);
+  const auto store = PhotoStore::Load(set, {0, 1, 2, 3}, {}, 32, workers_, {});
   ASSERT_TRUE(store.ok()) << store.status().message();
   std::vector<float> rgb(3 * 32 * 32), mask(32 * 32);
   int mirrored = 0;
@@ -219,7 +218,7 @@ TEST_F(PhotographsTest, CamerasAndKeypointsGoWithTheCrop) {
 TEST_F(PhotographsTest, BeyondTheEdgeIsWhiteAndOutside) {
   PhotographSet set = WriteMiniature(folder_, "cub");
   set.photographs[0].box = {-30, -30, 90, 90};
-  const auto store = PhotoStore::Load(set, {0}, {}, 24, workers_, nullptr, stop_);
+  const auto store = PhotoStore::Load(set, {0}, {}, 24, workers_, {});
   ASSERT_TRUE(store.ok());
   std::vector<float> rgb(3 * 24 * 24), mask(24 * 24);
   store->Cut(0, {}, rgb, mask);

@@ -20,7 +20,7 @@ class RenderedSet : public TempFolderTest {
   }
   Status Make(const std::string& out, int workers, const AnnotationNoise& noise = {}) {
     const RenderedSetJob job{models_, models_, {folder_ / "sky.png"}, 18, 4};
-    return MakeRenderedSet(job, noise, folder_ / out, Workers(workers), nullptr, stop_);
+    return MakeRenderedSet(job, noise, folder_ / out, Workers(workers), {});
   }
   static Result<TexturedMesh> RedBox(std::size_t) {
     Mesh box = Box(glm::vec3(0), {0.4f, 0.3f, 0.9f});
@@ -28,7 +28,6 @@ class RenderedSet : public TempFolderTest {
     return TexturedMesh(std::move(box));
   }
   MeshCache models_{1, 1 << 30, RedBox};
-  StopFlag stop_ = false;
 };
 
 TEST_F(RenderedSet, IsInTheLayoutOfPascal3d) {
@@ -80,9 +79,9 @@ TEST_F(RenderedSet, IsTheSameForAnyWorkers) {
 TEST_F(RenderedSet, NeedsModelsAndBackgrounds) {
   const MeshCache none(0, 1, RedBox);
   const RenderedSetJob job{none, models_, {folder_ / "sky.png"}};
-  ExpectMessage(MakeRenderedSet(job, {}, folder_ / "b", Workers(1), nullptr, stop_), "models");
+  ExpectMessage(MakeRenderedSet(job, {}, folder_ / "b", Workers(1), {}), "models");
   const RenderedSetJob bare{models_, models_, {}};
-  ExpectMessage(MakeRenderedSet(bare, {}, folder_ / "c", Workers(1), nullptr, stop_), "background");
+  ExpectMessage(MakeRenderedSet(bare, {}, folder_ / "c", Workers(1), {}), "background");
 }
 
 TEST(ExtremePoints, OfABoxAreItsCorners) {

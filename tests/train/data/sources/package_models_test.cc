@@ -192,8 +192,7 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   options.image_size = 8;
   options.views = 2;
   options.split.test_share = 0.5;
-  const StopFlag stop = false;
-  const auto summary = BuildDataset(*source, options, folder_ / "out", Workers(2), {}, stop);
+  const auto summary = BuildDataset(*source, options, folder_ / "out", Workers(2), {});
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   const auto dataset = Dataset::Open(folder_ / "out");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();
@@ -208,13 +207,13 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   EXPECT_NE(dataset->LoadImages(0).value(), dataset->LoadImages(2).value());
 
   options.liveries = 1;  // of the files that are there
-  const auto fewer = BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop);
+  const auto fewer = BuildDataset(*source, options, folder_ / "out", Workers(1), {});
   ASSERT_TRUE(fewer.ok()) << fewer.status().message();
   EXPECT_EQ(fewer->models.size(), 2u);
   EXPECT_EQ(fewer->reused, 2);
   options.liveries = 0;
   options.per_class = 1;
-  const auto one = BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop);
+  const auto one = BuildDataset(*source, options, folder_ / "out", Workers(1), {});
   ASSERT_TRUE(one.ok()) << one.status().message();
   EXPECT_EQ(one->models.size(), 3u);
   EXPECT_EQ(CountShapes(one->models), 1u);
@@ -227,13 +226,12 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   BuildOptions options;
   options.image_size = 8;
   options.views = 1;
-  const StopFlag stop = false;
-  ASSERT_TRUE(BuildDataset(*source, options, folder_ / "out", Workers(1), {}, stop).ok());
+  ASSERT_TRUE(BuildDataset(*source, options, folder_ / "out", Workers(1), {}).ok());
   std::string row = Row("one");
   const std::string text = kHead + row.replace(row.find("\t-x\t") + 1, 2, "-z");
   auto turned = PackageModels({"planes", text, {"blur"}}, folder_);
   ASSERT_TRUE(turned.ok()) << turned.status().message();
-  const auto again = BuildDataset(**turned, options, folder_ / "out", Workers(1), {}, stop);
+  const auto again = BuildDataset(**turned, options, folder_ / "out", Workers(1), {});
   ASSERT_FALSE(again.ok());
   EXPECT_NE(again.status().message().find("other settings"), std::string::npos);
   std::vector<std::unique_ptr<ModelSource>> one;

@@ -37,7 +37,7 @@ class RenderedSets : public TempFolderTest {
     BuildOptions options;
     options.split.test_share = 0.2;
     options.allow_broken = allow_broken;
-    return BuildDataset(*source, options, Data(), Workers(2), {}, stop_);
+    return BuildDataset(*source, options, Data(), Workers(2), {});
   }
 
   // Of all views of each model together.
@@ -87,11 +87,11 @@ class RenderedSets : public TempFolderTest {
     job.data = Data();
     job.run = folder_ / "run";
     job.config = Ok(ParseConfig(kTinyConfig + "steps = 20\n", "tiny")).value();
-    if (!PathExists(job.run)) Ok(Train(job, workers, {}, stop_).status());
+    if (!PathExists(job.run)) Ok(Train(job, workers, {}).status());
     const auto predictor = Ok(Predictor::Load(job.run, workers));
     TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
     evaluation.voxels = rule;
-    return Ok(predictor->task().Evaluate(evaluation, workers, {}, stop_)).value();
+    return Ok(predictor->task().Evaluate(evaluation, workers, {})).value();
   }
   void ExpectEvaluation(const char* rule) const {
     const Evaluation scores = TrainAndEvaluate();
@@ -101,8 +101,6 @@ class RenderedSets : public TempFolderTest {
     EXPECT_EQ(scores.unusable_predictions, 0);
     EXPECT_EQ(scores.models.size(), 2u);
   }
-
-  StopFlag stop_ = false;
 };
 
 TEST_F(RenderedSets, Choy) {

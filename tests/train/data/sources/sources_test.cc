@@ -75,8 +75,7 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   BuildOptions options;
   options.image_size = 8;
   options.views = 2;
-  const StopFlag stop = false;
-  const auto summary = BuildDataset(**source, options, folder_ / "out", Workers(1), {}, stop);
+  const auto summary = BuildDataset(**source, options, folder_ / "out", Workers(1), {});
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   EXPECT_EQ(summary->models.size(), 1u);
   ASSERT_EQ(summary->rejected.size(), 1u);
@@ -100,9 +99,8 @@ TEST_F(SourcesTest, BrokenModelsOfAFolderCostThemselves) {
   std::filesystem::create_directory(folder_ / "set/empty");
   BuildOptions options;
   options.image_size = 8;
-  const StopFlag stop = false;
   const auto source = Ok(FolderSource(folder_ / "set"));
-  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}, stop));
+  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}));
   EXPECT_EQ(summary->models.size(), 2u);
   ExpectIn(summary->broken.Summary(), "(none/faces)", "(nan/vertex)");
   ASSERT_EQ(summary->warnings.size(), 2u);
@@ -233,8 +231,7 @@ TEST_F(SourcesTest, NmrBecomesADataset) {
   WriteNmr(folder_ / "03001627_test", 1, grid);
   const auto source = NmrSource(folder_);
   ASSERT_TRUE(source.ok()) << source.status().message();
-  const StopFlag stop = false;
-  const auto summary = BuildDataset(**source, {}, folder_ / "out", Workers(2), {}, stop);
+  const auto summary = BuildDataset(**source, {}, folder_ / "out", Workers(2), {});
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   const auto dataset = Dataset::Open(folder_ / "out");
   ASSERT_TRUE(dataset.ok()) << dataset.status().message();

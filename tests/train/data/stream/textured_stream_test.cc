@@ -262,17 +262,16 @@ class TexturedMeshes : public TempFolderTest {
     BuildOptions options;
     options.image_size = 16;
     options.views = 2;
-    const auto built = BuildDataset(**source, options, folder_ / "data", workers_, nullptr, stop_);
+    const auto built = BuildDataset(**source, options, folder_ / "data", workers_, {});
     EXPECT_TRUE(built.ok()) << built.status().message();
   }
   Result<MeshCache> Load(const std::string& folder) {
     dataset_ = Ok(Dataset::Open(folder_ / "data")).value();
-    return OpenTexturedMeshes(*dataset_, {1, 0}, {folder, 8}, workers_, nullptr, stop_);
+    return OpenTexturedMeshes(*dataset_, {1, 0}, {folder, 8}, workers_, {});
   }
 
   std::optional<Dataset> dataset_;
   Workers workers_{2};
-  StopFlag stop_ = false;
 };
 
 TEST_F(TexturedMeshes, AreReadAgainFromTheirFolder) {

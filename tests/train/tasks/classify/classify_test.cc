@@ -37,7 +37,7 @@ sample_every = 30
 checkpoint_every = 7
 )";
 constexpr int kSize = 16;
-const ProgressSink kSilent = [](const Progress&) {};
+const Watch kSilent = {[](const Progress&) {}};
 
 // Noise with more red, green or blue in it, by class.
 Status WriteColored(const Path& folder, const std::vector<std::string>& classes) {
@@ -57,33 +57,30 @@ Status WriteColored(const Path& folder, const std::vector<std::string>& classes)
 class ClassifyTest : public TempFolderTest {
  protected:
   void SetUp() override { Ok(WriteColored(folder_ / "data", {"blue", "green", "red"})); }
-  Result<RunOutcome> TrainIn(const Path& run, int workers, const StopFlag& stop,
-                             const ProgressSink& progress = kSilent) {
+  Result<RunOutcome> TrainIn(const Path& run, int workers, const Watch& watch = kSilent) {
     TrainJob job;
     TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "tiny.toml"));
     job.run = run;
     job.data = folder_ / "data";
     job.existing = ExistingRun::kContinue;
-    return Train(job, Workers(workers), progress, stop);
+    return Train(job, Workers(workers), watch);
   }
   Path Trained() {
-    const auto outcome = Ok(TrainIn(folder_ / "run", 2, stop_));
+    const auto outcome = Ok(TrainIn(folder_ / "run", 2));
     return folder_ / "run";
   }
   Workers workers_{2};
   nn::Context context_{workers_};
-  StopFlag stop_ = false;
 };
 
 TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
-  ASSERT_TRUE(TrainIn(folder_ / "whole", 2, stop_).ok());
+  ASSERT_TRUE(TrainIn(folder_ / "whole", 2).ok());
   StopFlag stop = false;
   int seen = 0;
-  const auto part = TrainIn(folder_ / "parts", 1, stop, [&](const Progress& p) {
-    stop = p.stage == "training" && ++seen > 20;
-  });
+  const auto stop_after = [&](const Progress& p) { stop = p.stage == "training" && ++seen > 20; };
+  const auto part = TrainIn(folder_ / "parts", 1, {stop_after, &stop});
   EXPECT_EQ(part.status().code(), StatusCode::kCancelled);
-  const auto rest = Ok(TrainIn(folder_ / "parts", 3, stop_));
+  const auto rest = Ok(TrainIn(folder_ / "parts", 3));
   EXPECT_GT(rest->first_step, 0);
   ExpectSameBits(context_, folder_ / "whole", folder_ / "parts", 60);
 }
@@ -99,7 +96,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * kSize * kSize)).status(),
                 "predicts no meshes");
   const auto evaluation =
-      predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent, stop_);
+      predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent);
   ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
   ASSERT_EQ(evaluation->rows.size(), 3u);
   EXPECT_NEAR(evaluation->rows[0].mean.main(), 1.0 / 3, 1e-12);
@@ -114,7 +111,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   EXPECT_EQ(table.find("IoU"), std::string::npos) << table;
 
   const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
-  const auto report = Ok(WriteReport(job, workers_, kSilent, stop_));
+  const auto report = Ok(WriteReport(job, workers_, kSilent));
   const std::string page = ReadText(job.out).value();
   for (const char* part :
        {"to classify an object", "a mean accuracy of", "nearest training picture",
@@ -128,16 +125,15 @@ TEST_F(ClassifyTest, OtherClassesAreRefused) {
   const auto predictor = Ok(Predictor::Load(run, workers_));
   ASSERT_TRUE(WriteColored(folder_ / "other", {"blue", "red"}).ok());
   std::filesystem::remove(run / "training_models.txt");  // which would be refused before
-  ExpectMessage(predictor->task()
-                    .Evaluate({run, folder_ / "other", *predictor}, workers_, kSilent, stop_)
-                    .status(),
-                "other", "2 classes", "3 that the network was trained on");
+  ExpectMessage(
+      predictor->task().Evaluate({run, folder_ / "other", *predictor}, workers_, kSilent).status(),
+      "other", "2 classes", "3 that the network was trained on");
 }
 
 TEST_F(ClassifyTest, OneClassIsNothingToLearn) {
   std::filesystem::remove_all(folder_ / "data");
   ASSERT_TRUE(WriteColored(folder_ / "data", {"red"}).ok());
-  ExpectMessage(TrainIn(folder_ / "run", 1, stop_).status(), "1 class;", "two or more");
+  ExpectMessage(TrainIn(folder_ / "run", 1).status(), "1 class;", "two or more");
 }
 
 TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {
@@ -146,7 +142,7 @@ TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {
   ASSERT_TRUE(ApplyOverrides({"network.levels=6"}, &job.config).ok());
   job.run = folder_ / "run";
   job.data = folder_ / "data";
-  ExpectMessage(Train(job, workers_, kSilent, stop_).status(), "16 pixels", "at least 32");
+  ExpectMessage(Train(job, workers_, kSilent).status(), "16 pixels", "at least 32");
 }
 
 TEST_F(ClassifyTest, PicturesAreMovedAndMirrored) {
@@ -204,7 +200,7 @@ TEST_F(ClassifyTest, PerceptualNetworksThatAreNoneAreNamed) {
   ASSERT_TRUE(ApplyOverrides({"schedule.steps=1"}, &job.config).ok());
   job.run = folder_ / "meshes";
   job.data = folder_ / "noise";
-  ASSERT_TRUE(Train(job, workers_, kSilent, stop_).ok());
+  ASSERT_TRUE(Train(job, workers_, kSilent).ok());
   ExpectMessage(LoadPerceptualNetwork(context_, {.file = job.run}).status(), "meshes",
                 "\"single_image\"", "\"classify\"");
 }

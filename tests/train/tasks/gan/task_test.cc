@@ -23,7 +23,7 @@
 
 namespace tilegrad::train::gan_task_test {
 
-const ProgressSink kSilent = [](const Progress&) {};
+const Watch kSilent = {[](const Progress&) {}};
 
 class GanTaskTest : public TempFolderTest {
  protected:
@@ -38,7 +38,7 @@ class GanTaskTest : public TempFolderTest {
     job.config = std::move(*config);
     job.data = folder_ / "data";
     job.run = folder_ / "textured";
-    const auto outcome = Ok(Train(job, workers_, kSilent, stop_));
+    const auto outcome = Ok(Train(job, workers_, kSilent));
   }
   struct Job {
     std::string run;
@@ -56,10 +56,10 @@ class GanTaskTest : public TempFolderTest {
     job.run = folder_ / at.run;
     job.existing = ExistingRun::kContinue;
     StopFlag stop = false;
-    const ProgressSink watch = [&](const Progress& progress) {
+    const auto stop_at = [&](const Progress& progress) {
       if (progress.stage == "training" && progress.done >= at.stop_at) stop = true;
     };
-    return Train(job, Workers(at.workers), watch, stop);
+    return Train(job, Workers(at.workers), {stop_at, &stop});
   }
   std::vector<nn::NamedTensor> Final(const std::string& run) {
     return FinalTensors(context_, folder_ / run, 12);
@@ -67,7 +67,6 @@ class GanTaskTest : public TempFolderTest {
 
   Workers workers_{2};
   nn::Context context_;
-  StopFlag stop_ = false;
 };
 
 TEST_F(GanTaskTest, StoppedInEachStageAndContinuedEndsInTheSameBits) {
@@ -168,7 +167,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   EXPECT_EQ(made[0][0].textures[0].image.width, 32);
 
   const ReportJob page{run, folder_ / "data", folder_ / "page.html", 2};
-  const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
+  const auto report = Ok(WriteReport(page, workers_, kSilent));
   const std::string text = ReadText(page.out).value();
   for (const char* part :
        {"to generate textured objects from noise", "Wasserstein estimate", "sample 1 from behind",

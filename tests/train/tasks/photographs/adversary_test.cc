@@ -32,10 +32,10 @@ class PhotographsWithACritic : public TempFolderTest {
     job.existing = ExistingRun::kContinue;
     StopFlag stop = false;
     int steps = 0;
-    const ProgressSink count = [&](const Progress& progress) {
+    const auto count = [&](const Progress& progress) {
       if (progress.stage == "training" && ++steps == most) stop = true;
     };
-    return train::Train(job, Workers(workers), count, stop).status();
+    return train::Train(job, Workers(workers), {count, &stop}).status();
   }
   std::string Critic() const {
     return "[start]\nrun = \"" + (folder_ / "first").string() +
@@ -95,8 +95,7 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
   config.render.sharpness = config.render.sharpness_start = 50;
   config.schedule.steps = 10;
   const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
-  const StopFlag stop = false;
-  const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop);
+  const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, {});
   nn::Context context(workers_, nn::DType::kF64);
   PhotographStep step(context, config, {set.mean_keypoints, 15});
   const auto adversary = Adversary::Make(context, config.adversary, {.seed = 5}).value();

@@ -25,7 +25,7 @@
 namespace tilegrad::train::photographs_task_test {
 
 constexpr int kSteps = 12;  // of kTinyPhotographs
-const ProgressSink kSilent = [](const Progress&) {};
+const Watch kSilent = {[](const Progress&) {}};
 
 // The mean shape of 42 vertices loses much of its hull to smoothing.
 std::string TinyConfig(int smoothing = 0) {
@@ -54,7 +54,7 @@ class PhotographsTask : public TempFolderTest {
     job.data = folder_ / changes.data;
     job.run = folder_ / run;
     job.existing = ExistingRun::kContinue;
-    return train::Train(job, Workers(changes.workers), kSilent, stop_);
+    return train::Train(job, Workers(changes.workers), kSilent);
   }
   void ExpectSame(const std::string& a, const std::string& b) {
     ExpectSameBits(context_, folder_ / a, folder_ / b, kSteps);
@@ -63,7 +63,6 @@ class PhotographsTask : public TempFolderTest {
 
   Workers workers_{2};
   nn::Context context_{workers_};
-  StopFlag stop_ = false;
 };
 
 // Of bars of one shape the mean shape is the truth, and no network can do better. Of bars whose
@@ -85,7 +84,7 @@ TEST_F(PhotographsTask, LearnsShapesThatTheMeanShapeIsNot) {
     ASSERT_TRUE(trained.ok()) << trained.status().message();
     const auto predictor = Ok(Predictor::Load(run, workers_));
     const TaskEvaluation job{.run = run, .data = folder_ / "bars", .predictor = *predictor};
-    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
+    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
     scores[deforms ? 1 : 0] = evaluation->rows[2].mean;
   }
   EXPECT_GT(*scores[1].pck, *scores[0].pck + 0.05);
@@ -106,7 +105,7 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
     EXPECT_EQ((*meshes)[0].textures[0].image.width, 32);
 
     const TaskEvaluation job{.run = run, .data = folder_ / "cub", .predictor = *predictor};
-    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
+    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
     ASSERT_EQ(evaluation->rows.size(), 3u);
     const Score& ours = evaluation->rows[2].mean;
     EXPECT_GT(*ours.pck, 0.1);  // of 60 steps; LearnsShapesThatTheMeanShapeIsNot learns longer
@@ -123,7 +122,7 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
     EXPECT_EQ((*read)->rows[2].mean.pck, ours.pck);
 
     const ReportJob page{run, folder_ / "cub", folder_ / "page.html", 2};
-    const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
+    const auto report = Ok(WriteReport(page, workers_, kSilent));
     const std::string text = ReadText(page.out).value();
     for (const char* part : {"from one photograph", "10 photographs, one of each object",
                              "2D IoU loss", "Cotangent Laplacian"})
@@ -154,7 +153,7 @@ TEST_P(CameraHeads, FindTheCameraByAzimuths) {
   job.config.schedule.steps = 500;
   job.data = folder_ / "cub";
   job.run = folder_ / "eight";
-  const auto trained = Ok(train::Train(job, workers_, kSilent, stop_));
+  const auto trained = Ok(train::Train(job, workers_, kSilent));
   const auto log = Ok(ReadLog(job.run));
   ASSERT_EQ(log->size(), 500u);
   EXPECT_NEAR(MeanOf(*log, "azimuth", 0), std::log(8.0), 0.2);  // all alike
@@ -163,7 +162,7 @@ TEST_P(CameraHeads, FindTheCameraByAzimuths) {
   const auto predictor = Ok(Predictor::Load(job.run, workers_));
   const TaskEvaluation evaluation{
       .run = job.run, .data = job.data, .predictor = *predictor, .split = Split::kTrain};
-  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_));
+  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent));
   EXPECT_EQ(scores->rows.size(), 3u);  // nobody knows where the bars' keypoints truly are
 }
 
@@ -194,7 +193,7 @@ TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
   const auto predictor = Ok(Predictor::Load(folder_ / "run", workers_));
   const TaskEvaluation job{
       .run = folder_ / "run", .data = folder_ / "cub", .predictor = *predictor};
-  const auto scores = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
+  const auto scores = Ok(predictor->task().Evaluate(job, workers_, kSilent));
   ASSERT_EQ(scores->rows.size(), 4u);
   EXPECT_EQ(scores->rows[0].method, "true keypoints");
   EXPECT_EQ(scores->rows[0].mean.pck, 1);
@@ -225,10 +224,10 @@ TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
   job.existing = ExistingRun::kContinue;
   int steps = 0;
   StopFlag stop = false;
-  const ProgressSink after_five = [&](const Progress& progress) {
+  const auto after_five = [&](const Progress& progress) {
     if (progress.stage == "training" && ++steps == 5) stop = true;
   };
-  const auto stopped = train::Train(job, workers_, after_five, stop);
+  const auto stopped = train::Train(job, workers_, {after_five, &stop});
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
   ASSERT_TRUE(Train("stopped", {.workers = 1}).ok());
   ExpectSame("whole", "stopped");
@@ -243,7 +242,7 @@ TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
   job.config = ParseConfig(config, "tiny.toml").value();
   job.data = folder_ / "p3d";
   job.run = folder_ / "camera";
-  const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
+  const auto outcome = Ok(train::Train(job, workers_, kSilent));
 }
 
 TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
@@ -262,14 +261,14 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   job.config = ParseConfig(config, "tiny.toml").value();
   job.data = folder_ / "cub";
   job.run = folder_ / "c";
-  ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "network.texture", "paint");
+  ExpectMessage(train::Train(job, workers_, kSilent).status(), "network.texture", "paint");
   ASSERT_TRUE(Train("d", {}).ok());
   WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
   ExpectMessage(Train("d", {.steps = 20}).status(), "other photographs");
   const auto predictor = Ok(Predictor::Load(folder_ / "d", workers_));
   const TaskEvaluation evaluation{
       .run = folder_ / "d", .data = folder_ / "cub", .predictor = *predictor};
-  ExpectMessage(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_).status(),
+  ExpectMessage(predictor->task().Evaluate(evaluation, workers_, kSilent).status(),
                 "was trained on");
 }
 
@@ -287,7 +286,7 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
     config.camera = "predicted";
     config.schedule.steps = 10;
     const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
-    const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop_);
+    const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, {});
     nn::Context context(workers_, nn::DType::kF64);
     PhotographStep step(context, config, {set.mean_keypoints, 15});
     const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);

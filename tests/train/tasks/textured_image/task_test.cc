@@ -20,7 +20,7 @@
 
 namespace tilegrad::train::task_test {
 
-const ProgressSink kSilent = [](const Progress&) {};
+const Watch kSilent = {[](const Progress&) {}};
 
 class TexturedTask : public TempFolderTest {
  protected:
@@ -36,12 +36,11 @@ class TexturedTask : public TempFolderTest {
     ValueOf<std::int64_t>(job.config, "schedule.steps") = 12;
     job.data = folder_ / "data";
     job.run = run_;
-    const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
+    const auto outcome = Ok(train::Train(job, workers_, kSilent));
     EXPECT_TRUE(outcome->finished);
   }
 
   Workers workers_{2};
-  StopFlag stop_ = false;
 };
 
 TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
@@ -56,7 +55,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   EXPECT_EQ((*meshes)[0].corner_uvs.size(), 3 * (*meshes)[0].faces.size());
 
   const TaskEvaluation job{.run = run, .data = data, .predictor = *predictor, .views_per_model = 3};
-  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
+  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
   ASSERT_EQ(evaluation->rows.size(), 7u);
   const Score &dark = evaluation->rows[0].mean, &mean = evaluation->rows[1].mean,
               &ours = evaluation->rows[6].mean;
@@ -79,7 +78,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   EXPECT_EQ((*read)->rows[6].mean.light_angle, ours.light_angle);
 
   const ReportJob page{run, data, folder_ / "page.html", 2};
-  const auto report = Ok(WriteReport(page, workers_, kSilent, stop_));
+  const auto report = Ok(WriteReport(page, workers_, kSilent));
   const std::string text = ReadText(page.out).value();
   for (const char* part : {"to predict shape, texture and light", "texture + light L1",
                            "true light", "another view", "Angle of the light"}) {
@@ -95,11 +94,11 @@ TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
   ValueOf<std::int64_t>(job.config, "schedule.steps") = 4;
   job.data = folder_ / "data";
   job.run = run_;
-  const auto outcome = Ok(train::Train(job, workers_, kSilent, stop_));
+  const auto outcome = Ok(train::Train(job, workers_, kSilent));
   const auto predictor = Ok(Predictor::Load(run_, workers_));
   const TaskEvaluation evaluation{
       .run = run_, .data = folder_ / "data", .predictor = *predictor, .views_per_model = 2};
-  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_));
+  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent));
   EXPECT_EQ(scores->rows.size(), 7u);
 }
 
@@ -112,7 +111,7 @@ TEST_F(TexturedTask, RulesThatDrawNoTexturesAreErrors) {
     job.config = ParseConfig(text + "[light]\nmodel = \"" + light + "\"\n", "t").value();
     job.data = folder_ / "data";
     job.run = run_;
-    ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), part);
+    ExpectMessage(train::Train(job, workers_, kSilent).status(), part);
   }
 }
 
@@ -123,7 +122,7 @@ TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
                            .data = folder_ / "data",
                            .predictor = *predictor,
                            .views_per_model = 2};
-  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent, stop_));
+  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
   ASSERT_EQ(evaluation->rows.size(), 1u);
   EXPECT_FALSE(evaluation->rows[0].mean.light_angle);
 }
@@ -166,7 +165,7 @@ TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
       ParseConfig(std::string(kTinyTextured) + "[start]\nrun = \"/no/run\"\n", "t").value();
   job.data = folder_ / "data";
   job.run = run_;
-  ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "/no/run");
+  ExpectMessage(train::Train(job, workers_, kSilent).status(), "/no/run");
 }
 
 // The files of configs/ name keys that there are, and sizes that go with their images.
@@ -190,7 +189,7 @@ TEST_F(TexturedTask, WordsThatAreNotKnownAreErrors) {
   job.config = ParseConfig(std::string(kTinyTextured) + "[light]\nmodel = \"neon\"\n", "t").value();
   job.data = folder_ / "data";
   job.run = folder_ / "run";
-  ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "light.model is \"neon\"");
+  ExpectMessage(train::Train(job, workers_, kSilent).status(), "light.model is \"neon\"");
 }
 
 // Pictures of a painted ball under known lights, whose directions are found again.
