@@ -109,27 +109,32 @@ Result<nn::Var> PhotographsTask::Loss(const UpdateIndex& at, const Slots& slots,
   return step_->Loss(batch, at.step, out);
 }
 
-// Rows of pictures of the photographs of a store.
-Result<std::vector<std::vector<ShownPicture>>> RowsOf(nn::Context& context,
-                                                      const PhotographsConfig& config,
-                                                      PhotographNetwork& network,
-                                                      const PhotoStore& store) {
-  std::vector<std::vector<ShownPicture>> rows;
+// A photograph of a store as a report shows it.
+struct ShownPhotograph {
+  std::vector<ShownPicture> pictures;
+  Mesh prediction;
+};
+
+Result<std::vector<ShownPhotograph>> ShowAll(nn::Context& context, const PhotographsConfig& config,
+                                             PhotographNetwork& network, const PhotoStore& store) {
+  std::vector<ShownPhotograph> all;
   PhotographPictures pictures(store.size());
   for (int i = 0; i < store.count(); ++i) {
     const PhotographBatch batch = GatherPhotographs(context, config, store, {i}, -1);
-    TILEGRAD_ASSIGN(const auto predicted, PredictPhotographs(context, network, batch.input));
+    TILEGRAD_ASSIGN(auto predicted, PredictPhotographs(context, network, batch.input));
     CroppedPhoto crop = batch.crops[0];
     if (!store.photograph(i).camera) crop.camera = predicted[0].camera;
     TILEGRAD_ASSIGN(auto row, pictures.Row(store.photograph(i).id, predicted[0], crop,
                                            batch.input.span<float>()));
-    rows.push_back(std::move(row));
+    all.push_back({std::move(row), std::move(predicted[0].mesh)});
   }
-  return rows;
+  return all;
 }
 
 Result<ImageU8> PhotographsTask::SamplePicture(std::int64_t /*steps*/) {
-  TILEGRAD_ASSIGN(const auto rows, RowsOf(*context_, config_, step_->network(), *held_out_));
+  TILEGRAD_ASSIGN(auto shown, ShowAll(*context_, config_, step_->network(), *held_out_));
+  std::vector<std::vector<ShownPicture>> rows;
+  for (ShownPhotograph& photo : shown) rows.push_back(std::move(photo.pictures));
   return rows.empty() ? ImageU8() : SheetOf(rows, image_size());
 }
 
@@ -150,17 +155,14 @@ Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Wor
       const PhotoStore store,
       PhotoStore::Load(set, ChoosePhotographs(set, Split::kTest, request.examples),
                        model.config().crop, static_cast<int>(model.config().size), workers, watch));
-  TILEGRAD_ASSIGN(auto rows, RowsOf(model.context(), model.config(), model.network(), store));
+  TILEGRAD_ASSIGN(auto shown, ShowAll(model.context(), model.config(), model.network(), store));
   for (int i = 0; i < store.count(); ++i) {
-    const PhotographBatch batch =
-        GatherPhotographs(model.context(), model.config(), store, {i}, -1);
-    TILEGRAD_ASSIGN(auto predicted,
-                    PredictPhotographs(model.context(), model.network(), batch.input));
+    auto& [pictures, prediction] = shown[static_cast<std::size_t>(i)];
     Example& example = out.examples.emplace_back();
     example.name = example.id = store.photograph(i).id;
     example.class_name = set.source;
-    example.pictures = std::move(rows[static_cast<std::size_t>(i)]);
-    example.prediction = std::move(predicted[0].mesh);
+    example.pictures = std::move(pictures);
+    example.prediction = std::move(prediction);
   }
   return out;
 }
