@@ -81,9 +81,7 @@ Status WriteView(const ViewOptions& options) {
   TILEGRAD_ASSIGN(const int model, ChooseModel(dataset, options));
   TILEGRAD_ASSIGN(const auto images, dataset.LoadImages(model));
   const int size = dataset.info().image_size;
-  const std::size_t bytes = 4 * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
-  const auto image =
-      std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
+  const auto image = ViewOf(dataset.info(), images, options.view);
   TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
                             [&] { return io::SavePng(options.out, StraightRgba(image, size)); }));
   TILEGRAD_TRY(WriteVoxels(options, dataset, model));

@@ -26,6 +26,22 @@ std::vector<int> SpreadViews(int views, int count) {
   return out;
 }
 
+std::span<const std::uint8_t> ViewOf(const DatasetInfo& info, std::span<const std::uint8_t> images,
+                                     int view) {
+  const std::size_t bytes = images.size() / static_cast<std::size_t>(info.views);
+  return images.subspan(static_cast<std::size_t>(view) * bytes, bytes);
+}
+
+std::vector<std::uint8_t> ViewsOf(const DatasetInfo& info, std::span<const std::uint8_t> images,
+                                  std::span<const int> views) {
+  std::vector<std::uint8_t> out;
+  for (const int view : views) {
+    const auto image = ViewOf(info, images, view);
+    out.insert(out.end(), image.begin(), image.end());
+  }
+  return out;
+}
+
 std::size_t CountShapes(const std::vector<ModelInfo>& models) {
   std::set<std::pair<int, std::string>> shapes;
   for (const ModelInfo& model : models) shapes.emplace(model.class_index, ShapeOf(model));

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,12 @@ struct ModelData {
   // faces. Empty where the source has no meshes.
   Mesh mesh;
 };
+
+// One or some views in ModelData::images, the latter one after the other.
+std::span<const std::uint8_t> ViewOf(const DatasetInfo& info, std::span<const std::uint8_t> images,
+                                     int view);
+std::vector<std::uint8_t> ViewsOf(const DatasetInfo& info, std::span<const std::uint8_t> images,
+                                  std::span<const int> views);
 
 // The cameras of a model's views: `own` or, if that is empty, those of all models.
 std::vector<Camera> CamerasOf(const DatasetInfo& info, const std::vector<Camera>& own);

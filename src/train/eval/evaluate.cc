@@ -83,19 +83,6 @@ class Evaluator {
     return TruthShape(data, OwnVoxelRule(data_.info().source), voxels);
   }
 
-  std::span<const std::uint8_t> Image(const ModelData& data, int view) const {
-    const std::size_t bytes = data.images.size() / static_cast<std::size_t>(data_.info().views);
-    return std::span(data.images).subspan(bytes * static_cast<std::size_t>(view), bytes);
-  }
-  std::vector<std::uint8_t> Images(const ModelData& data, std::span<const int> views) const {
-    std::vector<std::uint8_t> out;
-    for (const int view : views) {
-      const auto image = Image(data, view);
-      out.insert(out.end(), image.begin(), image.end());
-    }
-    return out;
-  }
-
   Status LoadTrainingShapes() {
     const auto train = data_.Select(Split::kTrain);
     if (train.empty()) return InvalidArgument("the dataset has no training models");
@@ -129,7 +116,7 @@ class Evaluator {
   Status AddSearched(const ModelData& data) {
     TILEGRAD_ASSIGN(Shape shape, TruthOf(data));
     train_.shapes.push_back(std::move(shape));
-    train_.color_images.push_back(Images(data, color_views_));
+    train_.color_images.push_back(ViewsOf(data_.info(), data.images, color_views_));
     train_.index.Add(data.images, data_.info().views, data_.info().image_size);
     return {};
   }
@@ -150,7 +137,8 @@ class Evaluator {
     const std::size_t bytes = images.size() / color_views_.size(),
                       pixels = sides.size() / color_views_.size();
     for (std::size_t v = 0; v < color_views_.size(); ++v)
-      difference.Add(images.subspan(v * bytes, bytes), Image(truth, color_views_[v]),
+      difference.Add(images.subspan(v * bytes, bytes),
+                     ViewOf(data_.info(), truth.images, color_views_[v]),
                      sides.subspan(v * pixels, pixels));
     difference.To(score);
   }
@@ -159,7 +147,9 @@ class Evaluator {
   Score ScoreRetrieval(const ModelData& data, const Shape& truth) const {
     std::vector<Score> scores(views_.size());
     workers_.For(views_.size(), [&](std::size_t i, std::size_t) {
-      const auto match = train_.index.Nearest(Image(data, views_[i]), data_.info().image_size);
+      const DatasetInfo& info = data_.info();
+      const auto match =
+          train_.index.Nearest(ViewOf(info, data.images, views_[i]), info.image_size);
       const auto model = static_cast<std::size_t>(match.model);
       scores[i] = Compare(train_.shapes[model], truth);
       AddColors(train_.color_images[model], {}, data, &scores[i]);
@@ -194,7 +184,7 @@ class Evaluator {
 
   Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth,
                                  int* unusable_predictions) {
-    TILEGRAD_ASSIGN(auto meshes, job_.predict(Images(data, views_)));
+    TILEGRAD_ASSIGN(auto meshes, job_.predict(ViewsOf(data_.info(), data.images, views_)));
     if (meshes.size() != views_.size()) {
       return InternalError("{} predictions for {} images", meshes.size(), views_.size());
     }
@@ -209,14 +199,9 @@ class Evaluator {
   }
 
   void Fill(std::span<const int> held_out) {
-    for (std::size_t i = 0; i < held_out.size(); ++i) {
-      const ModelInfo& info = data_.model(held_out[i]);
-      out_.models.push_back({data_.ClassOf(info), info.id, predicted_scores_[i], info.shape});
-      out_.unusable_predictions += unusable_[i];
-    }
+    for (const int count : unusable_) out_.unusable_predictions += count;
     const ClassMeans means(data_, held_out);
-    out_.classes = means.classes();
-    out_.class_models = means.class_models();
+    means.Describe(predicted_scores_, &out_);
     out_.rows = {means.Row("undeformed template", template_scores_),
                  means.Row("best single shape", single_scores_)};
     if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieval_scores_));
@@ -224,7 +209,6 @@ class Evaluator {
     out_.rows.push_back(means.Row("tilegrad", predicted_scores_));
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
-    out_.dataset_source = data_.info().source;
     out_.voxels = kVoxelRuleNames[static_cast<int>(job_.voxels.rule)];
     out_.views_per_model = static_cast<int>(views_.size());
   }

@@ -11,16 +11,25 @@
 
 namespace tilegrad::train {
 
-ClassMeans::ClassMeans(const Dataset& dataset, std::span<const int> models) {
-  std::map<int, int> counts;
+ClassMeans::ClassMeans(const Dataset& dataset, std::span<const int> models)
+    : dataset_(dataset), models_(models.begin(), models.end()) {
   for (std::size_t i = 0; i < models.size(); ++i) {
     const ModelInfo& info = dataset.model(models[i]);
     members_[info.class_index][ShapeOf(info)].push_back(i);
+  }
+}
+
+void ClassMeans::Describe(std::span<const Score> scores, Evaluation* out) const {
+  out->dataset_source = dataset_.info().source;
+  std::map<int, int> counts;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const ModelInfo& info = dataset_.model(models_[i]);
+    out->models.push_back({dataset_.ClassOf(info), info.id, scores[i], info.shape});
     ++counts[info.class_index];
   }
   for (const auto& [class_index, count] : counts) {
-    classes_.push_back(dataset.info().classes[static_cast<std::size_t>(class_index)]);
-    class_models_.push_back(count);
+    out->classes.push_back(dataset_.info().classes[static_cast<std::size_t>(class_index)]);
+    out->class_models.push_back(count);
   }
 }
 

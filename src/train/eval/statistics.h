@@ -22,16 +22,16 @@ class ClassMeans {
  public:
   // `models`: indices into the dataset's.
   ClassMeans(const Dataset& dataset, std::span<const int> models);
-  const std::vector<std::string>& classes() const { return classes_; }    // that have models
-  const std::vector<int>& class_models() const { return class_models_; }  // how many
   // `scores`: one for each of the models.
   EvaluationRow Row(const std::string& method, std::span<const Score> scores) const;
+  // Sets the dataset's source, classes that have models, and models; `scores`: the prediction's.
+  void Describe(std::span<const Score> scores, Evaluation* out) const;
 
  private:
-  // class -> shape -> positions in `models`
+  const Dataset& dataset_;
+  std::vector<int> models_;
+  // class -> shape -> positions in `models_`
   std::map<int, std::map<std::string, std::vector<std::size_t>>> members_;
-  std::vector<std::string> classes_;
-  std::vector<int> class_models_;
 };
 
 // A mean over held-out models with its sampling error.

@@ -62,7 +62,7 @@ class ShowcaseBuilder {
     TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
     out.truth = std::move(data.mesh);
     const std::vector<int> views = ShownViews(info_.views);
-    TILEGRAD_ASSIGN(auto meshes, predictor_.Predict(ImageOf(data, views[0])));
+    TILEGRAD_ASSIGN(auto meshes, predictor_.Predict(ViewOf(info_, data.images, views[0])));
     out.prediction = std::move(meshes[0]);
     const std::vector<Camera> all = CamerasOf(info_, data.cameras);
     std::vector<Camera> cameras;
@@ -73,7 +73,7 @@ class ShowcaseBuilder {
         DrawMesh(out.prediction, {cameras, info_.image_size, info_.image_size}, workers_));
     for (std::size_t v = 0; v < views.size(); ++v) {
       auto [left, right] = Captions(out.name, TurnTo(info_, views[v]), v == 0);
-      left.image = OnPaper(ImageOf(data, views[v]), info_.image_size);
+      left.image = OnPaper(ViewOf(info_, data.images, views[v]), info_.image_size);
       right.image = std::move(predicted[v]);
       out.pictures.push_back(std::move(left));
       out.pictures.push_back(std::move(right));
@@ -82,11 +82,6 @@ class ShowcaseBuilder {
   }
 
  private:
-  std::span<const std::uint8_t> ImageOf(const ModelData& data, int view) const {
-    const std::size_t bytes = data.images.size() / static_cast<std::size_t>(info_.views);
-    return std::span(data.images).subspan(static_cast<std::size_t>(view) * bytes, bytes);
-  }
-
   const Dataset& dataset_;
   const DatasetInfo& info_;
   const Predictor& predictor_;
@@ -109,6 +104,17 @@ Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
 }
 
 }  // namespace
+
+Result<Dataset> OpenHeldOut(const TaskEvaluation& job) {
+  TILEGRAD_ASSIGN(Dataset dataset, Dataset::Open(job.data));
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
+  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  return dataset;
+}
+
+Result<Dataset> OpenHeldOut(const ShowcaseRequest& request) {
+  return OpenHeldOut(TaskEvaluation{request.run, request.data, request.predictor});
+}
 
 Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   const DatasetInfo& info = dataset.info();
@@ -169,9 +175,7 @@ std::vector<int> ShownViews(int views) {
 
 Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
                              const Watch& watch) {
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
-  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
-  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
   Showcase out = AboutDataset(dataset, request.header);
   out.note =
       "The network saw none of these in training. From the first picture alone it predicted one "
@@ -190,11 +194,9 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
 
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
                                      const Watch& watch, const MakeFitFunction& fit) {
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.oracle_steps > 0 && !fit)
     return InvalidArgument("--oracle fits meshes; this task predicts none");
-  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
-  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(job));
   EvaluationJob evaluation;
   evaluation.dataset = &dataset;
   evaluation.split = job.split;

@@ -17,6 +17,11 @@ inline constexpr int kShownViews = 3;
 // Makes a function that fits, in `steps` steps on the workers, what a task predicts.
 using MakeFitFunction = std::function<FitFunction(const DatasetInfo&, int steps, const Workers&)>;
 
+// The dataset that a run is scored on or shown with. Errors: as CheckHeldOut, except for the
+// training models, which may be scored; images of another size than the predictor's.
+Result<Dataset> OpenHeldOut(const TaskEvaluation& job);
+Result<Dataset> OpenHeldOut(const ShowcaseRequest& request);
+
 // Scores of eval/evaluate.h. Errors: as CheckHeldOut and Evaluate; images of another size.
 // `fit`: for TaskEvaluation::oracle_steps, which are an error without it.
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,

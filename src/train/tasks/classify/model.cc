@@ -10,7 +10,6 @@
 #include "base/rng.h"
 #include "render/picture/composite.h"
 #include "train/data/dataset_files.h"
-#include "train/data/trained_models.h"
 #include "train/eval/baselines.h"
 #include "train/eval/statistics.h"
 #include "train/predictor.h"
@@ -99,18 +98,6 @@ Status CheckClasses(const Dataset& dataset, const ClassifierModel& model) {
                          model.classes().size());
 }
 
-// Some views of one model, one after the other.
-std::vector<std::uint8_t> SelectedViews(std::span<const std::uint8_t> images, int of,
-                                        std::span<const int> views) {
-  const std::size_t bytes = images.size() / static_cast<std::size_t>(of);
-  std::vector<std::uint8_t> out;
-  for (const int view : views) {
-    const auto image = images.subspan(static_cast<std::size_t>(view) * bytes, bytes);
-    out.insert(out.end(), image.begin(), image.end());
-  }
-  return out;
-}
-
 Score Accuracy(std::span<const int> said, int truth) {
   Score score;
   score.accuracy = static_cast<double>(std::count(said.begin(), said.end(), truth)) /
@@ -174,7 +161,7 @@ class Examiner {
   Status Examine(std::size_t i, int model) {
     const int truth = data_.model(model).class_index;
     TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
-    const std::vector<std::uint8_t> images = SelectedViews(all, data_.info().views, views_);
+    const std::vector<std::uint8_t> images = ViewsOf(data_.info(), all, views_);
     std::vector<int> said, found(views_.size());
     const std::size_t bytes = images.size() / views_.size();
     for (std::size_t v = 0; v < views_.size(); v += Model::kImagesAtOnce) {
@@ -197,18 +184,11 @@ class Examiner {
 
   void Fill(std::span<const int> models) {
     const ClassMeans means(data_, models);
-    out_.classes = means.classes();
-    out_.class_models = means.class_models();
+    means.Describe(said_, &out_);
     out_.rows = {means.Row("most frequent class", frequent_)};
     if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieved_));
     out_.rows.push_back(means.Row("tilegrad", said_));
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      const ModelInfo& info = data_.model(models[i]);
-      out_.models.push_back({model_.classes()[static_cast<std::size_t>(info.class_index)], info.id,
-                             said_[i], info.shape});
-    }
     out_.predictor = job_.predictor.description();
-    out_.dataset_source = data_.info().source;
     out_.views_per_model = static_cast<int>(views_.size());
   }
 
@@ -231,7 +211,7 @@ Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& cl
   Example out = NamedExample(dataset, model);
   TILEGRAD_ASSIGN(const auto all, dataset.LoadImages(model));
   const std::vector<int> views = ShownViews(info.views);
-  const std::vector<std::uint8_t> images = SelectedViews(all, info.views, views);
+  const std::vector<std::uint8_t> images = ViewsOf(info, all, views);
   TILEGRAD_ASSIGN(const auto said, classifier.Classify(images));
   const std::size_t bytes = images.size() / views.size();
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -248,21 +228,17 @@ Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& cl
 Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
                                       const Workers& workers, const Watch& watch) {
   if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
   if (job.oracle_steps > 0)
     return InvalidArgument("--oracle fits meshes; a classifier predicts none");
-  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
-  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(job));
   TILEGRAD_TRY(CheckClasses(dataset, model));
   return Examiner(dataset, job, model, workers, watch).Run();
 }
 
 Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
                                 const Watch& watch) {
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
-  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
-  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
   TILEGRAD_TRY(CheckClasses(dataset, model));
   Showcase out = AboutDataset(dataset, request.header);
   out.purpose = "to classify an object from one image";

@@ -8,11 +8,11 @@
 #include "base/error.h"
 #include "base/try_all.h"
 #include "train/data/dataset_files.h"
-#include "train/data/trained_models.h"
 #include "train/eval/scores.h"
 #include "train/eval/statistics.h"
 #include "train/predictor.h"
 #include "train/ranks/process_group.h"
+#include "train/tasks/held_out.h"
 #include "train/tasks/textured_image/light_search.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/object_pictures.h"
@@ -97,6 +97,12 @@ enum LightMethod {
   kLightMethods
 };
 using MethodScores = std::array<Score, kLightMethods>;
+
+std::vector<Score> ScoresOf(int method, std::span<const MethodScores> all) {
+  std::vector<Score> out;
+  for (const MethodScores& scores : all) out.push_back(scores[static_cast<std::size_t>(method)]);
+  return out;
+}
 
 const char* NameOf(int method) {
   if (method == kWithoutLight) return "without light";
@@ -255,11 +261,7 @@ class TexturedEvaluator {
     };
     TILEGRAD_TRY(TryAll(workers_, objects.size(), score));
     for (const auto flag : unusable) unusable_[i] += flag;
-    for (int m = 0; m < kLightMethods; ++m) {
-      std::vector<train::Score> of_method;
-      for (const MethodScores& view : scores) of_method.push_back(view[m]);
-      scores_[i][m] = MeanScore(of_method);
-    }
+    for (int m = 0; m < kLightMethods; ++m) scores_[i][m] = MeanScore(ScoresOf(m, scores));
     return {};
   }
 
@@ -278,22 +280,12 @@ class TexturedEvaluator {
 
   void Fill(const std::vector<int>& models) {
     const ClassMeans means(dataset_, models);
-    out_.classes = means.classes();
-    out_.class_models = means.class_models();
     const bool lit = LightingOf(config_.light) != Lighting::kNone;
-    for (int m = lit ? kWithoutLight : kTexturedOurs; m < kLightMethods; ++m) {
-      std::vector<train::Score> of_method;
-      for (const MethodScores& model : scores_) of_method.push_back(model[m]);
-      out_.rows.push_back(means.Row(NameOf(m), of_method));
-    }
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      const ModelInfo& info = dataset_.model(models[i]);
-      out_.models.push_back(
-          {dataset_.ClassOf(info), info.id, scores_[i][kTexturedOurs], info.shape});
-      out_.unusable_predictions += unusable_[i];
-    }
+    for (int m = lit ? kWithoutLight : kTexturedOurs; m < kLightMethods; ++m)
+      out_.rows.push_back(means.Row(NameOf(m), ScoresOf(m, scores_)));
+    means.Describe(ScoresOf(kTexturedOurs, scores_), &out_);
+    for (const int count : unusable_) out_.unusable_predictions += count;
     out_.predictor = job_.predictor.description();
-    out_.dataset_source = dataset_.info().source;
     out_.views_per_model = job_.views_per_model;
   }
 
@@ -316,11 +308,9 @@ Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const Tas
   if (job.change)
     return InvalidArgument(
         "--refine fits shapes only; predictions of textures and lights cannot be refined");
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
   if (job.voxels) return InvalidArgument("--voxels: this task is scored by ours and by binvox's");
   if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
-  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
-  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(job));
   return TexturedEvaluator(config, job, dataset, workers).Run(watch);
 }
 

@@ -137,9 +137,7 @@ void AddTexturedSheet(int size, Showcase* showcase) {
 
 Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
                                          const Watch& watch) {
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
-  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
-  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
   Showcase out = AboutDataset(dataset, request.header);
   out.purpose = "to predict shape, texture and light of an object from one image";
   out.data += " It saw only pictures that were rendered while it trained, no 3D data.";
