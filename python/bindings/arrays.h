@@ -9,7 +9,6 @@
 #include <pybind11/pybind11.h>
 
 #include <cstddef>
-#include <initializer_list>
 #include <span>
 #include <stdexcept>
 #include <string>

@@ -3,7 +3,6 @@
 // one of a list; files elsewhere.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <span>
 #include <string>
 

@@ -2,7 +2,6 @@
 // tilegrad dataset: renders models into a dataset that training reads.
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>

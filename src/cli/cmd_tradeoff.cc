@@ -2,9 +2,7 @@
 // tilegrad tradeoff: what accuracy costs, measured.
 #include <fmt/core.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "base/file.h"
 #include "base/output_guard.h"

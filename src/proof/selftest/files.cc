@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files written and read back, in a folder that is removed afterwards.
-#include <cstdlib>
 #include <cstring>
 
 #include "base/rng.h"

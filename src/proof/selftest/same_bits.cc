@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // One input gives one output, bit by bit, for any number of workers, batched or one by one.
-#include <iterator>
 
 #include "base/hash.h"
 #include "proof/selftest/check.h"

@@ -2,8 +2,6 @@
 // The network of section 5.1: one RGBA image in, a deformed and coloured sphere out.
 #pragma once
 
-#include <memory>
-
 #include "nn/layers.h"
 #include "train/models/sphere_model.h"
 

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <span>
 #include <vector>
 
 #include "nn/context.h"

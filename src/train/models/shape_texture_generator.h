@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "nn/layers.h"
 #include "scene/mesh.h"

@@ -3,10 +3,8 @@
 // the light out. The paper's figure 3 shows its three heads; sizes that it does not give are ours.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "nn/nn.h"
 #include "scene/mesh.h"

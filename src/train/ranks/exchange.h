@@ -5,9 +5,7 @@
 // where each has one subtree, and no sum depends on what arrives first.
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
-#include <cstring>
 #include <functional>
 #include <mutex>
 #include <string>

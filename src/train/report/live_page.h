@@ -14,7 +14,6 @@
 #include <nlohmann/json_fwd.hpp>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "base/file.h"
 #include "base/progress.h"

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>

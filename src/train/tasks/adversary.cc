@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/adversary.h"
 
-#include <cmath>
-
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/fingerprint.h"

@@ -2,7 +2,6 @@
 #include "train/data/build/truth_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
 #include <unordered_map>

@@ -2,7 +2,6 @@
 #include "train/data/photographs/pascal3d_record.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
 #include "base/error.h"

@@ -8,7 +8,6 @@
 //
 // Objects are centred, their largest half-extent is 0.45; the vertical field of view is that of
 // Blender's lens.
-#include <cmath>
 
 #include "base/error.h"
 #include "io/binvox.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models that lie in folders, one file each: any tree class/file.
 #include <algorithm>
-#include <cctype>
 #include <set>
 
 #include "base/error.h"

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <glm/geometric.hpp>
 #include <map>
 #include <string_view>

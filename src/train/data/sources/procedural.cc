@@ -2,7 +2,6 @@
 #include "train/data/sources/procedural.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "base/error.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models of Debian's sweethome3d-furniture, by our list of classes.
 #include <map>
-#include <optional>
 
 #include "base/error.h"
 #include "io/mesh_file.h"

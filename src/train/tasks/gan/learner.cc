@@ -2,7 +2,6 @@
 #include "train/tasks/gan/learner.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "base/error.h"

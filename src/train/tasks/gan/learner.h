@@ -3,7 +3,6 @@
 // of its stage. Also keeps the generator that scored best.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <vector>

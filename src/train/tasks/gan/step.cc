@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/gan/step.h"
 
-#include <algorithm>
-
 #include "nn/nn.h"
 #include "scene/camera_conventions.h"
 

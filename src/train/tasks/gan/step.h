@@ -4,7 +4,6 @@
 // the textures are trained.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "train/losses/loss_sum.h"
