@@ -95,8 +95,7 @@ TEST_F(Help, OtherShellsReadTheirScripts) {
   for (const char* shell : {"zsh", "fish"}) {
     if (!Has(shell)) continue;
     ++shells;
-    ASSERT_TRUE(
-        WriteTextAtomic(folder_ / shell, ExpectDone(std::string("completion ") + shell)).ok());
+    Ok(WriteTextAtomic(folder_ / shell, ExpectDone(std::string("completion ") + shell)));
     EXPECT_EQ(std::system((std::string(shell) + " -n " + In(shell)).c_str()), 0) << shell;
   }
   if (shells == 0) GTEST_SKIP() << "neither zsh nor fish is installed";

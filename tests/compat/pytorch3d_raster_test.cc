@@ -13,6 +13,7 @@
 
 #include "base/rng.h"
 #include "compat/pytorch3d_fragment.h"
+#include "support/expect.h"
 
 namespace tilegrad::compat::pytorch3d::layered_raster_test {
 
@@ -51,8 +52,7 @@ Layers<T> Draw(const std::vector<T>& v, const std::vector<FaceRange>& images,
                const LayeredOptions& options) {
   const Workers workers(2);
   Layers<T> out(Count(options, images.size()));
-  const Status status = RasterizeLayers<T>(v, images, options, workers, out.View());
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(RasterizeLayers<T>(v, images, options, workers, out.View()));
   return out;
 }
 

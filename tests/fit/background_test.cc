@@ -102,22 +102,18 @@ class BackgroundInput : public TempFolderTest {
     StopFlag stop = false;
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    ASSERT_TRUE(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views",
-                          OutputGuard(), {}, stop)
-                    .ok());
-    const auto truth = ReadFitFolder(folder_ / "views", 0);
-    ASSERT_TRUE(truth.ok());
+    Ok(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views", OutputGuard(), {},
+                 stop));
+    const auto truth = Ok(ReadFitFolder(folder_ / "views", 0));
     truth_.assign(truth->images.alpha.begin(), truth->images.alpha.end());
     Rng rng(3);
     for (int i = 0; i < 4; ++i) PutBeforeWall(i, &rng);
-    const auto found = ReadFitFolder(folder_ / "views", InputOptions{});
-    ASSERT_TRUE(found.ok());
+    const auto found = Ok(ReadFitFolder(folder_ / "views", InputOptions{}));
     found_ = *found;
   }
   void PutBeforeWall(int i, Rng* rng) const {
     const Path file = folder_ / "views" / "images" / (std::string("00") + char('0' + i) + ".png");
-    const auto image = io::LoadImage(file);
-    ASSERT_TRUE(image.ok());
+    const auto image = Ok(io::LoadImage(file));
     ImageU8 photo(64, 64, 3);
     for (std::size_t p = 0; p < 64 * 64; ++p) {
       const double alpha = image->pixels[4 * p + 3] / 255.0;
@@ -145,8 +141,7 @@ TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
   }
   EXPECT_GT(both / either, 0.96);
   for (const Background other : {Background::kMask, Background::kNone}) {
-    const auto bare = ReadFitFolder(folder_ / "views", {.background = other});
-    ASSERT_TRUE(bare.ok());
+    const auto bare = Ok(ReadFitFolder(folder_ / "views", {.background = other}));
     EXPECT_FALSE(bare->masked);
   }
 }
@@ -167,8 +162,7 @@ TEST_F(BackgroundInput, MasksAreKept) {
 
 TEST_F(BackgroundInput, NeedsNoCameras) {
   std::filesystem::remove(folder_ / "views" / "transforms_train.json");
-  const auto lone = ReadFitFolder(folder_ / "views", {.fov = 90});
-  ASSERT_TRUE(lone.ok()) << lone.status().message();
+  const auto lone = Ok(ReadFitFolder(folder_ / "views", {.fov = 90}));
   EXPECT_FALSE(lone->posed);
   EXPECT_EQ(lone->cameras.size(), 4u);
   EXPECT_NEAR(lone->cameras[0].fx, 32, 1e-4);

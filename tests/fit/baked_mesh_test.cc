@@ -30,9 +30,7 @@ class BakedMesh : public TempFolderTest {
   io::LoadedMesh SaveAndLoad() {
     const Path file = folder_ / "mesh.glb";
     EXPECT_TRUE(io::SaveGlb(file, MeshOfScene(scene_)).ok());
-    auto loaded = io::LoadMesh(file);
-    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    return std::move(*loaded);
+    return Ok(io::LoadMesh(file)).value();
   }
   // The largest difference of the fit's picture and the file's, which a viewer lights, where both
   // show the inside of the object.

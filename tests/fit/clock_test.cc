@@ -65,9 +65,8 @@ class HurriedFit : public TempFolderTest {
   void SetUp() override {
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    const Status made = MakeViews(box, {.views = 6, .held_out = 0, .size = 24}, folder_ / "views",
-                                  OutputGuard(), {}, stop_);
-    ASSERT_TRUE(made.ok()) << made.message();
+    Ok(MakeViews(box, {.views = 6, .held_out = 0, .size = 24}, folder_ / "views", OutputGuard(), {},
+                 stop_));
   }
   // Gets there in no time: from step 200 on it hurries.
   FitJob Job(const std::string& out) {
@@ -94,8 +93,7 @@ class HurriedFit : public TempFolderTest {
 };
 
 TEST_F(HurriedFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
-  const auto whole = RunFit(Job("whole"), Workers(1), {}, stop_);
-  ASSERT_TRUE(whole.ok()) << whole.status().message();
+  const auto whole = Ok(RunFit(Job("whole"), Workers(1), {}, stop_));
   EXPECT_TRUE(whole->finished);
   EXPECT_EQ(whole->last_step, 220);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "whole" / "timelapse" / "00000220.png"));
@@ -104,8 +102,7 @@ TEST_F(HurriedFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
     StopAt(job, step);
     job.existing = ExistingRun::kContinue;
   }
-  const auto resumed = RunFit(job, Workers(7), {}, stop_);
-  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  const auto resumed = Ok(RunFit(job, Workers(7), {}, stop_));
   EXPECT_EQ(resumed->first_step, 207);
   EXPECT_EQ(resumed->last_step, 220);
   EXPECT_EQ(Read("whole"), Read("parts"));
@@ -124,8 +121,7 @@ TEST_F(HurriedFit, AFinishedFitGoesOnWithMoreSteps) {
       ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "300 steps", "or more");
       job.config.steps = 300;
     }
-    const auto more = RunFit(job, Workers(2), {}, stop_);
-    ASSERT_TRUE(more.ok()) << more.status().message();
+    const auto more = Ok(RunFit(job, Workers(2), {}, stop_));
     EXPECT_EQ(more->last_step, 300);
     // Pictures of both parts: 0, 87, 174 and 220; 200 and 300.
     EXPECT_TRUE(std::filesystem::exists(job.out / "timelapse" / "00000300.png"));

@@ -19,9 +19,8 @@ class Exposure : public TempFolderTest {
   void SetUp() override {
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.6f, 0.5f, 0.3f, 1});
-    ASSERT_TRUE(MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views",
-                          OutputGuard(), {}, stop_)
-                    .ok());
+    Ok(MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", OutputGuard(), {},
+                 stop_));
   }
   // Starts from the true shape.
   FitJob Job() {
@@ -45,8 +44,7 @@ class Exposure : public TempFolderTest {
   Evaluation Evaluate(const FitScene& scene, const FitJob& job, Parameter p) {
     FitterOptions options;
     options.parameters[p] = true;
-    auto fitter = Fitter::Make(scene, options, workers_);
-    EXPECT_TRUE(fitter.ok()) << fitter.status().message();
+    auto fitter = Ok(Fitter::Make(scene, options, workers_));
     FitStep step;
     std::vector<int> views(job.input.training);
     step.views = views;
@@ -90,8 +88,7 @@ class Exposure : public TempFolderTest {
 TEST_F(Exposure, GradientsAreThoseOfDifferences) {
   FitJob job = Job();
   job.config.parameters[Parameter::kExposure] = true;
-  const auto start = PrepareFit(job, workers_);
-  ASSERT_TRUE(start.ok()) << start.status().message();
+  const auto start = Ok(PrepareFit(job, workers_));
   FitScene scene = start->scene;
   ASSERT_EQ(scene.gains.size(), 10u);
   for (std::size_t i = 0; i < scene.gains.size(); ++i) scene.gains[i] = i % 2 == 0 ? 1.3f : 0.7f;
@@ -115,8 +112,7 @@ TEST_F(Exposure, GradientsAreThoseOfDifferences) {
 
 TEST_F(Exposure, FocalGradientIsThatOfDifferences) {
   const FitJob job = Job();
-  const auto start = PrepareFit(job, workers_);
-  ASSERT_TRUE(start.ok());
+  const auto start = Ok(PrepareFit(job, workers_));
   FitScene scene = start->scene;
   const auto scaled = [&](double by) {
     FitScene out = scene;
@@ -142,15 +138,12 @@ TEST_F(Exposure, GainsAreRecovered) {
   FitJob job = Job();
   const double gains[10] = {0.9, 1.2, 0.7, 1.0, 1.3, 0.8, 1.1, 0.6, 0.95, 1.15};
   job.config.parameters[Parameter::kColors] = job.config.parameters[Parameter::kExposure] = true;
-  const auto start = PrepareFit(job, workers_);
-  ASSERT_TRUE(start.ok());
+  const auto start = Ok(PrepareFit(job, workers_));
   Photograph(start->scene, gains, &job.input);
   SetColor(*job.start, {0.5f, 0.5f, 0.5f, 1});  // to be found, too
   job.config.steps = 300;
-  const auto outcome = RunFit(job, workers_, {}, stop_);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
-  const auto text = ReadText(job.out / "transforms_fitted.json");
-  ASSERT_TRUE(text.ok());
+  Ok(RunFit(job, workers_, {}, stop_).status());
+  const auto text = Ok(ReadText(job.out / "transforms_fitted.json"));
   // Relative to the reference, whose gain is not written: it is 1.
   std::size_t at = 0, found = 0;
   for (const int view : job.input.training) {
@@ -177,8 +170,7 @@ TEST_F(Exposure, TheFocalLengthIsRecovered) {
   job.config.rates[Parameter::kFocal] = 0.005;
   ASSERT_TRUE(RunFit(job, workers_, {}, stop_).ok());
   const auto input = ReadFitFolder(folder_ / "views", 0);
-  const auto text = ReadText(job.out / "transforms_fitted.json");
-  ASSERT_TRUE(text.ok());
+  const auto text = Ok(ReadText(job.out / "transforms_fitted.json"));
   const std::size_t at = text->find("\"fl_x\": ");
   ASSERT_NE(at, std::string::npos);
   EXPECT_NEAR(std::stod(text->substr(at + 8)), static_cast<double>(truth),

@@ -47,23 +47,18 @@ TEST(CellDistance, IsThatToTheNearestEmptyCell) {
 class Hollows : public TempFolderTest {
  protected:
   FitInput Views(const Mesh& mesh) {
-    const Status made = MakeViews(mesh, {.views = 24, .held_out = 0, .size = 96}, folder_ / "views",
-                                  OutputGuard(true), {}, stop_);
-    EXPECT_TRUE(made.ok()) << made.message();
-    auto input = ReadFitFolder(folder_ / "views", 0);
-    EXPECT_TRUE(input.ok()) << input.status().message();
-    return std::move(*input);
+    Ok(MakeViews(mesh, {.views = 24, .held_out = 0, .size = 96}, folder_ / "views",
+                 OutputGuard(true), {}, stop_));
+    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
   }
   // The hull, and what is left of it.
   struct Grids {
     ScalarGrid hull, hollow;
   };
   static Grids Carved(const FitInput& input, int workers = 2) {
-    auto grid = Carve(input, {}, Workers(workers));
-    EXPECT_TRUE(grid.ok()) << grid.status().message();
+    auto grid = Ok(Carve(input, {}, Workers(workers)));
     Grids out{*grid, *grid};
-    const auto found = CarveHollows(input, Workers(workers), {}, &out.hollow);
-    EXPECT_TRUE(found.ok()) << found.status().message();
+    const auto found = Ok(CarveHollows(input, Workers(workers), {}, &out.hollow));
     EXPECT_EQ(*found, out.hull.values != out.hollow.values);
     return out;
   }
@@ -161,8 +156,7 @@ TEST_F(Hollows, TurnTheDefaultWeightOfTheAreaOff) {
   FitJob job;
   job.config.vertex_colors = true;
   job.input = Views(OpenBox(true));
-  const auto open = PrepareFit(job, Workers(2));
-  ASSERT_TRUE(open.ok()) << open.status().message();
+  const auto open = Ok(PrepareFit(job, Workers(2)));
   EXPECT_EQ(open->config.regularizers.area, 0);
 }
 

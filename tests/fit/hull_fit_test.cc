@@ -15,9 +15,8 @@ namespace tilegrad::train::hull_fit_test {
 class HullFit : public TempFolderTest {
  protected:
   FitJob Job(const std::string& out, const Mesh& mesh = Torus(0.3f, 0.12f, 24, 12), int size = 32) {
-    const Status made = MakeViews(mesh, {.views = 8, .held_out = 2, .size = size},
-                                  folder_ / "views", OutputGuard(true), {}, stop_);
-    EXPECT_TRUE(made.ok()) << made.message();
+    Ok(MakeViews(mesh, {.views = 8, .held_out = 2, .size = size}, folder_ / "views",
+                 OutputGuard(true), {}, stop_));
     FitJob job;
     job.input = ReadFitFolder(folder_ / "views", 0).value();
     job.out = folder_ / out;
@@ -48,8 +47,7 @@ TEST_F(HullFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
       stop_ = false;
       job.existing = ExistingRun::kContinue;
     }
-    const auto resumed = RunFit(job, Workers(7), {}, stop_);
-    ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+    const auto resumed = Ok(RunFit(job, Workers(7), {}, stop_));
     EXPECT_EQ(resumed->first_step, 29);
     EXPECT_EQ(Read(whole), Read(parts));
   }
@@ -60,22 +58,19 @@ TEST_F(HullFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
 TEST_F(HullFit, ChartsWithoutRoomGetALargerTexture) {
   FitJob job = Job("run");
   job.config.texture_size = 16;
-  const auto larger = PrepareFit(job, Workers(1));
-  ASSERT_TRUE(larger.ok()) << larger.status().message();
+  const auto larger = Ok(PrepareFit(job, Workers(1)));
   EXPECT_GT(larger->scene.texture.width, 16);
   EXPECT_LE(larger->scene.texture.width, 64);
   job.config.texture_size = 2;
   job.config.start = StartShape::kAuto;
-  const auto sphere = PrepareFit(job, Workers(1));
-  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  const auto sphere = Ok(PrepareFit(job, Workers(1)));
   EXPECT_NE(sphere->note.find("no hull: a texture of 8 x 8"), std::string::npos) << sphere->note;
 }
 
 // The ring is 3 pixels thick, the box 14.
 TEST_F(HullFit, TheAreaPullsThinHullsLess) {
   const auto area = [](const FitJob& job) {
-    const auto start = PrepareFit(job, Workers(1));
-    EXPECT_TRUE(start.ok()) << start.status().message();
+    const auto start = Ok(PrepareFit(job, Workers(1)));
     return start->config.regularizers.area;
   };
   const Mesh box = Box({0, 0, 0}, {0.9f, 0.6f, 0.7f});
@@ -90,8 +85,7 @@ TEST_F(HullFit, TheAreaPullsThinHullsLess) {
 TEST_F(HullFit, KeepsTheHole) {
   FitJob job = Job("ring");
   ASSERT_TRUE(RunFit(job, Workers(2), {}, stop_).ok());
-  const auto mesh = io::LoadMesh(job.out / "mesh.glb");
-  ASSERT_TRUE(mesh.ok());
+  const auto mesh = Ok(io::LoadMesh(job.out / "mesh.glb"));
   for (const glm::vec3& p : mesh->mesh.positions) EXPECT_GT(std::hypot(p.x, p.z), 0.02f);
 }
 

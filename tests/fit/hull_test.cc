@@ -51,12 +51,9 @@ TEST(MaskDistance, OfNoPlaceIsFarOutside) {
 class Hull : public TempFolderTest {
  protected:
   FitInput Views(const Mesh& mesh, int size = 96) {
-    const Status made = MakeViews(mesh, {.views = 24, .held_out = 0, .size = size},
-                                  folder_ / "views", OutputGuard(true), {}, stop_);
-    EXPECT_TRUE(made.ok()) << made.message();
-    auto input = ReadFitFolder(folder_ / "views", 0);
-    EXPECT_TRUE(input.ok()) << input.status().message();
-    return std::move(*input);
+    Ok(MakeViews(mesh, {.views = 24, .held_out = 0, .size = size}, folder_ / "views",
+                 OutputGuard(true), {}, stop_));
+    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
   }
   static long Euler(const Mesh& mesh) {
     const auto edges = BuildTopology(mesh.faces, mesh.positions.size()).edges.size();
@@ -78,8 +75,7 @@ TEST_F(Hull, ContainsTheObjectAndIsLittleLarger) {
   const Mesh box = Box({0, 0, 0}, {0.9f, 0.5f, 0.6f});
   const FitInput input = Views(box);
   const Workers workers(2);
-  const auto grid = Carve(input, {}, workers);
-  ASSERT_TRUE(grid.ok()) << grid.status().message();
+  const auto grid = Ok(Carve(input, {}, workers));
   int inside = 0, missing = 0, more = 0;
   for (int i = 0; i < grid->size[0]; ++i)
     for (int j = 0; j < grid->size[1]; ++j)
@@ -104,8 +100,7 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
       mesh = Together(mesh, Box({x + side, 0, 0}, {0.08f, 0.44f, 0.1f}));
     }
   }
-  const auto hull = HullMesh(Views(mesh), {}, Workers(2));
-  ASSERT_TRUE(hull.ok()) << hull.status().message();
+  const auto hull = Ok(HullMesh(Views(mesh), {}, Workers(2)));
   EXPECT_EQ(Euler(*hull), 0);
   const auto truth = Voxelize(mesh, 32), found = Voxelize(*hull, 32);
   EXPECT_GT(VoxelIou(*truth, *found), 0.7);
@@ -116,8 +111,7 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
 TEST_F(Hull, HasNoMoreCellsThanImagesResolve) {
   FitInput input = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 16);
   for (Camera& camera : input.cameras) camera.fx *= 100;
-  const auto grid = Carve(input, {.cell_pixels = 0.5}, Workers(1));
-  ASSERT_TRUE(grid.ok()) << grid.status().message();
+  const auto grid = Ok(Carve(input, {.cell_pixels = 0.5}, Workers(1)));
   EXPECT_LT(*std::max_element(grid->size.begin(), grid->size.end()), 2 * 16 / 0.5 + 9);
 }
 
@@ -157,8 +151,7 @@ TEST_F(Hull, ToleratesBadMasks) {
   const auto strict = Carve(input, {}, Workers(1));
   EXPECT_EQ(strict.status().code(), StatusCode::kInvalidArgument);
   ExpectMessage(strict.status(), "--mask-tolerance", "--start sphere");
-  const auto hull = HullMesh(input, {.carve = {.tolerance = 0.1}}, Workers(1));
-  ASSERT_TRUE(hull.ok()) << hull.status().message();
+  const auto hull = Ok(HullMesh(input, {.carve = {.tolerance = 0.1}}, Workers(1)));
   EXPECT_GT(VoxelIou(*Voxelize(*hull, 32), *Voxelize(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 32)),
             0.75);
 }

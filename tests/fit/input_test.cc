@@ -18,8 +18,7 @@ class Input : public TempFolderTest {
   // 8 x 6 pixels of one grey.
   void Image(const std::string& name, int grey) {
     std::filesystem::create_directories((folder_ / name).parent_path());
-    ASSERT_TRUE(
-        io::SavePng(folder_ / name, ImageU8(8, 6, 3, static_cast<std::uint8_t>(grey))).ok());
+    Ok(io::SavePng(folder_ / name, ImageU8(8, 6, 3, static_cast<std::uint8_t>(grey))));
   }
   // The left half is the object.
   void Mask(const std::string& name) {
@@ -41,8 +40,7 @@ class Input : public TempFolderTest {
     Image(folder + "/deep/b.png", 102);
   }
   void ExpectTwoViews(const std::string& folder, bool masked) {
-    const auto input = ReadFitFolder(folder_ / folder, 0);
-    ASSERT_TRUE(input.ok()) << input.status().message();
+    const auto input = Ok(ReadFitFolder(folder_ / folder, 0));
     ASSERT_EQ(input->cameras.size(), 2u);
     const Camera& camera = input->cameras[1];
     EXPECT_EQ(camera.fx, 10);
@@ -123,8 +121,7 @@ TEST_F(Input, TransformsOfWindows) {
   for (const std::string path : {R"(images\\0.png)", R"(.\\images\\0.png)", R"(images\\0)"}) {
     Write("w/transforms.json", R"({"fl_x":10,"frames":[{"file_path":")" + path +
                                    R"(","mask_path":"masks\\0.png",)" + kPose + "}]}");
-    const auto input = ReadFitFolder(folder_ / "w", 0);
-    ASSERT_TRUE(input.ok()) << input.status().message();
+    const auto input = Ok(ReadFitFolder(folder_ / "w", 0));
     EXPECT_TRUE(input->masked);
   }
   Image("w/odd\\name.png", 51);  // a name that has one is found as it is
@@ -232,8 +229,7 @@ TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
   EXPECT_TRUE(ReadFitFolder(folder_ / "m", {.background = Background::kNone}).ok());
   Mask("m/seven.png");
   Write("m/transforms.json", TenFrames(7, R"("mask_path":"seven.png",)"));
-  const auto input = ReadFitFolder(folder_ / "m", 0);
-  ASSERT_TRUE(input.ok()) << input.status().message();
+  const auto input = Ok(ReadFitFolder(folder_ / "m", 0));
   EXPECT_TRUE(input->warnings.empty());
   // Bare pictures, and those of a test file, go the same way.
   std::filesystem::remove(folder_ / "m/transforms.json");
@@ -281,8 +277,7 @@ TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
   Write("b/notes.txt", std::string("mine"));
   EXPECT_TRUE(ReadFitFolder(folder_ / "b", 0)->warnings.empty());
   for (const char* name : {"b/2.heic", "b/3.TIF", "b/4.bmp"}) Write(name, std::string("x"));
-  const auto input = ReadFitFolder(folder_ / "b", 0);
-  ASSERT_TRUE(input.ok()) << input.status().message();
+  const auto input = Ok(ReadFitFolder(folder_ / "b", 0));
   EXPECT_EQ(input->names.size(), 2u);
   ASSERT_EQ(input->warnings.size(), 1u);
   EXPECT_NE(input->warnings[0].find("left out 3 pictures"), std::string::npos);
@@ -299,19 +294,16 @@ TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
 TEST_F(Input, NamesNeedNotBeUtf8) {
   const std::string name = "caf\xe9.png";
   Image("n/images/" + name, 51);
-  const auto bare = ReadFitFolder(folder_ / "n", 0);
-  ASSERT_TRUE(bare.ok()) << bare.status().message();
+  const auto bare = Ok(ReadFitFolder(folder_ / "n", 0));
   EXPECT_EQ(bare->names[0], name);
   Write("n/sparse/0/cameras.txt", std::string("1 PINHOLE 16 12 20 22 9 5\n"));
   Write("n/sparse/0/images.txt", "1 0 1 0 0 0 0 4 1 " + name + "\n\n");
-  const auto colmap = ReadFitFolder(folder_ / "n", 0);
-  ASSERT_TRUE(colmap.ok()) << colmap.status().message();
+  const auto colmap = Ok(ReadFitFolder(folder_ / "n", 0));
   // What a fit writes is JSON, and names the same file.
   const std::string text = WriteTransforms({{"images/" + name, colmap->cameras[0]}}, {8, 6});
   EXPECT_TRUE(IsUtf8(text));
   Write("n/transforms.json", text);
-  const auto frames = ReadTransforms(folder_ / "n/transforms.json");
-  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  const auto frames = Ok(ReadTransforms(folder_ / "n/transforms.json"));
   EXPECT_EQ(frames->at(0).image, folder_ / "n/images" / name);
   EXPECT_TRUE(ReadFitFolder(folder_ / "n", 0).ok());
 }

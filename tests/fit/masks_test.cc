@@ -176,8 +176,7 @@ TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
       {Place::kPaper, 0.95}, {Place::kTable, 0.9}, {Place::kRoom, 0.85}};
   for (const auto& [place, least] : cases) {
     const Capture capture(place);
-    const auto found = FindMasks(capture.input(), workers);
-    ASSERT_TRUE(found.ok()) << found.status().message();
+    const auto found = Ok(FindMasks(capture.input(), workers));
     EXPECT_GT(capture.Iou(found->alpha), least) << static_cast<int>(place);
     for (const double agreement : found->agreement) EXPECT_GT(agreement, 0.8);
   }

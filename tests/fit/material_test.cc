@@ -36,9 +36,8 @@ class LitFit : public TempFolderTest {
       mesh_.colors.emplace_back(x ? 0.8f : 0.4f, y ? 0.7f : 0.35f, x == y ? 0.6f : 0.3f, 1.0f);
     }
     for (glm::vec3& p : mesh_.positions) p.y *= 0.8f;
-    ASSERT_TRUE(MakeViews(mesh_, {.views = 12, .held_out = 0, .size = kSize}, folder_ / "views",
-                          OutputGuard(), {}, stop_)
-                    .ok());
+    Ok(MakeViews(mesh_, {.views = 12, .held_out = 0, .size = kSize}, folder_ / "views",
+                 OutputGuard(), {}, stop_));
     input_ = ReadFitFolder(folder_ / "views", 0).value();
     truth_ = io::LoadMesh(folder_ / "views" / "truth.glb")->mesh;
     Light();
@@ -113,8 +112,7 @@ TEST_F(LitFit, TheRightKindFindsColorsAndLight) {
   std::array<double, 3> errors = {};
   for (const auto kind : {MaterialKind::kUnlit, MaterialKind::kLambert, MaterialKind::kPhong}) {
     const std::string name = "kind" + std::to_string(static_cast<int>(kind));
-    const auto outcome = RunFit(Job(kind, name), Workers(2), {}, stop_);
-    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    Ok(RunFit(Job(kind, name), Workers(2), {}, stop_).status());
     const Path glb = folder_ / name / "mesh.glb";
     errors[static_cast<std::size_t>(kind)] = ColorError(glb);
     const double off = LightError(glb);

@@ -11,6 +11,7 @@
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
 #include "scene/shapes.h"
+#include "support/expect.h"
 
 namespace tilegrad::train::refine_test {
 
@@ -38,20 +39,17 @@ Camera CameraAt(double azimuth) {
 }
 
 TargetImages PictureOf(const Mesh& mesh, const Camera& camera) {
-  const auto planar = LitRenderer().Render(mesh, {&camera, 1}, kSize);
-  EXPECT_TRUE(planar.ok()) << planar.status().message();
+  const auto planar = Ok(LitRenderer().Render(mesh, {&camera, 1}, kSize));
   return TargetsOfPlanar(*planar, kSize);
 }
 
 TEST(FindCameras, FindsWhereAPictureWasTaken) {
   const Workers workers(1);
   const Mesh mesh = Figure({0.3f, 0.2f, 0.4f});
-  auto scene = SceneOfMesh(mesh);
-  ASSERT_TRUE(scene.ok());
+  auto scene = Ok(SceneOfMesh(mesh));
   for (const double azimuth : {15.0, 100.0, 290.0}) {
     const auto found =
-        FindCameras(*scene, PictureOf(mesh, CameraAt(azimuth)), CameraRule(), workers);
-    ASSERT_TRUE(found.ok()) << found.status().message();
+        Ok(FindCameras(*scene, PictureOf(mesh, CameraAt(azimuth)), CameraRule(), workers));
     const FoundCamera& best = found->front();
     // The nearest of the cameras that are tried is 7.5 degrees away at most.
     EXPECT_LT(std::abs(std::remainder(best.azimuth - azimuth, 360.0)), 7.6) << azimuth;
@@ -63,14 +61,12 @@ TEST(FindCameras, FindsWhereAPictureWasTaken) {
 TEST(FindCameras, FollowsAPictureThatIsFramedOtherwise) {
   const Workers workers(1);
   const Mesh mesh = Figure({0.3f, 0.2f, 0.4f});
-  auto scene = SceneOfMesh(mesh);
-  ASSERT_TRUE(scene.ok());
+  auto scene = Ok(SceneOfMesh(mesh));
   Camera camera = CameraAt(45);
   camera.translation[0] += 0.15f;
   camera.translation[1] -= 0.1f;
   camera.translation[2] -= 0.4f;
-  const auto found = FindCameras(*scene, PictureOf(mesh, camera), CameraRule(), workers);
-  ASSERT_TRUE(found.ok());
+  const auto found = Ok(FindCameras(*scene, PictureOf(mesh, camera), CameraRule(), workers));
   EXPECT_GT(found->front().silhouette_iou, 0.9);
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(found->front().camera.translation[i], camera.translation[i], 0.08) << i;
@@ -83,8 +79,7 @@ TEST(RefineMesh, MovesAPredictionOntoItsPicture) {
   Mesh prediction = Figure({0.4f, 0.35f, 0.4f});
   for (glm::vec4& color : prediction.colors) color = glm::vec4(0.5f, 0.5f, 0.5f, 1);
   const TargetImages picture = PictureOf(truth, CameraAt(30));
-  const auto refined = RefineMesh(prediction, picture, {.steps = 150}, workers);
-  ASSERT_TRUE(refined.ok()) << refined.status().message();
+  const auto refined = Ok(RefineMesh(prediction, picture, {.steps = 150}, workers));
   EXPECT_LT(refined->before.silhouette_iou, 0.92);
   EXPECT_GT(refined->after.silhouette_iou, 0.95);
   EXPECT_GT(refined->before.color_l1, 0.15);
@@ -108,10 +103,8 @@ TEST(RefineMesh, TheCameraSeesTheMeshThatIsGiven) {
   const TargetImages picture = PictureOf(truth, CameraAt(200));
   for (const int steps : {0, 60}) {
     const auto refined =
-        RefineMesh(Figure({0.35f, 0.3f, 0.4f}), picture, {.steps = steps}, workers);
-    ASSERT_TRUE(refined.ok());
-    auto scene = SceneOfMesh(refined->mesh);
-    ASSERT_TRUE(scene.ok());
+        Ok(RefineMesh(Figure({0.35f, 0.3f, 0.4f}), picture, {.steps = steps}, workers));
+    auto scene = Ok(SceneOfMesh(refined->mesh));
     scene->cameras = {refined->camera};
     FitRenderer renderer(workers);
     FitRenderer::Job job;
@@ -153,8 +146,7 @@ TEST(RefineMesh, WorkersDoNotChangeTheResult) {
   std::vector<Mesh> meshes;
   for (const int count : {1, 2}) {
     const Workers workers(count);
-    auto refined = RefineMesh(Figure({0.4f, 0.35f, 0.4f}), picture, {.steps = 20}, workers);
-    ASSERT_TRUE(refined.ok());
+    auto refined = Ok(RefineMesh(Figure({0.4f, 0.35f, 0.4f}), picture, {.steps = 20}, workers));
     meshes.push_back(std::move(refined->mesh));
   }
   EXPECT_EQ(meshes[0].positions, meshes[1].positions);
@@ -183,8 +175,7 @@ TEST(RefineMesh, PaintsATextureMap) {
   mesh.textures = {{"map", grey}};
   mesh.materials = {{.name = "map", .base_color_texture = 0}};
   const TargetImages picture = PictureOf(Figure({0.3f, 0.2f, 0.4f}), CameraAt(30));
-  const auto refined = RefineMesh(mesh, picture, {.steps = 200}, workers);
-  ASSERT_TRUE(refined.ok()) << refined.status().message();
+  const auto refined = Ok(RefineMesh(mesh, picture, {.steps = 200}, workers));
   EXPECT_GT(refined->after.silhouette_iou, 0.95);
   EXPECT_GT(refined->before.color_l1, 0.15);
   EXPECT_LT(refined->after.color_l1, 0.06);

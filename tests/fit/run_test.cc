@@ -26,9 +26,8 @@ class Fit : public TempFolderTest {
   void SetUp() override {
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    const Status made = MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views",
-                                  OutputGuard(), {}, stop_);
-    ASSERT_TRUE(made.ok()) << made.message();
+    Ok(MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", OutputGuard(), {},
+                 stop_));
   }
   FitJob Job(const std::string& out) {
     FitJob job;
@@ -47,11 +46,7 @@ class Fit : public TempFolderTest {
     const Workers w(workers);
     return RunFit(job, w, {}, stop_);
   }
-  Bytes Read(const Path& path) {
-    auto bytes = ReadFile(path);
-    EXPECT_TRUE(bytes.ok()) << bytes.status().message();
-    return bytes.ok() ? *bytes : Bytes();
-  }
+  Bytes Read(const Path& path) { return Ok(ReadFile(path)).value(); }
 
   StopFlag stop_ = false;
 };
@@ -72,28 +67,24 @@ void CheckReport(const std::string& page, const Mesh& mesh) {
 }
 
 TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
-  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
-  ASSERT_TRUE(truth.ok());
+  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
   FitJob job = Job("run");
   job.config.steps = 400;
   job.config.template_level = 3;
   job.truth = truth->mesh;
-  const auto outcome = Run(job);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  const auto outcome = Ok(Run(job));
   EXPECT_EQ(outcome->held_out.size(), 2u);
   // The sphere itself: 13.5 dB, 0.78 and 0.69.
   EXPECT_GT(MeanPsnr(outcome->held_out), 16.5);
   EXPECT_GT(MeanIou(outcome->held_out), 0.86);
   EXPECT_GT(outcome->voxel_iou.value_or(0), 0.78);
-  const auto mesh = io::LoadMesh(job.out / "mesh.glb");
-  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  const auto mesh = Ok(io::LoadMesh(job.out / "mesh.glb"));
   EXPECT_EQ(mesh->mesh.textures.size(), 1u);
   for (const char* name : {"report.html", "timelapse.png", "transforms_fitted.json"}) {
     EXPECT_TRUE(std::filesystem::exists(job.out / name)) << name;
   }
   CheckReport(ReadText(job.out / "report.html").value(), mesh->mesh);
-  const auto first = io::LoadMesh(job.out / "timelapse/00000000.glb");
-  ASSERT_TRUE(first.ok()) << first.status().message();
+  const auto first = Ok(io::LoadMesh(job.out / "timelapse/00000000.glb"));
   EXPECT_EQ(first->mesh.textures.size(), 1u);
 }
 
@@ -128,8 +119,7 @@ TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   stop_ = false;
   EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
   job.existing = ExistingRun::kContinue;
-  const auto resumed = Run(job, 7);
-  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  const auto resumed = Ok(Run(job, 7));
   EXPECT_EQ(resumed->first_step, 27);
   EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
 }
@@ -206,8 +196,7 @@ TEST_F(Fit, SettingsInAnotherOrderAreTheSame) {
     newest.info.config = line + "\n" + newest.info.config;
   ASSERT_TRUE(SaveCheckpoint(job.out, newest.info, std::move(newest.tensors)).ok());
   job.existing = ExistingRun::kContinue;
-  const auto continued = Run(job);
-  ASSERT_TRUE(continued.ok()) << continued.status().message();
+  const auto continued = Ok(Run(job));
   EXPECT_EQ(continued->first_step, job.config.steps);
 }
 
@@ -232,8 +221,7 @@ TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
                      OutputGuard(force), {}, stop_);
   };
   ASSERT_TRUE(make(0, folder_ / "views").ok());
-  const auto input = ReadFitFolder(folder_ / "views", 3);
-  ASSERT_TRUE(input.ok()) << input.status().message();
+  const auto input = Ok(ReadFitFolder(folder_ / "views", 3));
   EXPECT_EQ(input->images.width, 16);
   EXPECT_EQ(input->held_out.size(), 1u);
   stop_ = true;  // a call that is stopped leaves no cameras for images of two meshes
@@ -282,22 +270,19 @@ TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
 
 TEST_F(Fit, RefinesCameras) {
   FitJob job = Job("run");
-  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
-  ASSERT_TRUE(truth.ok());
+  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
   job.start = truth->mesh;
   job.config.parameters[Parameter::kCamera] = true;
   job.config.perturb_cameras = 5;
   job.config.steps = 200;
-  const auto outcome = Run(job);
-  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  const auto outcome = Ok(Run(job));
   EXPECT_NEAR(outcome->camera_error_before.value_or(0), 5, 1e-2);
   EXPECT_LT(outcome->camera_error_after.value_or(90), 2.5);
 }
 
 // Every parameter moves, under the light that it needs.
 TEST_F(Fit, EveryParameterCanBeFitted) {
-  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
-  ASSERT_TRUE(truth.ok());
+  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
   const std::pair<Parameter, Lighting> cases[] = {{Parameter::kColors, Lighting::kNone},
                                                   {Parameter::kTexture, Lighting::kLambert},
                                                   {Parameter::kUv, Lighting::kNone},
@@ -318,8 +303,7 @@ TEST_F(Fit, EveryParameterCanBeFitted) {
     if (!sphere) job.start = truth->mesh;
     const auto outcome = Run(job);
     ASSERT_TRUE(outcome.ok()) << NameOf(parameter) << ": " << outcome.status().message();
-    const auto log = ReadText(job.out / "metrics.jsonl");
-    ASSERT_TRUE(log.ok());
+    const auto log = Ok(ReadText(job.out / "metrics.jsonl"));
     const auto color_of = [&](std::size_t line) {
       std::size_t at = 0;
       for (std::size_t i = 0; i < line; ++i) at = log->find('\n', at) + 1;
@@ -405,8 +389,7 @@ TEST_F(Fit, MasksAreWhiteOrCutOut) {
   ASSERT_TRUE(io::SavePng(folder_ / "masks/a.png", ImageU8(8, 8, 3, 99)).ok());
   for (const ImageU8& mask : {opaque, cut, grey}) {
     ASSERT_TRUE(io::SavePng(folder_ / "masks/mask.png", mask).ok());
-    const auto input = ReadFitFolder(folder_ / "masks", 0);
-    ASSERT_TRUE(input.ok()) << input.status().message();
+    const auto input = Ok(ReadFitFolder(folder_ / "masks", 0));
     for (std::size_t p = 0; p < 64; ++p) {
       EXPECT_EQ(input->images.alpha[p], p % 8 < 4 ? 1.0f : 0.0f) << mask.channels << ", " << p;
     }
@@ -422,8 +405,7 @@ TEST_F(Fit, PerturbedCamerasStillSeeTheObject) {
     for (int r = 0; r < 3; ++r) camera.translation[r] -= 50 * camera.rotation[3 * r];
   }
   job.config.perturb_cameras = 10;
-  const auto start = PrepareFit(job, Workers(1));
-  ASSERT_TRUE(start.ok()) << start.status().message();
+  const auto start = Ok(PrepareFit(job, Workers(1)));
   for (std::size_t i = 0; i < job.input.cameras.size(); ++i) {
     const Camera &before = job.input.cameras[i], &after = start->scene.cameras[i];
     for (int r = 0; r < 3; ++r) {
@@ -437,11 +419,9 @@ TEST_F(Fit, TransformsRoundTrip) {
   const Camera camera = OrbitCamera({50, 40, 30}, 20, 30, 2);
   const Path file = folder_ / "cameras.json";
   ASSERT_TRUE(WriteTextAtomic(file, WriteTransforms({{"a.png", camera}}, {40, 30})).ok());
-  const auto frames = ReadTransforms(file);
-  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  const auto frames = Ok(ReadTransforms(file));
   // Half the size: everything in pixels halves.
-  const auto half = CameraOfFrame(frames->at(0), {20, 15});
-  ASSERT_TRUE(half.ok());
+  const auto half = Ok(CameraOfFrame(frames->at(0), {20, 15}));
   EXPECT_NEAR(half->fx, camera.fx / 2, 1e-4);
   EXPECT_NEAR(half->cy, camera.cy / 2, 1e-4);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(half->rotation[i], camera.rotation[i], 1e-5);

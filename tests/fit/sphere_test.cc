@@ -63,8 +63,7 @@ TEST(GuessSphere, FollowsFromParallaxWhereAxesAreParallel) {
 TEST(GuessSphere, SaysThatOneDirectionTellsNoDistance) {
   for (const int count : {1, 5}) {
     const std::vector<Camera> cameras(static_cast<std::size_t>(count), LookingFrom({0, 0.3, 2}));
-    const auto sphere = GuessSphere(InputOfBall(kBall, cameras, kSize));
-    ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+    const auto sphere = Ok(GuessSphere(InputOfBall(kBall, cameras, kSize)));
     EXPECT_NE(sphere->doubt.find("distance is not known"), std::string::npos);
     // The world's origin is nearly where the ball is.
     EXPECT_NEAR(sphere->radius, kBall.radius, 0.1);
@@ -73,16 +72,14 @@ TEST(GuessSphere, SaysThatOneDirectionTellsNoDistance) {
   // Far from the origin the ball has the usual size.
   const Ball far{{40, 0, 0}, 3};
   const auto sphere =
-      GuessSphere(InputOfBall(far, std::vector{LookingFrom({40, 0, 12}, far.centre)}, kSize));
-  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+      Ok(GuessSphere(InputOfBall(far, std::vector{LookingFrom({40, 0, 12}, far.centre)}, kSize)));
   EXPECT_NEAR(sphere->radius, 0.5, 0.05);
 }
 
 TEST(GuessSphere, LiesBetweenViewsFromOppositeSides) {
   const std::vector<Camera> cameras = {LookingFrom(kBall.centre + glm::dvec3(0, 0, 2)),
                                        LookingFrom(kBall.centre - glm::dvec3(0, 0, 2))};
-  const auto sphere = GuessSphere(InputOfBall(kBall, cameras, kSize));
-  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  const auto sphere = Ok(GuessSphere(InputOfBall(kBall, cameras, kSize)));
   EXPECT_LT(glm::distance(glm::dvec3(sphere->centre), kBall.centre), 0.3);
 }
 
@@ -144,8 +141,7 @@ TEST(FitStart, IsASphereWhereAllViewsLookOneWay) {
   job.input = InputOfBall(kBall, Around(10, 18), kSize);
   job.config.template_level = 2;
   job.config.texture_size = 32;
-  const auto start = PrepareFit(job, Workers(2));
-  ASSERT_TRUE(start.ok()) << start.status().message();
+  const auto start = Ok(PrepareFit(job, Workers(2)));
   EXPECT_NE(start->note.find("within 1"), std::string::npos) << start->note;
   EXPECT_NE(start->note.find("depth"), std::string::npos) << start->note;
   for (std::size_t i = 0; i < start->scene.positions.size(); i += 3) {
@@ -160,8 +156,7 @@ TEST(FitStart, IsASphereWhereAllViewsLookOneWay) {
 TEST(GuessSphere, WhatIsSeenLargeNeedsMoreViewsAround) {
   for (const double radius : {0.1, 0.5}) {
     const Ball ball{kBall.centre, radius};
-    const auto sphere = GuessSphere(InputOfBall(ball, Around(10, 45), kSize));
-    ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+    const auto sphere = Ok(GuessSphere(InputOfBall(ball, Around(10, 45), kSize)));
     EXPECT_EQ(sphere->doubt.empty(), radius < 0.2) << sphere->doubt;
   }
 }

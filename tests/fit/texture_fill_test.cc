@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "scene/camera.h"
+#include "support/expect.h"
 
 namespace tilegrad::train::texture_fill_test {
 
@@ -116,8 +117,7 @@ TEST(TextureFill, SeenTexelsAreThoseInPixels) {
   scene.cameras = {camera};
   const Workers workers(1);
   const int view = 0;
-  const auto seen = SeenTexels(scene, {&view, 1}, {64, 64}, workers);
-  ASSERT_TRUE(seen.ok()) << seen.status().message();
+  const auto seen = Ok(SeenTexels(scene, {&view, 1}, {64, 64}, workers));
   for (std::size_t t = 0; t < 64; ++t) {
     const std::size_t column = t % 8, row = t / 8;
     EXPECT_EQ((*seen)[t], column < 4 && row >= 2 && row < 6) << column << " " << row;

@@ -49,9 +49,7 @@ class Undistorted : public TempFolderTest {
                                    R"(,"cx":58,"cy":47,"w":120,"h":90,)" +
                                    R"("frames":[{"file_path":"0.png","transform_matrix":)" +
                                    "[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}");
-    auto input = ReadFitFolder(folder_ / "d", 0);
-    EXPECT_TRUE(input.ok()) << input.status().message();
-    return input.ok() ? std::move(*input) : FitInput();
+    return Ok(ReadFitFolder(folder_ / "d", 0)).value();
   }
 
   // The largest error of colours and how many pixels of the mask are wrong, away from the outline.

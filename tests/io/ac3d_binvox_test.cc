@@ -160,8 +160,7 @@ BinvoxGrid Sample() {
 // The format's own rule: index = x * side^2 + z * side + y.
 TEST(Binvox, YIsFastestThenZ) {
   const std::string header = "#binvox 1\ndim 2 2 2\ntranslate -1 0 2.5\nscale 3\n";
-  const auto grid = DecodeBinvox(FileOf(header, std::string("\0\1\1\1\0\4\1\1\0\1", 10)), "a");
-  ASSERT_TRUE(grid.ok()) << grid.status().message();
+  const auto grid = Ok(DecodeBinvox(FileOf(header, std::string("\0\1\1\1\0\4\1\1\0\1", 10)), "a"));
   // Voxels 1 and 6 of the file: (x, y, z) = (0, 1, 0) and (1, 0, 1).
   EXPECT_EQ(grid->voxels, (std::vector<std::uint8_t>{0, 0, 1, 0, 0, 1, 0, 0}));
   EXPECT_EQ(grid->translate, (std::array<double, 3>{-1, 0, 2.5}));
@@ -170,8 +169,7 @@ TEST(Binvox, YIsFastestThenZ) {
 
 TEST(Binvox, ComesBackAsItWasWritten) {
   const BinvoxGrid grid = Sample();
-  const auto again = DecodeBinvox(EncodeBinvox(grid), "a");
-  ASSERT_TRUE(again.ok()) << again.status().message();
+  const auto again = Ok(DecodeBinvox(EncodeBinvox(grid), "a"));
   EXPECT_EQ(again->voxels, grid.voxels);
   EXPECT_EQ(again->translate, grid.translate);
   EXPECT_EQ(again->scale, grid.scale);

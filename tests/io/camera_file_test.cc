@@ -246,8 +246,7 @@ TEST_F(CameraFiles, OfSeveralColmapModelsTheLargestIsRead) {
   }
   std::string told;
   const auto got =
-      io::LoadCameras(folder_, {.warn = [&](const std::string& note) { told = note; }});
-  ASSERT_TRUE(got.ok()) << got.status().message();
+      Ok(io::LoadCameras(folder_, {.warn = [&](const std::string& note) { told = note; }}));
   EXPECT_EQ(got->size(), 2u);
   ExpectIn(told, "sparse/1: taken for its 2 images", "0 (1), 10 (1)");
   // What a broken file claims to have, but has no room for, does not count.

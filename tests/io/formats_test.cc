@@ -241,10 +241,9 @@ TEST_F(FormatsTest, NpzRoundTrip) {
   const std::vector<float> f = {1.5f, -2, 3};
   const std::vector<std::uint8_t> u(24, 7);
   const std::vector<std::int64_t> empty;
-  ASSERT_TRUE(SaveNpz(folder_ / "a.npz", {{"f", MakeNpy<float>({3}, f)},
-                                          {"u", MakeNpy<std::uint8_t>({2, 3, 4}, u)},
-                                          {"e", MakeNpy<std::int64_t>({0, 5}, empty)}})
-                  .ok());
+  Ok(SaveNpz(folder_ / "a.npz", {{"f", MakeNpy<float>({3}, f)},
+                                 {"u", MakeNpy<std::uint8_t>({2, 3, 4}, u)},
+                                 {"e", MakeNpy<std::int64_t>({0, 5}, empty)}}));
   const auto back = Ok(LoadNpz(folder_ / "a.npz"));
   EXPECT_EQ(back->at("f").As<float>().value(), f);
   EXPECT_EQ(back->at("u").shape, (std::vector<std::size_t>{2, 3, 4}));
@@ -389,9 +388,8 @@ TEST_F(FormatsTest, FurnitureCatalog) {
   const std::string text =
       "license=CC0\nid#1=a\nname#1=Chair\nmodel#1=/a/a.obj\nwidth#1=50\ndepth#1=40\nheight#1=90\n"
       "modelRotation#1=0 0 1 -1 0 0 0 -1 0\nid#2=b\nname#2=No model\n";
-  ASSERT_TRUE(WriteZip(folder_ / "a.sh3f",
-                       {{"PluginFurnitureCatalog.properties", Bytes(text.begin(), text.end())}})
-                  .ok());
+  Ok(WriteZip(folder_ / "a.sh3f",
+              {{"PluginFurnitureCatalog.properties", Bytes(text.begin(), text.end())}}));
   const auto catalog = Ok(ReadFurnitureCatalog(**OpenZip(folder_ / "a.sh3f")));
   ASSERT_EQ(catalog->entries.size(), 1u);
   EXPECT_EQ(catalog->entries[0].model, "a/a.obj");

@@ -47,15 +47,14 @@ class GuardedProcessTest : public testing::Test {
 
 TEST_F(GuardedProcessTest, BytesOfAnySizeArrive) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{50} << 20}) {
-    const auto got = Guarded([&](AskParent) { return Bytes(size, 7); });
-    ASSERT_TRUE(got.ok()) << got.status().message();
+    const auto got = Ok(Guarded([&](AskParent) { return Bytes(size, 7); }));
     EXPECT_EQ(*got, Bytes(size, 7));
   }
 }
 
 TEST_F(GuardedProcessTest, QuestionsAreAnsweredByTheParent) {
   int asked = 0;
-  const auto got = RunGuarded(
+  const auto got = Ok(RunGuarded(
       [](AskParent ask) {
         const auto large = ask("large"), none = ask("none");
         if (none || ask("") || ask(std::string(5000, 'x'))) std::abort();
@@ -65,8 +64,7 @@ TEST_F(GuardedProcessTest, QuestionsAreAnsweredByTheParent) {
         ++asked;
         return question == "large" ? std::optional(Bytes(3'000'000, 9)) : std::nullopt;
       },
-      {});
-  ASSERT_TRUE(got.ok()) << got.status().message();
+      {}));
   EXPECT_EQ(*got, Bytes(3'000'000, 9));
   EXPECT_EQ(asked, 2);
 }
@@ -221,8 +219,7 @@ TEST_F(GuardedProcessTest, SignalHandlersStayInTheParent) {
     return {};
   });
   ExpectMessage(got.status(), "crashed", "Terminated");
-  const auto group = Guarded([](AskParent) { return Bytes(1, ::getpgrp() == ::getpid()); });
-  ASSERT_TRUE(group.ok());
+  const auto group = Ok(Guarded([](AskParent) { return Bytes(1, ::getpgrp() == ::getpid()); }));
   EXPECT_EQ((*group)[0], 1);
   std::raise(SIGTERM);
   EXPECT_EQ(handled, 1);
@@ -255,8 +252,7 @@ TEST_F(GuardedProcessTest, NothingIsPrintedTwice) {
 
 TEST_F(GuardedProcessTest, DescriptorsOfTheParentAreClosed) {
   const auto got =
-      Guarded([](AskParent) { return Bytes(static_cast<std::size_t>(OpenDescriptors()), 0); });
-  ASSERT_TRUE(got.ok());
+      Ok(Guarded([](AskParent) { return Bytes(static_cast<std::size_t>(OpenDescriptors()), 0); }));
   EXPECT_LE(got->size(), 7u);  // three streams, socket, memory file, those of the listing itself
 }
 

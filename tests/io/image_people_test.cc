@@ -73,8 +73,7 @@ TEST_F(Orientation, AllEight) {
   for (int o = 1; o <= 8; ++o) {
     for (const bool big : {false, true}) {
       EXPECT_EQ(Letters(LetterPng(Tiff(big, o))), expected[o]) << o;
-      const auto stored = LoadStoredImage(Write("a.png", LetterPng(Tiff(big, o))));
-      ASSERT_TRUE(stored.ok()) << stored.status().message();
+      const auto stored = Ok(LoadStoredImage(Write("a.png", LetterPng(Tiff(big, o)))));
       EXPECT_EQ(LettersOf(stored->image), "abc/def");
       EXPECT_EQ(stored->orientation, o);
     }

@@ -104,8 +104,7 @@ class Mat : public TempFolderTest {
 
   void ExpectBird(const Path& path) const {
     const auto mat = Ok(LoadMat(path));
-    const auto images = MatPlace::Variable(*mat, "images");
-    ASSERT_TRUE(images.ok());
+    const auto images = Ok(MatPlace::Variable(*mat, "images"));
     EXPECT_EQ(images->Field(0, "rel_path")->Text().value(), "a/b.jpg");
     EXPECT_EQ(images->Field(0, "parts")->Numbers(6).value(),
               (std::vector<double>{10, 20, 1, 30, 40, 0}));

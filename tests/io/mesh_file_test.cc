@@ -154,13 +154,11 @@ TEST_F(MeshFileTest, NonFiniteEmptyAndUnknown) {
 
 TEST_F(MeshFileTest, ReadsFromAZipIgnoringCase) {
   const auto bytes = [](const std::string& text) { return Bytes(text.begin(), text.end()); };
-  ASSERT_TRUE(WriteZip(folder_ / "a.zip",
-                       {{"Chair/Chair.OBJ", bytes("mtllib CHAIR.mtl\nusemtl m\n" + kTriangleObj)},
-                        {"Chair/chair.mtl", bytes("newmtl m\nKd 0 1 0\n")}})
-                  .ok());
+  Ok(WriteZip(folder_ / "a.zip",
+              {{"Chair/Chair.OBJ", bytes("mtllib CHAIR.mtl\nusemtl m\n" + kTriangleObj)},
+               {"Chair/chair.mtl", bytes("newmtl m\nKd 0 1 0\n")}}));
   const auto zip = Ok(OpenZip(folder_ / "a.zip"));
-  const auto loaded = LoadMesh(**zip, "chair/chair.obj");
-  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const auto loaded = Ok(LoadMesh(**zip, "chair/chair.obj"));
   EXPECT_EQ(loaded->mesh.materials[loaded->mesh.face_materials[0]].base_color.g, 1);
 }
 
@@ -177,8 +175,7 @@ TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".sh3f") continue;
     const auto zip = Ok(OpenZip(entry.path()));
-    const auto catalog = ReadFurnitureCatalog(**zip);
-    ASSERT_TRUE(catalog.ok()) << catalog.status().message();
+    const auto catalog = Ok(ReadFurnitureCatalog(**zip));
     for (const FurnitureEntry& item : catalog->entries) {
       const auto loaded = LoadMesh(**zip, item.model);
       ++models;

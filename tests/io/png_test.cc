@@ -90,8 +90,7 @@ void ExpectAsStb(const Bytes& png) {
                             0),
       &stbi_image_free);
   ASSERT_NE(pixels, nullptr) << stbi_failure_reason();
-  const auto image = DecodeImage(png, "a.png");
-  ASSERT_TRUE(image.ok()) << image.status().message();
+  const auto image = Ok(DecodeImage(png, "a.png"));
   EXPECT_EQ(image->width, width);
   EXPECT_EQ(image->height, height);
   ASSERT_EQ(image->channels, channels);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "nn/nn.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn {
 
@@ -37,8 +38,7 @@ class Game {
                      Mean(Abs(painted - real)) + GradientPenalty(wide_critic_, one) +
                      Mean(Abs(wide_net_.Forward(one, Mode::kTrain) - one));
     const auto gradients = Grad(loss, adam_.parameters());
-    const Status status = adam_.Step(gradients);
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(adam_.Step(gradients));
     return loss.item();
   }
 

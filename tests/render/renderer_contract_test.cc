@@ -12,6 +12,7 @@
 #include "render/trial.h"
 #include "render/validate.h"
 #include "scene/camera.h"
+#include "support/expect.h"
 
 namespace tilegrad::renderer_contract_test {
 
@@ -70,8 +71,7 @@ struct Session {
 
   explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
   PlanReport Render(const Outputs& request) {
-    const Status status = renderer.Render({&view, 1}, options, request, &frame);
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(renderer.Render({&view, 1}, options, request, &frame));
     return Explain(renderer);
   }
   // With the cotangents and gradients that are left after `choose`.
@@ -85,8 +85,7 @@ struct Session {
     SceneGradients d_scene;
     chosen = &every_gradient;
     choose(d_frame, d_scene);
-    const Status status = renderer.Backward(frame, d_frame, {&d_scene, 1});
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(renderer.Backward(frame, d_frame, {&d_scene, 1}));
     return Explain(renderer);
   }
   const SceneGradients* chosen = nullptr;  // all gradients there are, to choose from
@@ -276,8 +275,7 @@ class Overflow : public testing::Test {
 TEST_F(Overflow, LargeNumbersWhoseProductIsAFloatAreDrawn) {
   auto scene = Triangle(0x1p60f);
   scene.surfaces[0].base_color = {0x1p60f, 1, 1};
-  const Status status = Render(scene);
-  ASSERT_TRUE(status.ok()) << status.message();
+  Ok(Render(scene));
   int seen = 0;
   for (std::size_t i = 0; i < test::kTrialPixels; ++i) {
     if (frame_.images().face_ids[i] < 0) continue;

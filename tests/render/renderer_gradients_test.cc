@@ -11,6 +11,7 @@
 #include "proof/complex_step.h"
 #include "proof/owned_scene.h"
 #include "render/trial.h"
+#include "support/expect.h"
 
 namespace tilegrad::renderer_gradients_test {
 
@@ -80,9 +81,8 @@ struct Rendered {
 Rendered RenderBoth(Trial& trial) {
   Rendered out;
   const Workers workers(2);
-  const Status status = RenderOwned(trial.scene, trial.options, trial.images,
-                                    trial.d_frame.Cast<float>(), workers, &out.got);
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(RenderOwned(trial.scene, trial.options, trial.images, trial.d_frame.Cast<float>(), workers,
+                 &out.got));
   auto scene64 = OwnedCast<double>(trial.scene);
   out.truth = RenderOwnedRef<double>(scene64, trial.options, trial.images, trial.d_frame,
                                      out.got.frame.face_ids);

@@ -14,6 +14,7 @@
 #include "proof/owned_scene.h"
 #include "render/trial.h"
 #include "scene/camera.h"
+#include "support/expect.h"
 
 namespace tilegrad::renderer_test {
 
@@ -47,8 +48,7 @@ RenderOptions Options() {
 Frame Draw(const Scene& scene, const Outputs& request = {}) {
   Renderer renderer{{.threads = 1}};
   Frame frame;
-  const Status status = renderer.Render({&scene, 1}, Options(), request, &frame);
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(renderer.Render({&scene, 1}, Options(), request, &frame));
   return frame;
 }
 
@@ -134,8 +134,7 @@ TEST(Renderer, DirectionsThatAreGivenMayHaveAnyLength) {
     SceneGradients d_scene;
     d_scene.normals = d_n;
     d_scene.light_directions = d_l;
-    const Status status = renderer.Backward(frame, d_frame, {&d_scene, 1});
-    ASSERT_TRUE(status.ok()) << status.message();
+    Ok(renderer.Backward(frame, d_frame, {&d_scene, 1}));
     for (float& x : d_n) x = std::ldexp(x, power);
     for (float& x : d_l) x = std::ldexp(x, -power);
     if (power == 0) {
@@ -204,9 +203,7 @@ OwnedRendering<float> RenderAll(OwnedScene<float>& scene) {
   const Workers workers(1);
   Rng rng(9, 9);
   const OwnedCotangents<float> d_frame(test::kTrialPixels, 0, &rng);
-  const Status status =
-      RenderOwned(scene, test::TrialOptions(), test::EveryImage(), d_frame, workers, &out);
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(RenderOwned(scene, test::TrialOptions(), test::EveryImage(), d_frame, workers, &out));
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "scene/camera.h"
 #include "scene/shapes.h"
 #include "support/allocation_count.h"
+#include "support/expect.h"
 
 namespace tilegrad::rivals::renderer_test {
 
@@ -78,11 +79,8 @@ Images<T> Render(const Scene<T>& scene, const Options& options, const std::vecto
                  const Workers& workers) {
   Images<T> out(scene);
   RendererT<T> renderer(workers);
-  const Status drawn = renderer.Render(scene.Batch(), options, out.View());
-  EXPECT_TRUE(drawn.ok()) << drawn.message();
-  const Status back =
-      renderer.Backward(scene.Batch(), options, PushesOf(scene, d), out.Gradients());
-  EXPECT_TRUE(back.ok()) << back.message();
+  Ok(renderer.Render(scene.Batch(), options, out.View()));
+  Ok(renderer.Backward(scene.Batch(), options, PushesOf(scene, d), out.Gradients()));
   return out;
 }
 

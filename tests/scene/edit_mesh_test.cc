@@ -17,11 +17,7 @@
 
 namespace tilegrad::edit_mesh_test {
 
-EditMesh Make(const Mesh& mesh) {
-  auto made = EditMesh::Make(mesh.positions, mesh.faces);
-  EXPECT_TRUE(made.ok()) << made.status().message();
-  return std::move(*made);
-}
+EditMesh Make(const Mesh& mesh) { return Ok(EditMesh::Make(mesh.positions, mesh.faces)).value(); }
 
 bool IsManifold(const EditMesh& mesh) {
   const Mesh packed = mesh.Pack();

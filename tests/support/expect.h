@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -15,14 +14,23 @@
 
 namespace tilegrad {
 
+// Ends the test at the caller's line; the failure has the message and the traces around it.
+[[noreturn]] inline void EndTest(const std::string& message, const char* file, int line) {
+  ADD_FAILURE_AT(file, line) << message;
+  using testing::TestPartResult;
+  throw testing::AssertionException(
+      TestPartResult(TestPartResult::kFatalFailure, file, line, message.c_str()));
+}
+
 // The result; an error ends the test with its message.
 template <class T>
-Result<T> Ok(Result<T> result) {
-  if (!result.ok()) throw std::runtime_error(result.status().message());
+Result<T> Ok(Result<T> result, const char* file = __builtin_FILE(), int line = __builtin_LINE()) {
+  if (!result.ok()) EndTest(result.status().message(), file, line);
   return result;
 }
-inline void Ok(const Status& status) {
-  if (!status.ok()) throw std::runtime_error(status.message());
+inline void Ok(const Status& status, const char* file = __builtin_FILE(),
+               int line = __builtin_LINE()) {
+  if (!status.ok()) EndTest(status.message(), file, line);
 }
 
 // The text has all of these.

@@ -12,6 +12,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
+#include "support/expect.h"
 #include "train/gradient_check.h"
 #include "train/tasks/single_image/step.h"
 
@@ -279,8 +280,7 @@ void ExpectSameBitsAndLearning(const std::string& rule, bool color = false) {
     config.render.rule = rule;
     TrainStep step(context, config, p.store.size);
     for (std::int64_t s = 0; s < 60; ++s) {
-      const auto values = RunStep(step, GatherBatch(context, p.store, p.samples), s);
-      ASSERT_TRUE(values.ok()) << values.status().message();
+      const auto values = Ok(RunStep(step, GatherBatch(context, p.store, p.samples), s));
       (s == 0 ? first : last) = values->loss;
     }
     std::vector<float> weights;

@@ -195,9 +195,8 @@ std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {
 TEST_F(RunTest, NewestWholeCheckpointIsTaken) {
   EXPECT_EQ(LoadNewestCheckpoint(context_, folder_).status().code(), StatusCode::kNotFound);
   for (const std::int64_t step : {10, 20, 30}) {
-    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "name = \"x\"", 1.5},
-                               SomeTensors(context_, static_cast<double>(step)))
-                    .ok());
+    Ok(SaveCheckpoint(folder_, {step, 64, "name = \"x\"", 1.5},
+                      SomeTensors(context_, static_cast<double>(step))));
   }
   const auto files = ListCheckpoints(folder_);
   ASSERT_EQ(files.size(), 3u);
@@ -214,8 +213,7 @@ TEST_F(RunTest, NewestWholeCheckpointIsTaken) {
 TEST_F(RunTest, OnlyBrokenCheckpointsAreAnError) {
   Write("checkpoints/step_00000010.safetensors", "garbage");
   ExpectMessage(LoadNewestCheckpoint(context_, folder_).status(), "step_00000010");
-  ASSERT_TRUE(
-      nn::WriteSafetensors(folder_ / "other.safetensors", {SomeTensors(context_, 1), {}}).ok());
+  Ok(nn::WriteSafetensors(folder_ / "other.safetensors", {SomeTensors(context_, 1), {}}));
   ExpectMessage(LoadCheckpoint(context_, folder_ / "other.safetensors").status(),
                 "not a checkpoint");
 }

@@ -13,8 +13,7 @@ class StepProfileTest : public TempFolderTest {
  protected:
   StepProfileTest() {
     Ok(WriteNoiseDataset(folder_ / "data"));
-    auto config = ParseConfig(kTinyConfig, "tiny");
-    EXPECT_TRUE(config.ok()) << config.status().message();
+    auto config = Ok(ParseConfig(kTinyConfig, "tiny"));
     job_.config = std::move(config).value();
     job_.data = folder_ / "data";
     job_.config.schedule.steps = 4;

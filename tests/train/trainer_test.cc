@@ -44,8 +44,7 @@ class TrainerTest : public TempFolderTest {
  protected:
   TrainerTest() : workers_(1), context_(workers_) {
     Ok(WriteNoiseDataset(folder_ / "data"));
-    auto config = ParseConfig(kTinyConfig, "tiny");
-    EXPECT_TRUE(config.ok()) << config.status().message();
+    auto config = Ok(ParseConfig(kTinyConfig, "tiny"));
     job_ = {.config = std::move(config).value(), .data = folder_ / "data", .run = folder_ / "run"};
     job_.config.schedule.steps = 12;
   }

@@ -86,8 +86,7 @@ Images<T> Render(const ProjectedFacesOwner<T>& faces, const Case& c, const Worke
                 std::vector<T>(pixels)};
   Ok(RasterizeProjected<T>(faces.View(), c.raster, faces.features, faces.channels, workers, out.ids,
                            out.features));
-  const auto bound = ProjectedSoftMask<T>(faces.View(), c.mask, out.ids, workers, out.mask);
-  EXPECT_TRUE(bound.ok()) << bound.status().message();
+  const auto bound = Ok(ProjectedSoftMask<T>(faces.View(), c.mask, out.ids, workers, out.mask));
   out.bound = bound.value();
   return out;
 }

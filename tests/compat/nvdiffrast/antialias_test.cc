@@ -28,8 +28,7 @@ AntialiasInput<T> InputOf(const Scene<T>& scene, const EdgeRings& rings, const N
 template <class T>
 Numbers<T> Antialiased(const AntialiasInput<T>& input, const Workers& workers = Workers(1)) {
   Numbers<T> out(input.color.size(), T(-7));
-  const Status status = Antialias<T>(input, workers, out);
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(Antialias<T>(input, workers, out));
   return out;
 }
 

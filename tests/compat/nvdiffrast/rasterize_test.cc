@@ -205,8 +205,7 @@ TEST(Rasterize, SameBitsForEveryTargetAndNumberOfWorkers) {
       EXPECT_EQ(out.rast, expected.rast) << target << " " << count;
       EXPECT_EQ(out.rast_db, expected.rast_db) << target << " " << count;
       Numbers<float> d(narrow.positions.size());
-      ASSERT_TRUE(
-          RasterizeBackward<float>(narrow.input(), {out.rast, d_rast, d_db}, workers, d).ok());
+      Ok(RasterizeBackward<float>(narrow.input(), {out.rast, d_rast, d_db}, workers, d));
       if (!gradient.has_value()) gradient = d;
       EXPECT_EQ(d, *gradient) << target << " " << count;
     }
@@ -281,8 +280,7 @@ TEST(RasterizeBackward, StaysFiniteWhereWIsTiny) {
   const auto out = Rasterize(scene);
   const Numbers<float> ones(out.rast.size(), 100.0f);
   Numbers<float> gradient(scene.positions.size());
-  ASSERT_TRUE(
-      RasterizeBackward<float>(scene.input(), {out.rast, ones, ones}, Workers(1), gradient).ok());
+  Ok(RasterizeBackward<float>(scene.input(), {out.rast, ones, ones}, Workers(1), gradient));
   float largest = 0;
   for (const float d : gradient) {
     ASSERT_TRUE(std::isfinite(d));
@@ -297,8 +295,7 @@ TEST(RasterizeBackward, EdgeOnFacesPullNothing) {
   scene.faces = {0, 1, 2};
   const Numbers<double> rast(4 * scene.grid().pixels(), 1.0);  // says that the face is everywhere
   Numbers<double> gradient(scene.positions.size(), 1.0);
-  ASSERT_TRUE(
-      RasterizeBackward<double>(scene.input(), {rast, rast, rast}, Workers(1), gradient).ok());
+  Ok(RasterizeBackward<double>(scene.input(), {rast, rast, rast}, Workers(1), gradient));
   for (const double d : gradient) EXPECT_EQ(d, 0);
 }
 

@@ -42,8 +42,7 @@ TEST(PosePictures, KeepTheShorterSide) {
     strip.alpha.assign(strip.pixels(), 1.0f);
     strip.color.assign(3 * strip.pixels(), 0.5f);
     const Camera lens = OrbitCamera({50, width, height}, 0, 0, 2);
-    const auto pictures = PreparePictures(strip, std::span(&lens, 1), 16);
-    ASSERT_TRUE(pictures.ok()) << pictures.status().message();
+    const auto pictures = Ok(PreparePictures(strip, std::span(&lens, 1), 16));
     EXPECT_EQ(std::min(pictures->images.width, pictures->images.height), 1);
   }
 }
@@ -51,13 +50,9 @@ TEST(PosePictures, KeepTheShorterSide) {
 class Poses : public TempFolderTest {
  protected:
   FitInput Input(int views) {
-    const Status made = MakeViews(
-        Thing(), {.views = views, .held_out = 2, .size = 64, .lowest = -20, .highest = 60},
-        folder_ / "views", OutputGuard(true), {}, stop_);
-    EXPECT_TRUE(made.ok()) << made.message();
-    auto input = ReadFitFolder(folder_ / "views", 0);
-    EXPECT_TRUE(input.ok()) << input.status().message();
-    return input.ok() ? *input : FitInput();
+    Ok(MakeViews(Thing(), {.views = views, .held_out = 2, .size = 64, .lowest = -20, .highest = 60},
+                 folder_ / "views", OutputGuard(true), {}, stop_));
+    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
   }
   InputPosesJob Job() const {
     InputPosesJob job;
@@ -97,8 +92,7 @@ TEST_F(Poses, AreFoundFromMasksAndColours) {
   }
   InputPosesJob job = Job();
   job.options.starts = 1;
-  const Status found = Find(job, &input);
-  ASSERT_TRUE(found.ok()) << found.message();
+  Ok(Find(job, &input));
   input.given_cameras = given;
   EXPECT_LT(MeanError(input), 3);
   for (const Camera& camera : input.cameras) EXPECT_EQ(camera.fx, given[0].fx);

@@ -107,8 +107,7 @@ TEST(ExtremesLong, FaceIdsBeyondWhatFloatsCount) {
   std::vector<float> d_positions(scene.positions.size()), d_rows(scene.vertex_count());
   SceneGradients d{.positions = d_positions};
   d.attributes = d_rows;
-  ASSERT_TRUE(
-      renderer.Backward(frame, {.alpha = d_alpha, .attributes = d_attributes}, {&d, 1}).ok());
+  Ok(renderer.Backward(frame, {.alpha = d_alpha, .attributes = d_attributes}, {&d, 1}));
   EXPECT_EQ(d_rows[0], 0);
   EXPECT_NEAR(d_rows[1] + d_rows[2] + d_rows[3], static_cast<double>(covered), 1e-4);
 }

@@ -12,6 +12,7 @@
 #include "render/pipeline/test_scenes.h"
 #include "render/reference.h"
 #include "render/renderer.h"
+#include "support/expect.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad::topologies_test {
@@ -181,8 +182,7 @@ struct Drawn {
 
   Drawn(TestScene<float> scene, const RenderOptions& options) : mesh(std::move(scene)) {
     const Scene view = mesh.View();
-    const Status status = Renderer({.threads = 2}).Render({&view, 1}, options, kImages, &frame);
-    EXPECT_TRUE(status.ok()) << status.message();
+    Ok(Renderer({.threads = 2}).Render({&view, 1}, options, kImages, &frame));
   }
   std::span<const float> alpha() const { return frame.images().alpha; }
 };
@@ -195,8 +195,7 @@ struct Gradients {
 Gradients BackwardOf(const Drawn& drawn, const FrameGradients& d_frame, int threads) {
   Gradients out{std::vector<float>(drawn.mesh.positions.size()), {}};
   const SceneGradients d{.positions = out.positions, .camera = &out.camera};
-  const Status status = Renderer({.threads = threads}).Backward(drawn.frame, d_frame, {&d, 1});
-  EXPECT_TRUE(status.ok()) << status.message();
+  Ok(Renderer({.threads = threads}).Backward(drawn.frame, d_frame, {&d, 1}));
   return out;
 }
 

@@ -203,9 +203,8 @@ TEST_F(IndexTest, CamerasThatCannotBe) {
     const auto at = before.find("\"" + key + "\": ") + key.size() + 4;
     ASSERT_NE(before.find(key), std::string::npos);
     std::string text = before;
-    ASSERT_TRUE(WriteTextAtomic(folder_ / "dataset.json",
-                                text.replace(at, text.find_first_of(",\n", at) - at, value))
-                    .ok());
+    Ok(WriteTextAtomic(folder_ / "dataset.json",
+                       text.replace(at, text.find_first_of(",\n", at) - at, value)));
     ExpectOpenError({"dataset.json", "\"camera\"", "\"" + key + "\" is " + value});
   };
   for (const char* fov : {"-1", "0", "180", "1e+300"}) expect("fov_y", fov);
@@ -258,8 +257,7 @@ TEST_F(IndexTest, NoModels) {
 }
 
 TEST_F(IndexTest, ModelFilesThatAreNotWhatTheyShould) {
-  const auto dataset = Dataset::Open(folder_);
-  ASSERT_TRUE(dataset.ok());
+  const auto dataset = Ok(Dataset::Open(folder_));
   const Path file = dataset->ModelPath(0);
   const auto arrays = io::LoadNpz(file).value();
   const auto expect_error = [&](io::NpzArrays changed, const std::string& name) {

@@ -169,8 +169,7 @@ using WrittenEvaluation = TempFolderTest;
 
 TEST_F(WrittenEvaluation, NamesNeedNotBeUtf8) {
   ASSERT_TRUE(WriteEvaluation(folder_, Named("caf\xe9")).ok());
-  const auto back = ReadEvaluation(folder_);
-  ASSERT_TRUE(back.ok()) << back.status().message();
+  const auto back = Ok(ReadEvaluation(folder_));
   EXPECT_EQ((*back)->classes[0], "caf\xe9");
   EXPECT_NE(ReadText(folder_ / "eval.md").value().find("caf\\\\xe9"), std::string::npos);
 }
@@ -273,8 +272,7 @@ TEST_F(WrittenErrors, ComeBackAndAreShown) {
   for (const char* part : {"60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50"})
     EXPECT_NE(table.find(part), std::string::npos) << part << "\n" << table;
   ASSERT_TRUE(WriteEvaluation(folder_, evaluation).ok());
-  const auto back = ReadEvaluation(folder_);
-  ASSERT_TRUE(back.ok()) << back.status().message();
+  const auto back = Ok(ReadEvaluation(folder_));
   EXPECT_EQ((*back)->rows[1].error->light_angle, 2);
   EXPECT_EQ((*back)->models[0].shape, "one");
   EXPECT_EQ(EvaluationJson(**back)["rows"][1]["light_of_constant"], 0.5);
@@ -324,8 +322,7 @@ class EvaluateShapesTest : public TempFolderTest {
 
 TEST_F(EvaluateShapesTest, LiveriesAreAveragedFirst) {
   for (const char* shape : {"", "one"}) {
-    const auto scored = Score(WithShape(shape));
-    ASSERT_TRUE(scored.ok()) << scored.status().message();
+    const auto scored = Ok(Score(WithShape(shape)));
     const EvaluationRow& row = scored->rows.back();
     ASSERT_EQ(scored->models.size(), 4 * row.classes.size());
     for (std::size_t c = 0; c < row.classes.size(); ++c) {

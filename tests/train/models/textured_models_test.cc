@@ -10,6 +10,7 @@
 #include "nn/nn.h"
 #include "scene/camera.h"
 #include "scene/shapes.h"
+#include "support/expect.h"
 #include "train/models/picture_lookup.h"
 #include "train/models/texture_network.h"
 #include "train/tasks/textured_image/object_pictures.h"
@@ -160,8 +161,7 @@ class Lookup : public testing::Test {
   }
   void Draw(const Mesh& mesh, const LightConfig& light, Appearance appearance) {
     ObjectPictures pictures(light, kSize, 2);
-    const auto picture = pictures.Draw(mesh, view_, appearance);
-    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    const auto picture = Ok(pictures.Draw(mesh, view_, appearance));
     image_ = context_.From({1, 4, kSize, kSize}, std::span<const float>(*picture));
     const auto vertices = static_cast<std::int64_t>(ball_.positions.size());
     positions_ =

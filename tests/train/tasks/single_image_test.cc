@@ -172,8 +172,7 @@ TEST(Oracle, FindsAShapeAndItsColor) {
   const DatasetInfo info = SmallInfo();
   const ModelData data = PicturesOf(Ellipsoid(), info);
   const FitFunction fit = FitTemplates(Config(), info, 150, workers);
-  const Result<Mesh> found = fit(data);
-  ASSERT_TRUE(found.ok()) << found.status().message();
+  const Result<Mesh> found = Ok(fit(data));
   const Shape truth = ShapeOf(Ellipsoid(), 1).value(), fitted = ShapeOf(*found, 1).value();
   EXPECT_GT(Compare(fitted, truth).iou, 0.6);
   EXPECT_LT(Compare(ShapeOf(Icosphere(2, 0.45f), 1).value(), truth).iou, 0.4);

@@ -35,20 +35,17 @@ class BuildTest : public TempFolderTest {
 
 TEST_F(BuildTest, ProceduralSetEndToEnd) {
   const auto source = ProceduralSource(4, 1);
-  const auto summary = Build(*source, folder_ / "set", 2);
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto summary = Ok(Build(*source, folder_ / "set", 2));
   EXPECT_EQ(summary->models.size(), 20u);
   EXPECT_TRUE(summary->rejected.empty());
 
-  const auto dataset = Dataset::Open(folder_ / "set");
-  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  const auto dataset = Ok(Dataset::Open(folder_ / "set"));
   EXPECT_EQ(dataset->info().classes,
             (std::vector<std::string>{"car", "chair", "lamp", "plane", "table"}));
   EXPECT_EQ(dataset->Select(Split::kTest).size(), 5u);
   EXPECT_EQ(dataset->Select(Split::kTrain).size(), 15u);
   for (std::size_t i = 0; i < dataset->models().size(); ++i) {
-    const auto data = dataset->Load(static_cast<int>(i));
-    ASSERT_TRUE(data.ok()) << data.status().message();
+    const auto data = Ok(dataset->Load(static_cast<int>(i)));
     EXPECT_EQ(data->images.size(), 3u * 4 * 16 * 16);
     EXPECT_EQ(data->images, dataset->LoadImages(static_cast<int>(i)).value());
     EXPECT_GT(std::count(data->occupancy.begin(), data->occupancy.end(), 1), 32);
@@ -60,8 +57,7 @@ TEST_F(BuildTest, ProceduralSetEndToEnd) {
     EXPECT_NEAR(reach, 0.45f, 1e-6f);  // one rounding of the scale and one of the shift
     EXPECT_LE(data->mesh.faces.size(), static_cast<std::size_t>(kTruthFaces));
   }
-  const auto sheet = io::LoadImage(folder_ / "set" / "contact_sheet.png");
-  ASSERT_TRUE(sheet.ok());
+  const auto sheet = Ok(io::LoadImage(folder_ / "set" / "contact_sheet.png"));
   EXPECT_GT(sheet->width, 6 * 3 * 16);
 }
 
@@ -107,8 +103,7 @@ TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
   EXPECT_NE(incomplete.status().message().find("not complete"), std::string::npos);
 
   stop_ = false;
-  const auto resumed = Build(*source, folder_ / "parts");
-  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  const auto resumed = Ok(Build(*source, folder_ / "parts"));
   EXPECT_EQ(resumed->reused, 4);
   EXPECT_EQ(Contents(folder_ / "whole"), Contents(folder_ / "parts"));
   EXPECT_EQ(Build(*source, folder_ / "parts")->reused, 10);
@@ -128,8 +123,7 @@ TEST_F(BuildTest, HalfWrittenFilesOfAKilledCommandGo) {
 TEST_F(BuildTest, OneProcessAtATime) {
   const auto source = ProceduralSource(1, 3);
   {
-    const auto lock = FolderLock::Take(folder_ / "set");
-    ASSERT_TRUE(lock.ok());
+    const auto lock = Ok(FolderLock::Take(folder_ / "set"));
     const auto refused = Build(*source, folder_ / "set");
     ASSERT_FALSE(refused.ok());
     EXPECT_NE(refused.status().message().find("another process"), std::string::npos);
@@ -144,8 +138,7 @@ TEST_F(BuildTest, StoppedWithOtherClassesTheIndexStillFits) {
   options_.limit = 2;
   stop_ = true;
   ASSERT_EQ(Build(*source, folder_ / "set").status().code(), StatusCode::kCancelled);
-  const auto dataset = Dataset::Open(folder_ / "set");
-  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  const auto dataset = Ok(Dataset::Open(folder_ / "set"));
   EXPECT_EQ(dataset->models().size(), 10u);
 }
 
@@ -155,8 +148,7 @@ TEST_F(BuildTest, BrokenModelFilesAreMadeAgain) {
   const auto whole = Contents(folder_ / "set");
   const Path file = folder_ / "set" / "models" / "lamp" / "lamp-00000.npz";
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  const auto again = Build(*source, folder_ / "set");
-  ASSERT_TRUE(again.ok());
+  const auto again = Ok(Build(*source, folder_ / "set"));
   EXPECT_EQ(again->reused, 4);
   EXPECT_EQ(Contents(folder_ / "set"), whole);
 }
@@ -233,8 +225,7 @@ class MixedSource : public ModelSource {
 };
 
 TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
-  const auto summary = Build(MixedSource(), folder_ / "set", 2);
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto summary = Ok(Build(MixedSource(), folder_ / "set", 2));
   EXPECT_EQ(summary->models.size(), 2u);
   ASSERT_EQ(summary->rejected.size(), 3u);
   EXPECT_EQ(summary->rejected[0].reason, "broken.obj: line 3: no number");
@@ -246,16 +237,14 @@ TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
 }
 
 TEST_F(BuildTest, WarningsOfReadingAreReported) {
-  const auto summary = Build(MixedSource(), folder_ / "set", 2);
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto summary = Ok(Build(MixedSource(), folder_ / "set", 2));
   ASSERT_EQ(summary->warnings.size(), 1u);
   EXPECT_EQ(summary->warnings[0].file, "red.obj");
   EXPECT_EQ(summary->warnings[0].text, "texture \"red.png\" not found");
 }
 
 TEST_F(BuildTest, RecolouredCopiesAreOnOneSideOfTheSplit) {
-  const auto summary = Build(MixedSource(), folder_ / "set");
-  ASSERT_TRUE(summary.ok());
+  const auto summary = Ok(Build(MixedSource(), folder_ / "set"));
   EXPECT_EQ(summary->models[0].geometry, summary->models[1].geometry);
   EXPECT_NE(summary->models[0].geometry, 0u);
   EXPECT_EQ(summary->models[0].split, summary->models[1].split);

@@ -41,13 +41,10 @@ class CollectTest : public TempFolderTest {
     job.config.schedule.steps = 20;
     job.data = folder_ / data;
     job.run = folder_ / (data + "_run");
-    const auto trained = train::Train(job, workers_, {});
-    ASSERT_TRUE(trained.ok()) << trained.status().message();
-    const auto predictor = Predictor::Load(job.run, workers_);
-    ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+    Ok(train::Train(job, workers_, {}).status());
+    const auto predictor = Ok(Predictor::Load(job.run, workers_));
     const TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
-    const auto scores = predictor->task().Evaluate(evaluation, workers_, {});
-    ASSERT_TRUE(scores.ok()) << scores.status().message();
+    const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, {}));
     EXPECT_LT(*scores->rows[0].mean.mask_loss, 0.95);
   }
 
@@ -61,15 +58,13 @@ class CollectTest : public TempFolderTest {
 
 TEST_F(CollectTest, ReadsPascal3dByItsOwnAnnotations) {
   const Pascal3dMiniature set(folder_ / "p3d", 12, 4);
-  const auto made = Collect({"pascal3d", folder_ / "p3d"}, "cars");
-  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto made = Ok(Collect({"pascal3d", folder_ / "p3d"}, "cars"));
   EXPECT_EQ(made->photographs, (std::array<int, 3>{13, 0, 5}));
   EXPECT_EQ(made->broken.Summary(), "");
   EXPECT_EQ(made->notes.at("objects truncated, occluded or difficult"), 2);
   EXPECT_EQ(made->notes.at("objects of PASCAL VOC"), 2);
   EXPECT_EQ(made->notes.at("objects drawn from CAD models"), 16);
-  const auto read = OpenPhotographs(folder_ / "cars");
-  ASSERT_TRUE(read.ok()) << read.status().message();
+  const auto read = Ok(OpenPhotographs(folder_ / "cars"));
   EXPECT_EQ(read->keypoint_names.size(), 12u);
   EXPECT_EQ(read->keypoint_names[0], "left_back_bumper");
   EXPECT_EQ(read->mirror[0], 6);
@@ -121,8 +116,7 @@ TEST_F(CollectTest, BrokenMembersOfPascal3dCostThemselves) {
   CollectionJob job{"pascal3d", folder_ / "p3d"};
   ExpectMessage(Collect(job, "cars").status(), "3 of 20", "--allow-broken", "n02814533_101.mat");
   job.allow_broken = true;
-  const auto made = Collect(job, "cars");
-  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto made = Ok(Collect(job, "cars"));
   EXPECT_EQ(made->photographs[0], 10);
   const std::string summary = made->broken.Summary();
   for (const char* part : {"_101.mat", "_103.mat", "_105.mat"})
@@ -152,8 +146,7 @@ TEST_F(CollectTest, BrokenCadModelsOfPascal3dCostThemselves) {
   fields[0] = io::MatArray::Numbers({3, 3}, std::vector<double>(9, NAN));
   expect_one_broken("not finite");
   job.allow_broken = true;
-  const auto made = Collect(job, "cars");
-  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto made = Ok(Collect(job, "cars"));
   EXPECT_EQ(made->photographs, (std::array<int, 3>{13, 0, 5}));
   fields[2] = fields[0];
   ASSERT_TRUE(io::SaveMat(file, cad).ok());
@@ -169,11 +162,9 @@ TEST_F(CollectTest, TakesMasksOfAFolder) {
   ASSERT_TRUE(io::SavePng(folder_ / "masks/car_imagenet/n02814533_104.png", mask).ok());
   CollectionJob job{"pascal3d", folder_ / "p3d"};
   job.masks = folder_ / "masks";
-  const auto made = Collect(job, "cars");
-  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto made = Ok(Collect(job, "cars"));
   EXPECT_EQ(made->notes.at("objects of the masks folder"), 1);
-  const auto read = OpenPhotographs(folder_ / "cars");
-  ASSERT_TRUE(read.ok()) << read.status().message();
+  const auto read = Ok(OpenPhotographs(folder_ / "cars"));
   EXPECT_TRUE(read->photographs[4].mask.at(30, 20));
   EXPECT_FALSE(read->photographs[4].mask.at(29, 20));
   EXPECT_EQ(std::ranges::count(read->photographs[4].mask.inside, true), 30 * 40);
@@ -187,14 +178,12 @@ TEST_F(CollectTest, BrokenPicturesOfCubCostThemselves) {
   CollectionJob job{"cub", folder_ / "cub"};
   ExpectMessage(Collect(job, "birds").status(), "2 of 16", "bar_1.png");
   job.allow_broken = true;
-  const auto made = Collect(job, "birds");
-  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto made = Ok(Collect(job, "birds"));
   EXPECT_EQ(made->photographs, (std::array<int, 3>{10, 0, 4}));
   const std::string summary = made->broken.Summary();
   for (const char* part : {"bar_1.png", "bar_3.png"})
     EXPECT_NE(summary.find(part), std::string::npos) << part << "\n" << summary;
-  const auto read = OpenPhotographs(folder_ / "birds");
-  ASSERT_TRUE(read.ok()) << read.status().message();
+  const auto read = Ok(OpenPhotographs(folder_ / "birds"));
   for (const Photograph& photo : read->photographs) {
     PhotoMask drawn = photo.mask;
     for (std::size_t i = 0; i < drawn.inside.size(); ++i) {

@@ -86,8 +86,7 @@ double LargestAngle(const Scene& scene, const Structure& found) {
 
 TEST(Factorization, FindsCamerasAndShapeWithHiddenKeypoints) {
   const Scene scene = MakeScene(60, 0, 1);
-  const auto found = FactorizeKeypoints(scene.job);
-  ASSERT_TRUE(found.ok()) << found.status().message();
+  const auto found = Ok(FactorizeKeypoints(scene.job));
   EXPECT_LT(found->error, 1e-3);
   EXPECT_LT(LargestAngle(scene, *found), 0.5);
   // Scales in pixels a unit of a shape that is as large as ours times `unit`.
@@ -107,8 +106,7 @@ TEST(Factorization, FindsCamerasAndShapeWithHiddenKeypoints) {
 
 TEST(Factorization, StandsNoise) {
   const Scene scene = MakeScene(120, 2.0, 2);  // of about 100 pixels
-  const auto found = FactorizeKeypoints(scene.job);
-  ASSERT_TRUE(found.ok());
+  const auto found = Ok(FactorizeKeypoints(scene.job));
   EXPECT_LT(found->error, 0.05);
   double sum = 0;
   for (std::size_t v = 0; v < scene.cameras.size(); ++v)
@@ -123,8 +121,7 @@ TEST(Factorization, NamesDecideWhichOfTheTwoShapesItIs) {
   for (auto& view : scene.job.views)
     for (Keypoint& k : view) k.visible = true;
   scene.job.front = kFront;
-  const auto found = FactorizeKeypoints(scene.job);
-  ASSERT_TRUE(found.ok());
+  const auto found = Ok(FactorizeKeypoints(scene.job));
   EXPECT_LT(LargestAngle(scene, *found), 0.01);
   EXPECT_GT(found->shape[7][2], found->shape[8][2]);
 }

@@ -41,8 +41,7 @@ void ExpectSame(const PhotographSet& want, const PhotographSet& got) {
 TEST_F(PhotographsTest, ReadsCubAndPascal3d) {
   for (const char* source : {"cub", "pascal3d"}) {
     const PhotographSet want = WriteMiniature(folder_ / source, source);
-    const auto got = OpenPhotographs(folder_ / source);
-    ASSERT_TRUE(got.ok()) << got.status().message();
+    const auto got = Ok(OpenPhotographs(folder_ / source));
     EXPECT_EQ(got->source, source);
     ExpectSame(want, *got);
     EXPECT_EQ(got->Select(Split::kTest).size(), 3u);
@@ -52,18 +51,15 @@ TEST_F(PhotographsTest, ReadsCubAndPascal3d) {
 // Numbers by hand, as MATLAB counts: from 1, and boxes include their last pixels.
 TEST_F(PhotographsTest, PixelsCountFromOneInTheFiles) {
   PhotographSet set = WriteMiniature(folder_, "cub");
-  auto file = io::LoadMat(folder_ / "cachedir/cub/data/train_cub_cleaned.mat");
-  ASSERT_TRUE(file.ok());
+  auto file = Ok(io::LoadMat(folder_ / "cachedir/cub/data/train_cub_cleaned.mat"));
   io::MatArray& images = file->variables[0].second;
   images.elements[1] = io::MatArray::Structs({"x1", "y1", "x2", "y2"},
                                              {io::MatArray::Number(3), io::MatArray::Number(5),
                                               io::MatArray::Number(10), io::MatArray::Number(5)});
   std::vector<double> parts(45, 1.0);
   images.elements[4] = io::MatArray::Numbers({3, 15}, parts);
-  ASSERT_TRUE(
-      io::SaveMat(folder_ / "cachedir/cub/data/train_cub_cleaned.mat", file->variables).ok());
-  const auto got = OpenPhotographs(folder_);
-  ASSERT_TRUE(got.ok()) << got.status().message();
+  Ok(io::SaveMat(folder_ / "cachedir/cub/data/train_cub_cleaned.mat", file->variables));
+  const auto got = Ok(OpenPhotographs(folder_));
   const PhotoBox& box = got->photographs[0].box;
   EXPECT_EQ(box.left, 2);
   EXPECT_EQ(box.right, 10);
@@ -188,8 +184,7 @@ TEST(PhotoWindows, ArePaddedSquares) {
 // at the keypoints, and mirroring twice is nothing.
 TEST_F(PhotographsTest, CamerasAndKeypointsGoWithTheCrop) {
   const PhotographSet set = WriteMiniature(folder_, "cub");
-  const auto store = PhotoStore::Load(set, {0, 1, 2, 3}, {}, 32, workers_, {});
-  ASSERT_TRUE(store.ok()) << store.status().message();
+  const auto store = Ok(PhotoStore::Load(set, {0, 1, 2, 3}, {}, 32, workers_, {}));
   std::vector<float> rgb(3 * 32 * 32), mask(32 * 32);
   int mirrored = 0;
   for (int i = 0; i < 4; ++i) {
@@ -218,8 +213,7 @@ TEST_F(PhotographsTest, CamerasAndKeypointsGoWithTheCrop) {
 TEST_F(PhotographsTest, BeyondTheEdgeIsWhiteAndOutside) {
   PhotographSet set = WriteMiniature(folder_, "cub");
   set.photographs[0].box = {-30, -30, 90, 90};
-  const auto store = PhotoStore::Load(set, {0}, {}, 24, workers_, {});
-  ASSERT_TRUE(store.ok());
+  const auto store = Ok(PhotoStore::Load(set, {0}, {}, 24, workers_, {}));
   std::vector<float> rgb(3 * 24 * 24), mask(24 * 24);
   store->Cut(0, {}, rgb, mask);
   EXPECT_EQ(rgb[0], 1.0f);
@@ -265,8 +259,7 @@ class PhotoFolderTest : public PhotographsTest {
 
 TEST_F(PhotoFolderTest, FindsCamerasFromKeypoints) {
   WritePictures(24);
-  const auto got = OpenPhotographs(folder_);
-  ASSERT_TRUE(got.ok()) << got.status().message();
+  const auto got = Ok(OpenPhotographs(folder_));
   EXPECT_EQ(got->source, "photographs");
   EXPECT_EQ(got->Select(Split::kTest).size(), 4u);
   double worst = 0;
@@ -294,8 +287,7 @@ std::string Transforms(int first, int last) {
 TEST_F(PhotoFolderTest, TakesCamerasOfTransforms) {
   WritePictures(12);
   Write("transforms.json", Transforms(0, 12));
-  const auto got = OpenPhotographs(folder_);
-  ASSERT_TRUE(got.ok()) << got.status().message();
+  const auto got = Ok(OpenPhotographs(folder_));
   EXPECT_NEAR(got->photographs[3].camera->scale, 20, 1e-9);
   EXPECT_NEAR(got->photographs[3].camera->translation[0], 30, 1e-9);
   // The mean place of a keypoint, seen by a camera that looks along -z: its mean in the pictures.
@@ -309,8 +301,7 @@ TEST_F(PhotoFolderTest, TransformsOfTwoSplitsSayWhatIsHeldOut) {
   Write("transforms_train.json", Transforms(0, 9));
   ExpectMessage(OpenPhotographs(folder_).status(), "p109.png", "no camera for it among the 9");
   Write("transforms_test.json", Transforms(9, 12));
-  const auto got = OpenPhotographs(folder_);
-  ASSERT_TRUE(got.ok()) << got.status().message();
+  const auto got = Ok(OpenPhotographs(folder_));
   EXPECT_EQ(got->Select(Split::kTest), (std::vector<int>{9, 10, 11}));
   EXPECT_TRUE(got->photographs[11].camera);
 }
@@ -318,8 +309,7 @@ TEST_F(PhotoFolderTest, TransformsOfTwoSplitsSayWhatIsHeldOut) {
 TEST_F(PhotoFolderTest, WithoutKeypointsThereAreNoCameras) {
   WritePictures(6);
   std::filesystem::remove(folder_ / "keypoints.json");
-  const auto got = OpenPhotographs(folder_);
-  ASSERT_TRUE(got.ok()) << got.status().message();
+  const auto got = Ok(OpenPhotographs(folder_));
   EXPECT_FALSE(got->photographs[0].camera);
   EXPECT_TRUE(got->mean_keypoints.empty());
 }

@@ -32,8 +32,7 @@ class RenderedSet : public TempFolderTest {
 
 TEST_F(RenderedSet, IsInTheLayoutOfPascal3d) {
   ASSERT_TRUE(Make("a", 2, {.mask = 0, .keypoint = 0, .hidden = 0}).ok());
-  const auto set = OpenPhotographs(folder_ / "a");
-  ASSERT_TRUE(set.ok()) << set.status().message();
+  const auto set = Ok(OpenPhotographs(folder_ / "a"));
   EXPECT_EQ(set->source, "pascal3d");
   EXPECT_GT(set->Select(Split::kTrain).size(), 10u);
   EXPECT_GT(set->Select(Split::kTest).size(), 1u);
@@ -52,8 +51,7 @@ TEST_F(RenderedSet, IsInTheLayoutOfPascal3d) {
 // know a mean shape only. Nothing tells where the training part's keypoints truly are.
 TEST_F(RenderedSet, TestCamerasAreExact) {
   ASSERT_TRUE(Make("a", 2).ok());
-  const auto set = OpenPhotographs(folder_ / "a");
-  ASSERT_TRUE(set.ok()) << set.status().message();
+  const auto set = Ok(OpenPhotographs(folder_ / "a"));
   double sum = 0;
   int count = 0;
   for (const Photograph& photo : set->photographs) {

@@ -58,9 +58,7 @@ class PackageModelsTest : public TempFolderTest {
   }
   std::unique_ptr<ModelSource> Open(const std::string& rows) {
     text_ = kHead + rows;
-    auto source = PackageModels({"planes", text_, {"blur"}}, folder_);
-    EXPECT_TRUE(source.ok()) << source.status().message();
-    return source.ok() ? std::move(*source) : nullptr;
+    return Ok(PackageModels({"planes", text_, {"blur"}}, folder_)).value();
   }
 
   std::string text_;
@@ -76,8 +74,7 @@ TEST_F(PackageModelsTest, EachLiveryIsAnEntryOfItsShape) {
   EXPECT_EQ(source->entries()[3].shape, "two");
   EXPECT_EQ(source->facts().credits.size(), 1u);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto model = source->Load(i);
-    ASSERT_TRUE(model.ok()) << model.status().message();
+    const auto model = Ok(source->Load(i));
     EXPECT_TRUE(model->warnings.empty()) << model->warnings[0];
     const Mesh& mesh = std::get<Mesh>(model->data);
     ASSERT_EQ(mesh.textures.size(), 2u);
@@ -89,8 +86,7 @@ TEST_F(PackageModelsTest, EachLiveryIsAnEntryOfItsShape) {
 TEST_F(PackageModelsTest, ModelsAreTurnedAndLeftOutPartsAreGone) {
   const auto source = Open(Row("one"));
   ASSERT_NE(source, nullptr);
-  const auto model = source->Load(0);
-  ASSERT_TRUE(model.ok()) << model.status().message();
+  const auto model = Ok(source->Load(0));
   const Bounds bounds = MeshBounds(std::get<Mesh>(model->data));
   EXPECT_EQ(bounds.high, glm::vec3(2, 1, 3));
   EXPECT_EQ(bounds.low, glm::vec3(-2, 0, 0));
@@ -103,10 +99,8 @@ TEST_F(PackageModelsTest, ALineMayLeaveOutMore) {
   for (const auto& [words, faces] : cases) {
     std::string row = Row("one");
     const std::string text = kHead + row.replace(row.find("\ty\t\t\t") + 4, 0, words);
-    const auto source = PackageModels({"planes", text, {}}, folder_);
-    ASSERT_TRUE(source.ok()) << source.status().message();
-    const auto model = (*source)->Load(0);
-    ASSERT_TRUE(model.ok()) << model.status().message();
+    const auto source = Ok(PackageModels({"planes", text, {}}, folder_));
+    const auto model = Ok((*source)->Load(0));
     EXPECT_EQ(std::get<Mesh>(model->data).faces.size(), faces) << words;
   }
 }
@@ -116,19 +110,16 @@ TEST_F(PackageModelsTest, ImagesOfAListPaintAModelOfAZip) {
       "v 0 0 0\nv 1 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl none\nf 1/1 2/2 3/3\n";
   const Bytes mesh(obj.begin(), obj.end());
   ASSERT_TRUE(MakeFolder(folder_ / "trigger-rally").ok());
-  ASSERT_TRUE(
-      io::WriteZip(
-          folder_ / "trigger-rally/data.zip",
-          {{"c/car.obj", mesh}, {"c/a.png", Png(10)}, {"c/b.png", Png(20)}, {"c/wheel.obj", mesh}})
-          .ok());
+  Ok(io::WriteZip(
+      folder_ / "trigger-rally/data.zip",
+      {{"c/car.obj", mesh}, {"c/a.png", Png(10)}, {"c/b.png", Png(20)}, {"c/wheel.obj", mesh}}));
   const auto source = Open(
       "car\tcar\tCar\ttrigger-rally-data\tGPL\tc/car.obj\t+y\tz\tc/wheel.obj\t\t=c/a.png|=c/"
       "b.png\t\n");
   ASSERT_NE(source, nullptr);
   ASSERT_EQ(source->entries().size(), 2u);
   EXPECT_EQ(source->entries()[1].id, "car-b");
-  const auto model = source->Load(1);
-  ASSERT_TRUE(model.ok()) << model.status().message();
+  const auto model = Ok(source->Load(1));
   const Mesh& painted = std::get<Mesh>(model->data);
   EXPECT_EQ(painted.faces.size(), 2u);
   ASSERT_EQ(painted.textures.size(), 1u);
@@ -142,8 +133,7 @@ TEST_F(PackageModelsTest, WheelsOfAListAreAdded) {
   row.insert(row.size() - 1, "0 1 5 1 0.5|0 1 -5 1 0.5");
   const auto source = Open(row);
   ASSERT_NE(source, nullptr);
-  const auto model = source->Load(0);
-  ASSERT_TRUE(model.ok()) << model.status().message();
+  const auto model = Ok(source->Load(0));
   const Mesh& mesh = std::get<Mesh>(model->data);
   EXPECT_TRUE(Validate(mesh).ok());
   const Bounds bounds = MeshBounds(mesh);
@@ -192,10 +182,8 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   options.image_size = 8;
   options.views = 2;
   options.split.test_share = 0.5;
-  const auto summary = BuildDataset(*source, options, folder_ / "out", Workers(2), {});
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
-  const auto dataset = Dataset::Open(folder_ / "out");
-  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  Ok(BuildDataset(*source, options, folder_ / "out", Workers(2), {}).status());
+  const auto dataset = Ok(Dataset::Open(folder_ / "out"));
   ASSERT_EQ(dataset->models().size(), 6u);
   EXPECT_EQ(CountShapes(dataset->models()), 2u);
   EXPECT_EQ(dataset->Select(Split::kTest).size(), 3u);
@@ -207,14 +195,12 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   EXPECT_NE(dataset->LoadImages(0).value(), dataset->LoadImages(2).value());
 
   options.liveries = 1;  // of the files that are there
-  const auto fewer = BuildDataset(*source, options, folder_ / "out", Workers(1), {});
-  ASSERT_TRUE(fewer.ok()) << fewer.status().message();
+  const auto fewer = Ok(BuildDataset(*source, options, folder_ / "out", Workers(1), {}));
   EXPECT_EQ(fewer->models.size(), 2u);
   EXPECT_EQ(fewer->reused, 2);
   options.liveries = 0;
   options.per_class = 1;
-  const auto one = BuildDataset(*source, options, folder_ / "out", Workers(1), {});
-  ASSERT_TRUE(one.ok()) << one.status().message();
+  const auto one = Ok(BuildDataset(*source, options, folder_ / "out", Workers(1), {}));
   EXPECT_EQ(one->models.size(), 3u);
   EXPECT_EQ(CountShapes(one->models), 1u);
 }
@@ -229,8 +215,7 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   ASSERT_TRUE(BuildDataset(*source, options, folder_ / "out", Workers(1), {}).ok());
   std::string row = Row("one");
   const std::string text = kHead + row.replace(row.find("\t-x\t") + 1, 2, "-z");
-  auto turned = PackageModels({"planes", text, {"blur"}}, folder_);
-  ASSERT_TRUE(turned.ok()) << turned.status().message();
+  auto turned = Ok(PackageModels({"planes", text, {"blur"}}, folder_));
   const auto again = BuildDataset(**turned, options, folder_ / "out", Workers(1), {});
   ASSERT_FALSE(again.ok());
   EXPECT_NE(again.status().message().find("other settings"), std::string::npos);
@@ -243,8 +228,7 @@ TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
   std::vector<std::unique_ptr<ModelSource>> sources;
   const std::string first = kHead + Row("one"), second = kHead + Row("two");
   for (const std::string* text : {&second, &first}) {
-    auto source = PackageModels({"planes", *text, {}}, folder_);
-    ASSERT_TRUE(source.ok()) << source.status().message();
+    auto source = Ok(PackageModels({"planes", *text, {}}, folder_));
     sources.push_back(std::move(*source));
   }
   const auto both = CombineSources("both", std::move(sources));
@@ -252,8 +236,7 @@ TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
   EXPECT_EQ(both->facts().credits.size(), 1u);
   ASSERT_EQ(both->entries().size(), 6u);
   EXPECT_EQ(both->entries()[0].id, "one-L0");
-  const auto model = both->Load(4);
-  ASSERT_TRUE(model.ok()) << model.status().message();
+  const auto model = Ok(both->Load(4));
   EXPECT_EQ(std::get<Mesh>(model->data).textures[0].image.pixels[0], 1);
 }
 
@@ -284,8 +267,7 @@ TEST_P(PackagesTest, EveryShapeLoads) {
   std::set<std::string> shapes;
   for (std::size_t i = 0; i < (*source)->entries().size(); ++i) {
     if (!shapes.insert((*source)->entries()[i].shape).second) continue;
-    const auto model = (*source)->Load(i);
-    EXPECT_TRUE(model.ok()) << model.status().message();
+    Ok((*source)->Load(i).status());
   }
   EXPECT_GE(shapes.size(), GetParam().shapes);
   EXPECT_GE((*source)->entries().size(), GetParam().models);

@@ -67,16 +67,14 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   Write("set/solid/c.obj", "v 0 0 0\nf 1 2 9\n");
   Write("set/solid/notes.txt", "no model");
   Write("set/readme.md", "no class");
-  const auto source = FolderSource(folder_ / "set");
-  ASSERT_TRUE(source.ok()) << source.status().message();
+  const auto source = Ok(FolderSource(folder_ / "set"));
   ASSERT_EQ((*source)->entries().size(), 2u);
   EXPECT_EQ((*source)->entries()[0].id, "a_b");
   EXPECT_EQ((*source)->entries()[0].class_name, "solid");
   BuildOptions options;
   options.image_size = 8;
   options.views = 2;
-  const auto summary = BuildDataset(**source, options, folder_ / "out", Workers(1), {});
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}));
   EXPECT_EQ(summary->models.size(), 1u);
   ASSERT_EQ(summary->rejected.size(), 1u);
   EXPECT_NE(summary->rejected[0].reason.find("c.obj"), std::string::npos);
@@ -118,8 +116,7 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   Write("set/solid/skin.JPG", "");
   Write("set/solid/textures/skin.png", "");
   Write("set/solid/b.max", "");
-  const auto source = FolderSource(folder_ / "set");
-  ASSERT_TRUE(source.ok()) << source.status().message();
+  const auto source = Ok(FolderSource(folder_ / "set"));
   ASSERT_EQ((*source)->entries().size(), 1u);
   const std::vector<IgnoredFile> ignored = (*source)->ignored();
   const std::vector<std::pair<std::string, std::string>> expected = {
@@ -153,16 +150,14 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
     Write(std::string("net/03001627/") + model + "/models/model_normalized.obj", kTetrahedron);
   }
   Write("net/99999999/z/models/model_normalized.obj", kTetrahedron);
-  const auto all = ShapeNetSource(folder_ / "net", {});
-  ASSERT_TRUE(all.ok()) << all.status().message();
+  const auto all = Ok(ShapeNetSource(folder_ / "net", {}));
   ASSERT_EQ((*all)->entries().size(), 3u);
   EXPECT_EQ((*all)->entries()[0].class_name, "chair");
   EXPECT_FALSE((*all)->entries()[0].split.has_value());
   EXPECT_TRUE((*all)->Load(0).ok());
 
   Write("split.txt", "03001627/a1 test\n\n03001627/c3 val\n");
-  const auto listed = Listed();
-  ASSERT_TRUE(listed.ok()) << listed.status().message();
+  const auto listed = Ok(Listed());
   ASSERT_EQ((*listed)->entries().size(), 2u);
   EXPECT_EQ((*listed)->entries()[0].split, Split::kTest);
   EXPECT_EQ((*listed)->entries()[1].split, Split::kValidation);
@@ -194,13 +189,11 @@ TEST(SweetHome3d, ElevenClassesLoad) {
   if (!std::filesystem::exists(kSweetHome3dFolder)) {
     GTEST_SKIP() << "the package sweethome3d-furniture is not installed";
   }
-  const auto source = SweetHome3dSource(kSweetHome3dFolder);
-  ASSERT_TRUE(source.ok()) << source.status().message();
+  const auto source = Ok(SweetHome3dSource(kSweetHome3dFolder));
   std::set<std::string> classes;
   for (std::size_t i = 0; i < (*source)->entries().size(); ++i) {
     if (!classes.insert((*source)->entries()[i].class_name).second) continue;
-    const auto model = (*source)->Load(i);
-    EXPECT_TRUE(model.ok()) << model.status().message();
+    Ok((*source)->Load(i).status());
   }
   EXPECT_EQ(classes.size(), 11u);
 }
@@ -218,9 +211,8 @@ void WriteNmr(const Path& stem, std::size_t models, const std::vector<std::uint8
   for (std::size_t i = 0; i < models; ++i) voxels.insert(voxels.end(), grid.begin(), grid.end());
   auto npy = io::MakeNpy<std::uint8_t>({models, 32, 32, 32}, voxels);
   npy.type = io::NpyType::kBool;
-  ASSERT_TRUE(io::SaveNpz(stem.string() + "_images.npz",
-                          {{"arr_0", io::MakeNpy<std::uint8_t>({models, 24, 4, 64, 64}, images)}})
-                  .ok());
+  Ok(io::SaveNpz(stem.string() + "_images.npz",
+                 {{"arr_0", io::MakeNpy<std::uint8_t>({models, 24, 4, 64, 64}, images)}}));
   ASSERT_TRUE(io::SaveNpz(stem.string() + "_voxels.npz", {{"arr_0", npy}}).ok());
 }
 
@@ -229,18 +221,14 @@ TEST_F(SourcesTest, NmrBecomesADataset) {
   grid[5] = 1;
   WriteNmr(folder_ / "03001627_train", 2, grid);
   WriteNmr(folder_ / "03001627_test", 1, grid);
-  const auto source = NmrSource(folder_);
-  ASSERT_TRUE(source.ok()) << source.status().message();
-  const auto summary = BuildDataset(**source, {}, folder_ / "out", Workers(2), {});
-  ASSERT_TRUE(summary.ok()) << summary.status().message();
-  const auto dataset = Dataset::Open(folder_ / "out");
-  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  const auto source = Ok(NmrSource(folder_));
+  Ok(BuildDataset(**source, {}, folder_ / "out", Workers(2), {}).status());
+  const auto dataset = Ok(Dataset::Open(folder_ / "out"));
   EXPECT_EQ(dataset->info().classes, std::vector<std::string>{"chair"});
   EXPECT_EQ(dataset->Select(Split::kTrain).size(), 2u);
   EXPECT_EQ(dataset->Select(Split::kTest).size(), 1u);
   EXPECT_DOUBLE_EQ(dataset->info().camera.lens.fov_y, 30);
-  const auto data = dataset->Load(0);
-  ASSERT_TRUE(data.ok()) << data.status().message();
+  const auto data = Ok(dataset->Load(0));
   EXPECT_TRUE(data->points.empty());
   EXPECT_TRUE(data->mesh.faces.empty());
   EXPECT_EQ(data->images.size(), kImage);
@@ -249,9 +237,8 @@ TEST_F(SourcesTest, NmrBecomesADataset) {
 TEST_F(SourcesTest, NmrFilesThatDoNotFitAreErrors) {
   WriteNmr(folder_ / "car_val", 1, std::vector<std::uint8_t>(kGrid));
   const std::vector<std::uint8_t> small(16);
-  ASSERT_TRUE(io::SaveNpz(folder_ / "car_val_voxels.npz",
-                          {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}})
-                  .ok());
+  Ok(io::SaveNpz(folder_ / "car_val_voxels.npz",
+                 {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}}));
   const auto source = NmrSource(folder_);
   ASSERT_FALSE(source.ok());
   EXPECT_NE(source.status().message().find("car_val_voxels.npz"), std::string::npos);
@@ -285,8 +272,7 @@ TEST_F(SourcesTest, NmrVoxelsMeetTheirImages) {
   std::vector<std::uint8_t> grid(kGrid);
   grid[static_cast<std::size_t>((theirs[1] * 32 + theirs[0]) * 32 + 31 - theirs[2])] = 1;
   WriteNmr(folder_ / "car_train", 1, grid);
-  const auto source = NmrSource(folder_);
-  ASSERT_TRUE(source.ok());
+  const auto source = Ok(NmrSource(folder_));
   const auto data = std::get<ModelData>((*source)->Load(0).value().data);
   const auto at = std::find(data.occupancy.begin(), data.occupancy.end(), 1);
   ASSERT_NE(at, data.occupancy.end());

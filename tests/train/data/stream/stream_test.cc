@@ -246,13 +246,11 @@ TEST(DatasetLitStream, WithoutChanceItIsTheDatasetsPicture) {
   const MeshCache balls = Balls(1);
   TexturedStream stream(JobOf(config, kSize, 7), balls, workers);
   std::vector<TexturedView> views(3);
-  const auto rgba = stream.Render(0, 0, 0, views);
-  ASSERT_TRUE(rgba.ok()) << rgba.status().message();
+  const auto rgba = Ok(stream.Render(0, 0, 0, views));
   std::vector<Camera> cameras;
   for (const TexturedView& view : views) cameras.push_back(view.camera);
   LitRenderer lit;
-  const auto want = lit.Render(Ball(), cameras, kSize);
-  ASSERT_TRUE(want.ok()) << want.status().message();
+  const auto want = Ok(lit.Render(Ball(), cameras, kSize));
   ASSERT_EQ(rgba->size(), want->size());
   for (std::size_t i = 0; i < want->size(); ++i)
     EXPECT_NEAR(255 * (*rgba)[i], (*want)[i], 0.51f) << i;
@@ -285,8 +283,7 @@ TEST(DatasetLitStream, ASheetShowsAllOfIt) {
   const Workers workers(1);
   const MeshCache balls = Balls(3);
   TexturedStream stream(JobOf({}, 16, 7), balls, workers);
-  const auto sheet = stream.Sheet(2, 3);
-  ASSERT_TRUE(sheet.ok());
+  const auto sheet = Ok(stream.Sheet(2, 3));
   EXPECT_EQ(sheet->width, 3 * 16 + 2 * 4);
   EXPECT_EQ(sheet->height, 2 * 16 + 4);
 }

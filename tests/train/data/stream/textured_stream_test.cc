@@ -140,11 +140,9 @@ TEST(TexturedStream, SamePositionSameBits) {
   job.config = {};
   TexturedStream one(job, meshes, workers), other(job, meshes, workers);
   std::vector<TexturedView> views(2), again(2);
-  const auto a = one.Render(1, 77, 0, views);
-  ASSERT_TRUE(a.ok()) << a.status().message();
+  const auto a = Ok(one.Render(1, 77, 0, views));
   ASSERT_TRUE(other.Render(0, 5, 1, again).ok());  // what came before does not matter
-  const auto b = other.Render(1, 77, 1, again);
-  ASSERT_TRUE(b.ok());
+  const auto b = Ok(other.Render(1, 77, 1, again));
   ASSERT_EQ(a->size(), 2u * 4 * kSize * kSize);
   EXPECT_EQ(std::memcmp(a->data(), b->data(), a->size_bytes()), 0);
   EXPECT_NE(views[0].light.direction, views[1].light.direction);
@@ -159,15 +157,13 @@ TEST(TexturedStream, ViewsCanBeChanged) {
   const MeshCache meshes = Balls(1);
   TexturedStream stream(Still("phong"), meshes, workers);
   std::vector<TexturedView> first(2), other(2);
-  const auto drawn = stream.Render(0, 4, 0, first);
-  ASSERT_TRUE(drawn.ok()) << drawn.status().message();
+  const auto drawn = Ok(stream.Render(0, 4, 0, first));
   const std::vector<float> before(drawn->begin(), drawn->end());
   ASSERT_TRUE(stream.Render(0, 5, 0, other).ok());
   ASSERT_TRUE(stream.Render(0, 4, 0, other).ok());
   std::swap(other[0], other[1]);
   ASSERT_TRUE(stream.Change(0, other).ok());
-  const auto swapped = stream.Again(0, Appearance::kLit);
-  ASSERT_TRUE(swapped.ok());
+  const auto swapped = Ok(stream.Again(0, Appearance::kLit));
   const std::size_t image = before.size() / 2;
   EXPECT_EQ(std::memcmp(swapped->data(), before.data() + image, image * sizeof(float)), 0);
   EXPECT_NE(std::memcmp(swapped->data(), before.data(), image * sizeof(float)), 0);
@@ -183,11 +179,9 @@ TEST(TexturedStream, SetsUpWhatRenderDraws) {
   job.config = {};
   TexturedStream one(job, meshes, workers), other(job, meshes, workers);
   std::vector<TexturedView> views(2);
-  const auto drawn = one.Render(0, 9, 0, views);
-  ASSERT_TRUE(drawn.ok()) << drawn.status().message();
+  const auto drawn = Ok(one.Render(0, 9, 0, views));
   ASSERT_TRUE(other.SetUp(0, 9, 0, views).ok());
-  const auto again = other.Again(0, Appearance::kLit);
-  ASSERT_TRUE(again.ok());
+  const auto again = Ok(other.Again(0, Appearance::kLit));
   ASSERT_EQ(again->size(), drawn->size());
   EXPECT_EQ(std::memcmp(again->data(), drawn->data(), drawn->size_bytes()), 0);
 }
@@ -257,13 +251,11 @@ class TexturedMeshes : public TempFolderTest {
     for (const char* name : {"a", "b"})
       EXPECT_TRUE(
           io::SaveGlb(folder_ / "models" / "ball" / (std::string(name) + ".glb"), Ball()).ok());
-    auto source = FolderSource(folder_ / "models");
-    EXPECT_TRUE(source.ok()) << source.status().message();
+    auto source = Ok(FolderSource(folder_ / "models"));
     BuildOptions options;
     options.image_size = 16;
     options.views = 2;
-    const auto built = BuildDataset(**source, options, folder_ / "data", workers_, {});
-    EXPECT_TRUE(built.ok()) << built.status().message();
+    Ok(BuildDataset(**source, options, folder_ / "data", workers_, {}).status());
   }
   Result<MeshCache> Load(const std::string& folder) {
     dataset_ = Ok(Dataset::Open(folder_ / "data")).value();
@@ -275,8 +267,7 @@ class TexturedMeshes : public TempFolderTest {
 };
 
 TEST_F(TexturedMeshes, AreReadAgainFromTheirFolder) {
-  const auto meshes = Load((folder_ / "models").string());
-  ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+  const auto meshes = Ok(Load((folder_ / "models").string()));
   ASSERT_EQ(meshes->size(), 2u);
   const auto mesh = Ok(meshes->Get(0)).value();
   ASSERT_EQ(mesh->scene().textures.size(), 1u);
@@ -285,8 +276,7 @@ TEST_F(TexturedMeshes, AreReadAgainFromTheirFolder) {
 }
 
 TEST_F(TexturedMeshes, WithoutAFolderColoursOfTheDatasetStandIn) {
-  const auto meshes = Load("");
-  ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+  const auto meshes = Ok(Load(""));
   const auto mesh = Ok(meshes->Get(0)).value();
   EXPECT_TRUE(mesh->scene().textures.empty());
   EXPECT_FALSE(mesh->scene().colors.values.empty());

@@ -66,7 +66,7 @@ class ClassifyTest : public TempFolderTest {
     return Train(job, Workers(workers), watch);
   }
   Path Trained() {
-    const auto outcome = Ok(TrainIn(folder_ / "run", 2));
+    Ok(TrainIn(folder_ / "run", 2).status());
     return folder_ / "run";
   }
   Workers workers_{2};
@@ -96,8 +96,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * kSize * kSize)).status(),
                 "predicts no meshes");
   const auto evaluation =
-      predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent);
-  ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+      Ok(predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent));
   ASSERT_EQ(evaluation->rows.size(), 3u);
   EXPECT_NEAR(evaluation->rows[0].mean.main(), 1.0 / 3, 1e-12);
   EXPECT_GT(evaluation->rows[2].mean.main(), 0.9);
@@ -111,7 +110,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   EXPECT_EQ(table.find("IoU"), std::string::npos) << table;
 
   const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
-  const auto report = Ok(WriteReport(job, workers_, kSilent));
+  Ok(WriteReport(job, workers_, kSilent).status());
   const std::string page = ReadText(job.out).value();
   for (const char* part :
        {"to classify an object", "a mean accuracy of", "nearest training picture",

@@ -63,8 +63,7 @@ TEST_F(PhotographsWithACritic, SameBitsForAnyWorkersAndAfterAStop) {
   EXPECT_EQ(Train("stopped", Critic(), 2, 5).code(), StatusCode::kCancelled);
   ASSERT_TRUE(Train("stopped", Critic(), 1).ok());
   ExpectSame("whole", "stopped");
-  const auto log = ReadLog(folder_ / "whole");
-  ASSERT_TRUE(log.ok());
+  const auto log = Ok(ReadLog(folder_ / "whole"));
   for (const char* name : {"adversarial", "critic_features", "critic_distance", "critic_penalty"}) {
     const auto& values = log->back().values;
     EXPECT_TRUE(std::any_of(values.begin(), values.end(), [&](const auto& value) {
