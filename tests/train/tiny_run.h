@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -122,6 +123,21 @@ steps = 12
 batch = 4
 sample_every = 10
 )" + kOften;
+
+// A training of some task, for tests of all of them.
+struct TinyKind {
+  const char* name;
+  std::string config;
+  std::vector<std::string> settings = {};
+  const char* data = "data";  // a folder
+};
+
+inline void PrintTo(const TinyKind& kind, std::ostream* out) { *out << kind.name; }
+
+inline const std::vector<std::string> kTinyCritic = {
+    "adversarial.weight=0.5",        "adversarial.features=1", "adversarial.base=4",
+    "adversarial.halvings=2",        "adversarial.updates=2",  "adversarial.learning_rate=1e-3",
+    "adversarial.place=interpolates"};
 
 // The value behind a key of a configuration.
 template <class T>

@@ -91,65 +91,6 @@ class TrainerTest : public TempFolderTest {
   TrainJob job_;
 };
 
-// With everything that is off by default.
-TEST_F(TrainerTest, MirroredSmoothedAndAveragedRunsResumeToo) {
-  ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
-  ValueOf<double>(job_.config, "optimizer.average") = 0.9;
-  ValueOf<std::int64_t>(job_.config, "network.smoothing") = 2;
-  ValueOf<bool>(job_.config, "network.symmetric") = true;
-  ValueOf<std::int64_t>(job_.config, "network.blocks") = 1;
-  ValueOf<bool>(job_.config, "network.fc_norm") = false;
-  ValueOf<bool>(job_.config, "network.picture_colors") = true;
-  RunWhole("whole", 2);
-  StopAfter(4);  // between two checkpoints of the schedule
-  EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 4);
-  ExpectFinishes();
-  ExpectSameBits("whole", "run");
-}
-
-TEST_F(TrainerTest, StreamedRunsResumeAndDoNotDependOnWorkers) {
-  ASSERT_TRUE(WriteNoiseDataset(folder_ / "boxes", Meshes::kBoxes).ok());
-  job_.data = folder_ / "boxes";
-  ValueOf<double>(job_.config, "stream.share") = 0.5;
-  ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
-  RunWhole("whole", 1);
-  RunWhole("two", 2);
-  RunWhole("sixteen", 16);
-  StopAfter(4);
-  ExpectFinishes();
-  ExpectSameBits("whole", "run");
-  ExpectSameBits("whole", "two");
-  ExpectSameBits("whole", "sixteen");
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / "stream.png"));
-}
-
-// Whoever looks more often gets the same weights.
-TEST_F(TrainerTest, SampleSheetsComeEarlyAndLeaveTheBitsAlone) {
-  ASSERT_TRUE(WriteNoiseDataset(folder_ / "boxes", Meshes::kBoxes, /*classes=*/2).ok());
-  job_.data = folder_ / "boxes";
-  const std::string streamed = kTinyConfig + "[stream]\nshare = 0.5\n";
-  for (const std::string& text : {streamed, kTinyTextured, kTinyClassifier}) {
-    for (const std::int64_t every : {1, 1000}) {
-      job_.config = ParseConfig(text, "tiny").value();
-      job_.config.schedule.steps = 12;
-      job_.config.schedule.sample_every = every;
-      std::vector<std::string> drawn;
-      job_.drawn = [&](const Path& file) {
-        EXPECT_TRUE(std::filesystem::exists(file)) << file;
-        drawn.push_back(file.filename().string());
-      };
-      RunWhole(std::to_string(every), 2);
-      const std::vector<std::string> few = {"step_00000010.png", "step_00000012.png"};
-      if (every == 1)
-        EXPECT_EQ(drawn.size(), 12u);
-      else
-        EXPECT_EQ(drawn, few);
-    }
-    ExpectSameBits("1", "1000");
-    for (const char* run : {"1", "1000"}) std::filesystem::remove_all(folder_ / run);
-  }
-}
-
 TEST_F(TrainerTest, ANewRunKeepsItsPicturesAndWarnsOfFewModels) {
   int warnings = 0;
   job_.warn = [&](const std::string& text) {

@@ -32,25 +32,14 @@ struct Ended {
   std::string output;
 };
 
-struct Kind {
-  const char* name;
-  std::string config;
-  Words settings = {};
-  const char* data = "data";
-};
-
 // Its textures come from the run "textures", and its second stage begins at a step that no
 // checkpoint of the first 200 but one falls on.
-const Kind kGan = {"gan", kTinyGan, {"schedule.batch=8", "stages.shape=9"}};
+const TinyKind kGan = {"gan", kTinyGan, {"schedule.batch=8", "stages.shape=9"}};
 
-const Kind kKinds[] = {
+const TinyKind kKinds[] = {
     {"single", kTinyConfig + "[stream]\nshare = 0.5\n", {}},
     {"textured", kTinyTextured},
-    {"critic",
-     kTinyTextured,
-     {"adversarial.weight=0.5", "adversarial.features=1", "adversarial.base=4",
-      "adversarial.halvings=2", "adversarial.updates=2", "adversarial.learning_rate=1e-3",
-      "adversarial.place=interpolates"}},
+    {"critic", kTinyTextured, kTinyCritic},
     {"classify", kTinyClassifier},
     kGan,
     {"photographs", kTinyPhotographs, {}, "cub"},
@@ -82,7 +71,7 @@ class Ranks : public TempFolderTest {
     Use(kKinds[0]);
   }
 
-  void Use(const Kind& kind) {
+  void Use(const TinyKind& kind) {
     Write("tiny.toml", kind.config);
     settings_ = kind.settings;
     data_ = kind.data;
@@ -142,7 +131,7 @@ class Ranks : public TempFolderTest {
   }
 
   void CheckSameBits(const std::vector<std::pair<int, int>>& ranks_and_workers) {
-    for (const Kind& kind : kKinds) {
+    for (const TinyKind& kind : kKinds) {
       SCOPED_TRACE(kind.name);
       Use(kind);
       const std::string whole = std::string(kind.name) + "_whole";
@@ -345,7 +334,7 @@ TEST_F(Ranks, EvaluateToTheSameBytes) {
   steps_ = 2;
   ExpectDone({TILEGRAD_PROGRAM, "dataset", "--source", "procedural", "--limit", "12", "--size",
               "32", "--threads", "1", "--out", (folder_ / "made").string()});
-  for (const Kind& kind : kKinds) {
+  for (const TinyKind& kind : kKinds) {
     const std::string name = kind.name;
     if (name == kGan.name || name == "critic") continue;
     SCOPED_TRACE(kind.name);

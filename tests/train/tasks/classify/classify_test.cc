@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The classifier as a run: it learns, is stopped and continues to the same bits, is scored and
-// reported, and serves as the network of a perceptual loss.
+// The classifier as a run: it learns, is scored and reported, and serves as the network of a
+// perceptual loss. Its bits: every_task_test.cc.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -13,7 +13,6 @@
 #include "train/predictor.h"
 #include "train/report/report.h"
 #include "train/run/log.h"
-#include "train/same_run.h"
 #include "train/tasks/classify/model.h"
 #include "train/tasks/classify/perceptual_network.h"
 #include "train/tiny_run.h"
@@ -57,33 +56,20 @@ Status WriteColored(const Path& folder, const std::vector<std::string>& classes)
 class ClassifyTest : public TempFolderTest {
  protected:
   void SetUp() override { Ok(WriteColored(folder_ / "data", {"blue", "green", "red"})); }
-  Result<RunOutcome> TrainIn(const Path& run, int workers, const Watch& watch = kSilent) {
+  Status TrainRun() {
     TrainJob job;
     TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "tiny.toml"));
-    job.run = run;
+    job.run = folder_ / "run";
     job.data = folder_ / "data";
-    job.existing = ExistingRun::kContinue;
-    return Train(job, Workers(workers), watch);
+    return Train(job, workers_, kSilent).status();
   }
   Path Trained() {
-    Ok(TrainIn(folder_ / "run", 2).status());
+    Ok(TrainRun());
     return folder_ / "run";
   }
   Workers workers_{2};
   nn::Context context_{workers_};
 };
-
-TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
-  ASSERT_TRUE(TrainIn(folder_ / "whole", 2).ok());
-  StopFlag stop = false;
-  int seen = 0;
-  const auto stop_after = [&](const Progress& p) { stop = p.stage == "training" && ++seen > 20; };
-  const auto part = TrainIn(folder_ / "parts", 1, {stop_after, &stop});
-  EXPECT_EQ(part.status().code(), StatusCode::kCancelled);
-  const auto rest = Ok(TrainIn(folder_ / "parts", 3));
-  EXPECT_GT(rest->first_step, 0);
-  ExpectSameBits(context_, folder_ / "whole", folder_ / "parts", 60);
-}
 
 TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   const Path run = Trained();
@@ -132,7 +118,7 @@ TEST_F(ClassifyTest, OtherClassesAreRefused) {
 TEST_F(ClassifyTest, OneClassIsNothingToLearn) {
   std::filesystem::remove_all(folder_ / "data");
   ASSERT_TRUE(WriteColored(folder_ / "data", {"red"}).ok());
-  ExpectMessage(TrainIn(folder_ / "run", 1).status(), "1 class;", "two or more");
+  ExpectMessage(TrainRun(), "1 class;", "two or more");
 }
 
 TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The task goes the whole way on miniatures of CUB-200 and PASCAL3D+: it trains, is stopped and
-// goes on to the same bits, predicts, is evaluated by Table 3 and reported.
+// The task goes the whole way on miniatures of CUB-200 and PASCAL3D+: it trains, predicts, is
+// evaluated by Table 3 and reported. Its bits: every_task_test.cc.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,6 @@
 #include "train/predictor.h"
 #include "train/report/report.h"
 #include "train/run/log.h"
-#include "train/same_run.h"
 #include "train/tasks/photographs/step.h"
 #include "train/tiny_run.h"
 #include "train/trainer.h"
@@ -43,22 +42,17 @@ class PhotographsTask : public TempFolderTest {
     std::int64_t steps = kSteps;
     std::string data = "cub";
     int smoothing = 0;
-    std::int64_t sample_every = 1000;
   };
   Result<RunOutcome> Train(const std::string& run, const Changes& changes) {
     TrainJob job;
     TILEGRAD_ASSIGN(job.config, ParseConfig(TinyConfig(changes.smoothing) + changes.more, "tiny"));
     job.config.schedule.steps = changes.steps;
-    job.config.schedule.sample_every = changes.sample_every;
+    job.config.schedule.sample_every = 1000;
     job.extends = true;
     job.data = folder_ / changes.data;
     job.run = folder_ / run;
     job.existing = ExistingRun::kContinue;
     return train::Train(job, Workers(changes.workers), kSilent);
-  }
-  void ExpectSame(const std::string& a, const std::string& b) {
-    ExpectSameBits(context_, folder_ / a, folder_ / b, kSteps);
-    EXPECT_GT(FinalTensors(context_, folder_ / a, kSteps).size(), 20u);
   }
 
   Workers workers_{2};
@@ -198,38 +192,6 @@ TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
   EXPECT_EQ(scores->rows[0].mean.pck, 1);
   EXPECT_FALSE(scores->rows[0].mean.mask_loss);
   EXPECT_NE(FormatTable(*scores).find("100.0"), std::string::npos);
-}
-
-TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
-  ASSERT_TRUE(Train("one", {.workers = 1}).ok());
-  ASSERT_TRUE(Train("two", {.workers = 2}).ok());
-  ExpectSame("one", "two");
-}
-
-TEST_F(PhotographsTask, SampleSheetsLeaveTheBitsAlone) {
-  ASSERT_TRUE(Train("few", {}).ok());
-  ASSERT_TRUE(Train("many", {.sample_every = 1}).ok());
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "few/samples/step_00000010.png"));
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "many/samples/step_00000001.png"));
-  ExpectSame("few", "many");
-}
-
-TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
-  ASSERT_TRUE(Train("whole", {}).ok());
-  TrainJob job;
-  job.config = ParseConfig(TinyConfig(), "tiny.toml").value();
-  job.data = folder_ / "cub";
-  job.run = folder_ / "stopped";
-  job.existing = ExistingRun::kContinue;
-  int steps = 0;
-  StopFlag stop = false;
-  const auto after_five = [&](const Progress& progress) {
-    if (progress.stage == "training" && ++steps == 5) stop = true;
-  };
-  const auto stopped = train::Train(job, workers_, {after_five, &stop});
-  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
-  ASSERT_TRUE(Train("stopped", {.workers = 1}).ok());
-  ExpectSame("whole", "stopped");
 }
 
 TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {

@@ -1,48 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-// Portions of a step side by side: the bits of a run depend on their number, never on how many
-// workers share them or when the run was stopped.
+// What holds for runs of every task: the bits of a run depend on its settings and on the number of
+// portions of a step, never on how many workers share them, when the run was stopped or how often
+// it was looked at.
 #include <gtest/gtest.h>
+
+#include <functional>
 
 #include "data/photographs/miniature.h"
 #include "nn/nn.h"
 #include "same_run.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
+#include "train/run/checkpoint.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train::portions_test {
+namespace tilegrad::train::every_task_test {
 
-constexpr int kSteps = 7, kStop = 4;
+constexpr int kSteps = 7, kStop = 4, kNever = 1000;
 
-struct Kind {
-  const char* name;
-  std::string config;
-  std::vector<std::string> settings = {};
-  const char* data = "data";
-};
+std::vector<std::string> PerceptualCritic() {
+  std::vector<std::string> settings = kTinyCritic;
+  settings.push_back("adversarial.perceptual=0.1");
+  return settings;
+}
 
-void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
-
-const std::vector<std::string> kCritic = {
-    "adversarial.weight=0.5",     "adversarial.features=1",        "adversarial.base=4",
-    "adversarial.halvings=2",     "adversarial.updates=2",         "adversarial.learning_rate=1e-3",
-    "adversarial.perceptual=0.1", "adversarial.place=interpolates"};
-
-const Kind kKinds[] = {
+const TinyKind kKinds[] = {
     {"single", kTinyConfig + "[stream]\nshare = 0.5\n", {"schedule.mirrored=0.5"}},
+    // With everything that is off by default.
+    {"options",
+     kTinyConfig,
+     {"schedule.mirrored=0.5", "optimizer.average=0.9", "network.smoothing=2",
+      "network.symmetric=true", "network.blocks=1", "network.fc_norm=false",
+      "network.picture_colors=true"}},
     {"softras", kTinyConfig, {"render.rule=softras", "softras.color=true"}},
     {"textured", kTinyTextured},
-    {"critic", kTinyTextured, kCritic},
+    {"critic", kTinyTextured, PerceptualCritic()},
     {"classify", kTinyClassifier, {"schedule.mirrored=0.5"}},
     {"gan", kTinyGan, {"schedule.batch=8", "stages.shape=3", "critic.texture_weight=0.5"}},
     {"photographs", kTinyPhotographs, {}, "cub"},
     {"photographs_critic",
      kTinyPhotographs,
-     {"adversarial.weight=0.5", "adversarial.base=4", "adversarial.halvings=2"},
+     {"adversarial.weight=0.5", "adversarial.features=1", "adversarial.base=4",
+      "adversarial.halvings=2", "adversarial.learning_rate=1e-3"},
      "cub"},
 };
 
-class Portions : public TempFolderTest, public testing::WithParamInterface<Kind> {
+class EveryTask : public TempFolderTest, public testing::WithParamInterface<TinyKind> {
  protected:
   void SetUp() override {
     std::filesystem::create_directories(folder_ / "data");
@@ -76,24 +79,27 @@ class Portions : public TempFolderTest, public testing::WithParamInterface<Kind>
 
   struct How {
     std::string run;
-    int portions, workers, stop = kSteps + 1;  // stop: after so many steps
+    int portions = 1, workers = 2, stop = kNever;  // stop: after so many steps
+    int steps = kSteps, sample_every = 10;
+    std::function<void(const Path&)> drawn = {};
   };
   void Run(const How& how) {
     std::vector<std::string> settings = settings_;
     settings.push_back("schedule.portions=" + std::to_string(how.portions));
-    settings.push_back("schedule.steps=" + std::to_string(kSteps));
-    const TrainJob job = JobOf(how.run, GetParam().config, settings);
+    settings.push_back("schedule.steps=" + std::to_string(how.steps));
+    settings.push_back("schedule.sample_every=" + std::to_string(how.sample_every));
+    TrainJob job = JobOf(how.run, GetParam().config, settings);
+    job.drawn = how.drawn;
     StopFlag stop = false;
     const auto stop_after = [&](const Progress& p) {
       if (p.stage == "training" && p.done >= static_cast<std::size_t>(how.stop)) stop = true;
     };
     const auto outcome = Train(job, Workers(how.workers), {stop_after, &stop});
-    const bool whole = how.stop > kSteps;
-    EXPECT_EQ(outcome.ok(), whole) << outcome.status().message();
+    EXPECT_EQ(outcome.ok(), how.stop == kNever) << outcome.status().message();
   }
-  void ExpectSame(const std::string& a, const std::string& b) {
-    ExpectSameBits(context_, folder_ / a, folder_ / b, kSteps);
-    ExpectSameCurves(folder_ / a, folder_ / b, kSteps);
+  void ExpectSame(const std::string& a, const std::string& b, int steps = kSteps) {
+    ExpectSameBits(context_, folder_ / a, folder_ / b, steps);
+    ExpectSameCurves(folder_ / a, folder_ / b, steps);
   }
 
   Workers workers_{1};
@@ -101,7 +107,7 @@ class Portions : public TempFolderTest, public testing::WithParamInterface<Kind>
   std::vector<std::string> settings_;
 };
 
-TEST_P(Portions, HaveTheSameBitsOnAnyNumberOfWorkersAndResume) {
+TEST_P(EveryTask, HasTheSameBitsOnAnyNumberOfWorkersAndResumes) {
   for (const int portions : {1, 2, 4}) {
     SCOPED_TRACE(portions);
     const std::string name = std::to_string(portions) + "_";
@@ -112,13 +118,36 @@ TEST_P(Portions, HaveTheSameBitsOnAnyNumberOfWorkersAndResume) {
       ExpectSame(name + "1", run);
     }
     const std::string stopped = name + "stopped";
-    Run({stopped, portions, 16, kStop});
+    Run({stopped, portions, 16, kStop});  // between two checkpoints of the schedule
+    EXPECT_EQ(LoadNewestCheckpoint(context_, folder_ / stopped)->checkpoint.info.step, kStop);
     Run({stopped, portions, 2});
     ExpectSame(name + "1", stopped);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Portions, testing::ValuesIn(kKinds),
+// Whoever looks more often gets the same weights.
+TEST_P(EveryTask, SampleSheetsComeEarlyAndLeaveTheBitsAlone) {
+  constexpr int kSheetSteps = 12;
+  for (const int every : {1, 1000}) {
+    std::vector<std::string> drawn;
+    const auto note = [&](const Path& file) {
+      EXPECT_TRUE(std::filesystem::exists(file)) << file;
+      drawn.push_back(file.filename().string());
+    };
+    Run({.run = std::to_string(every), .steps = kSheetSteps, .sample_every = every, .drawn = note});
+    const std::vector<std::string> few = {"step_00000010.png", "step_00000012.png"};
+    if (every == 1)
+      EXPECT_EQ(drawn.size(), static_cast<std::size_t>(kSheetSteps));
+    else
+      EXPECT_EQ(drawn, few);
+  }
+  ExpectSame("1", "1000", kSheetSteps);
+  if (GetParam().config.find("[stream]") != std::string::npos) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "1" / "stream.png"));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, EveryTask, testing::ValuesIn(kKinds),
                          [](const auto& one) { return std::string(one.param.name); });
 
-}  // namespace tilegrad::train::portions_test
+}  // namespace tilegrad::train::every_task_test
