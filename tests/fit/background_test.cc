@@ -7,11 +7,9 @@
 
 #include "base/rng.h"
 #include "fit/input.h"
-#include "fit/make_views.h"
 #include "fit/masks/start_masks.h"
+#include "fit/views_fixture.h"
 #include "io/image_file.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::train::background_test {
 
@@ -38,21 +36,17 @@ std::vector<float> Ring(double noise, double texture = 0) {
   return out;
 }
 
-double IouWithRing(const std::vector<float>& alpha) {
-  double both = 0, either = 0;
-  for (std::size_t p = 0; p < kPixels; ++p) {
-    const bool a = alpha[p] >= 0.5f,
-               b = OnRing(static_cast<int>(p) % kSide, static_cast<int>(p) / kSide);
-    both += a && b;
-    either += a || b;
-  }
-  return both / either;
+std::vector<float> RingMask() {
+  std::vector<float> out(kPixels);
+  for (std::size_t p = 0; p < kPixels; ++p)
+    out[p] = OnRing(static_cast<int>(p) % kSide, static_cast<int>(p) / kSide) ? 1.0f : 0.0f;
+  return out;
 }
 
 TEST(Background, LeavesTheObjectWithItsHole) {
   for (const double noise : {0.0, 0.02, 0.04}) {
     const BackgroundMask mask = MaskFromPlainBackground(Ring(noise), kSide, kSide);
-    EXPECT_GT(IouWithRing(mask.alpha), 0.95) << noise;
+    EXPECT_GT(MaskIou(mask.alpha, RingMask()), 0.95) << noise;
     EXPECT_EQ(mask.doubt, "") << noise;
   }
 }
@@ -95,21 +89,13 @@ TEST(Background, SaysWhenItIsNotPlain) {
 }
 
 // Renders before a grey wall with noise, as files.
-class BackgroundInput : public TempFolderTest {
+class BackgroundInput : public ViewsTest {
  protected:
   void SetUp() override {
-    TempFolderTest::SetUp();
-    StopFlag stop = false;
-    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
-    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    Ok(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views", OutputGuard(), {},
-                 stop));
-    const auto truth = Ok(ReadFitFolder(folder_ / "views", 0));
-    truth_.assign(truth->images.alpha.begin(), truth->images.alpha.end());
+    truth_ = Views(ColoredBox(), {.views = 4, .held_out = 0, .size = 64}).images.alpha;
     Rng rng(3);
     for (int i = 0; i < 4; ++i) PutBeforeWall(i, &rng);
-    const auto found = Ok(ReadFitFolder(folder_ / "views", InputOptions{}));
-    found_ = *found;
+    found_ = Ok(ReadFitFolder(folder_ / "views", InputOptions{})).value();
   }
   void PutBeforeWall(int i, Rng* rng) const {
     const Path file = folder_ / "views" / "images" / (std::string("00") + char('0' + i) + ".png");
@@ -126,20 +112,14 @@ class BackgroundInput : public TempFolderTest {
     ASSERT_TRUE(io::SavePng(file, photo).ok());
   }
 
-  std::vector<float> truth_;  // alpha of the renders
+  AlignedVector<float> truth_;  // alpha of the renders
   FitInput found_;
 };
 
 TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
   EXPECT_TRUE(found_.masked);
   EXPECT_TRUE(found_.warnings.empty());
-  double both = 0, either = 0;
-  for (std::size_t p = 0; p < found_.images.alpha.size(); ++p) {
-    const bool a = found_.images.alpha[p] >= 0.5f, b = truth_[p] >= 0.5f;
-    both += a && b;
-    either += a || b;
-  }
-  EXPECT_GT(both / either, 0.96);
+  EXPECT_GT(MaskIou(found_.images.alpha, truth_), 0.96);
   for (const Background other : {Background::kMask, Background::kNone}) {
     const auto bare = Ok(ReadFitFolder(folder_ / "views", {.background = other}));
     EXPECT_FALSE(bare->masked);
@@ -156,8 +136,7 @@ TEST_F(BackgroundInput, MasksAreKept) {
   ASSERT_TRUE(ReadMasks(job.out / "masks", &again).ok());
   for (std::size_t p = 0; p < again.images.alpha.size(); ++p)
     EXPECT_NEAR(again.images.alpha[p], found_.images.alpha[p], 0.5 / 255 + 1e-6);
-  ASSERT_EQ(found_.notes.size(), 1u);
-  EXPECT_NE(found_.notes[0].find("0 of 4 are in doubt"), std::string::npos) << found_.notes[0];
+  ExpectOnly(found_.notes, "0 of 4 are in doubt");
 }
 
 TEST_F(BackgroundInput, NeedsNoCameras) {

@@ -7,10 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/make_views.h"
-#include "fit/run.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::clock_test {
 
@@ -60,18 +57,13 @@ TEST(FitClock, WaitsForFullResolutionAndForCameras) {
   EXPECT_EQ(StepsOf(config, 0), 600 + 134);
 }
 
-class HurriedFit : public TempFolderTest {
+class HurriedFit : public ViewsTest {
  protected:
-  void SetUp() override {
-    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
-    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    Ok(MakeViews(box, {.views = 6, .held_out = 0, .size = 24}, folder_ / "views", OutputGuard(), {},
-                 stop_));
-  }
+  void SetUp() override { Views(ColoredBox(), {.views = 6, .held_out = 0, .size = 24}); }
   // Gets there in no time: from step 200 on it hurries.
   FitJob Job(const std::string& out) {
     FitJob job;
-    job.input = ReadFitFolder(folder_ / "views", 0).value();
+    job.input = Input();
     job.out = folder_ / out;
     job.config.start = StartShape::kHull;
     job.config.texture_size = 64;
@@ -81,52 +73,37 @@ class HurriedFit : public TempFolderTest {
     job.config.timelapse = 4;
     return job;
   }
-  void StopAt(const FitJob& job, std::uint64_t step) {
-    const auto stopped = RunFit(
-        job, Workers(2), [&](const Progress& p) { stop_ = p.done == step; }, stop_);
-    EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-    stop_ = false;
-  }
   Bytes Read(const std::string& out) { return ReadFile(folder_ / out / "mesh.glb").value(); }
-
-  StopFlag stop_ = false;
 };
 
 TEST_F(HurriedFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
-  const auto whole = Ok(RunFit(Job("whole"), Workers(1), {}, stop_));
-  EXPECT_TRUE(whole->finished);
-  EXPECT_EQ(whole->last_step, 220);
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "whole" / "timelapse" / "00000220.png"));
-  FitJob job = Job("parts");
-  for (const std::uint64_t step : {70u, 130u, 207u}) {
-    StopAt(job, step);
-    job.existing = ExistingRun::kContinue;
-  }
-  const auto resumed = Ok(RunFit(job, Workers(7), {}, stop_));
-  EXPECT_EQ(resumed->first_step, 207);
-  EXPECT_EQ(resumed->last_step, 220);
-  EXPECT_EQ(Read("whole"), Read("parts"));
-  EXPECT_EQ(RunFit(job, Workers(1), {}, stop_)->first_step, 220);  // nothing is left to do
+  FitJob job = Job("whole");
+  const FitOutcome resumed = ExpectSameInParts(job, {70, 130, 207});
+  EXPECT_TRUE(resumed.finished);
+  EXPECT_EQ(resumed.last_step, 220);
+  EXPECT_TRUE(std::filesystem::exists(job.out / "timelapse" / "00000220.png"));
+  job.existing = ExistingRun::kContinue;
+  EXPECT_EQ(Run(job)->first_step, 220);  // nothing is left to do
 }
 
 TEST_F(HurriedFit, AFinishedFitGoesOnWithMoreSteps) {
   for (const char* name : {"once", "parts"}) {
     FitJob job = Job(name);
-    ASSERT_TRUE(RunFit(job, Workers(1), {}, stop_).ok());
+    ASSERT_TRUE(Run(job, 1).ok());
     job.existing = ExistingRun::kContinue;
     job.config.steps = 300;
     if (name == std::string("parts")) {
       StopAt(job, 260);
       job.config.steps = 280;  // neither what it has now, nor what it had
-      ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "300 steps", "or more");
+      ExpectMessage(Run(job, 1).status(), "300 steps", "or more");
       job.config.steps = 300;
     }
-    const auto more = Ok(RunFit(job, Workers(2), {}, stop_));
+    const auto more = Ok(Run(job));
     EXPECT_EQ(more->last_step, 300);
     // Pictures of both parts: 0, 87, 174 and 220; 200 and 300.
     EXPECT_TRUE(std::filesystem::exists(job.out / "timelapse" / "00000300.png"));
     job.config.steps = 260;
-    ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "300 steps already");
+    ExpectMessage(Run(job, 1).status(), "300 steps already");
   }
   EXPECT_EQ(Read("once"), Read("parts"));
 }

@@ -6,30 +6,17 @@
 #include <cmath>
 #include <numeric>
 
-#include "fit/make_views.h"
-#include "fit/run.h"
-#include "io/mesh_file.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::exposure_test {
 
-class Exposure : public TempFolderTest {
+class Exposure : public ViewsTest {
  protected:
-  void SetUp() override {
-    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
-    SetColor(box, {0.6f, 0.5f, 0.3f, 1});
-    Ok(MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", OutputGuard(), {},
-                 stop_));
-  }
   // Starts from the true shape.
   FitJob Job() {
     FitJob job;
-    auto input = ReadFitFolder(folder_ / "views", 0);
-    const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
-    EXPECT_TRUE(input.ok() && truth.ok());
-    if (input.ok()) job.input = std::move(*input);
-    if (truth.ok()) job.start = truth->mesh;
+    job.input = Views(ColoredBox({0.6f, 0.5f, 0.3f, 1}), {.views = 8, .held_out = 2, .size = 64});
+    job.start = Truth();
     job.out = folder_ / "run";
     job.config.timelapse = 0;
     job.config.levels = 1;
@@ -52,10 +39,8 @@ class Exposure : public TempFolderTest {
     step.job.options.width = step.job.options.height = 64;
     step.job.options.delta = 1e-3;
     step.job.options.max_alpha_error = 1e-6;
-    const auto values = (*fitter)->Evaluate(step);
-    EXPECT_TRUE(values.ok());
     Evaluation out;
-    if (values.ok()) out.total = values->loss;
+    out.total = Ok((*fitter)->Evaluate(step))->loss;
     for (const FittedBlock& block : (*fitter)->blocks()) {
       const auto gradient = block.gradient.value().span<float>();
       out.gradient.insert(out.gradient.end(), gradient.begin(), gradient.end());
@@ -79,7 +64,6 @@ class Exposure : public TempFolderTest {
     }
   }
 
-  StopFlag stop_ = false;
   Workers workers_{2};
 };
 
@@ -142,7 +126,7 @@ TEST_F(Exposure, GainsAreRecovered) {
   Photograph(start->scene, gains, &job.input);
   SetColor(*job.start, {0.5f, 0.5f, 0.5f, 1});  // to be found, too
   job.config.steps = 300;
-  Ok(RunFit(job, workers_, {}, stop_).status());
+  Ok(Run(job).status());
   const auto text = Ok(ReadText(job.out / "transforms_fitted.json"));
   // Relative to the reference, whose gain is not written: it is 1.
   std::size_t at = 0, found = 0;
@@ -168,8 +152,7 @@ TEST_F(Exposure, TheFocalLengthIsRecovered) {
   job.config.parameters[Parameter::kFocal] = true;
   job.config.steps = 200;
   job.config.rates[Parameter::kFocal] = 0.005;
-  ASSERT_TRUE(RunFit(job, workers_, {}, stop_).ok());
-  const auto input = ReadFitFolder(folder_ / "views", 0);
+  Ok(Run(job).status());
   const auto text = Ok(ReadText(job.out / "transforms_fitted.json"));
   const std::size_t at = text->find("\"fl_x\": ");
   ASSERT_NE(at, std::string::npos);

@@ -12,10 +12,7 @@
 
 #include "fit/hull/carve.h"
 #include "fit/hull/cell_distance.h"
-#include "fit/make_views.h"
-#include "fit/run.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train::hollows_test {
@@ -44,12 +41,10 @@ TEST(CellDistance, IsThatToTheNearestEmptyCell) {
       }
 }
 
-class Hollows : public TempFolderTest {
+class Hollows : public ViewsTest {
  protected:
-  FitInput Views(const Mesh& mesh) {
-    Ok(MakeViews(mesh, {.views = 24, .held_out = 0, .size = 96}, folder_ / "views",
-                 OutputGuard(true), {}, stop_));
-    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
+  FitInput Pictures(const Mesh& mesh) {
+    return Views(mesh, {.views = 24, .held_out = 0, .size = 96});
   }
   // The hull, and what is left of it.
   struct Grids {
@@ -65,7 +60,6 @@ class Hollows : public TempFolderTest {
   static double Iou(const Mesh& truth, const ScalarGrid& grid) {
     return VoxelIou(*Voxelize(truth, 32), *Voxelize(LevelSet(grid), 32));
   }
-  StopFlag stop_ = false;
 };
 
 constexpr glm::vec3 kSize = {0.9f, 0.5f, 0.7f};
@@ -92,7 +86,7 @@ Mesh OpenBox(bool colored) {
 
 TEST_F(Hollows, OfAnOpenBoxAreCarved) {
   const Mesh truth = OpenBox(true);
-  const Grids grids = Carved(Views(truth));
+  const Grids grids = Carved(Pictures(truth));
   EXPECT_LT(Iou(truth, grids.hull), 0.5);
   EXPECT_GT(Iou(truth, grids.hollow), 0.7);
 }
@@ -100,7 +94,7 @@ TEST_F(Hollows, OfAnOpenBoxAreCarved) {
 // Only the shading of the sides and their edges tell.
 TEST_F(Hollows, OfAGreyBoxAreCarvedWhereShadingTells) {
   const Mesh truth = OpenBox(false);
-  const Grids grids = Carved(Views(truth));
+  const Grids grids = Carved(Pictures(truth));
   EXPECT_GT(Iou(truth, grids.hollow), 0.7);
 }
 
@@ -139,7 +133,7 @@ TEST_F(Hollows, OfAJarAreAsDeepAsItsWallsAllow) {
                      {0, -0.3f}});
   for (const glm::vec3& p : jar.positions)
     jar.colors.push_back({0.5f + 0.6f * p.x, 0.4f, 0.5f + 0.6f * p.z, 1});
-  const Grids grids = Carved(Views(jar));
+  const Grids grids = Carved(Pictures(jar));
   EXPECT_LT(Iou(jar, grids.hull), 0.5);
   EXPECT_GT(Iou(jar, grids.hollow), 0.65);
 }
@@ -147,7 +141,7 @@ TEST_F(Hollows, OfAJarAreAsDeepAsItsWallsAllow) {
 TEST_F(Hollows, AreNotInAClosedBox) {
   Mesh box = OpenBox(true);
   AddBox({-0.45f, 0.2f, -0.35f}, {0.45f, 0.25f, 0.35f}, {0.5f, 0.3f, 0.6f, 1}, &box);
-  const Grids grids = Carved(Views(box));
+  const Grids grids = Carved(Pictures(box));
   EXPECT_EQ(grids.hull.values, grids.hollow.values);
 }
 
@@ -155,13 +149,13 @@ TEST_F(Hollows, AreNotInAClosedBox) {
 TEST_F(Hollows, TurnTheDefaultWeightOfTheAreaOff) {
   FitJob job;
   job.config.vertex_colors = true;
-  job.input = Views(OpenBox(true));
+  job.input = Pictures(OpenBox(true));
   const auto open = Ok(PrepareFit(job, Workers(2)));
   EXPECT_EQ(open->config.regularizers.area, 0);
 }
 
 TEST_F(Hollows, AreTheSameForAnyNumberOfWorkers) {
-  const FitInput input = Views(OpenBox(true));
+  const FitInput input = Pictures(OpenBox(true));
   EXPECT_EQ(Carved(input, 1).hollow.values, Carved(input, 5).hollow.values);
 }
 

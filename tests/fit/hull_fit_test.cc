@@ -4,21 +4,15 @@
 
 #include <cmath>
 
-#include "fit/make_views.h"
-#include "fit/run.h"
-#include "io/mesh_file.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::hull_fit_test {
 
-class HullFit : public TempFolderTest {
+class HullFit : public ViewsTest {
  protected:
   FitJob Job(const std::string& out, const Mesh& mesh = Torus(0.3f, 0.12f, 24, 12), int size = 32) {
-    Ok(MakeViews(mesh, {.views = 8, .held_out = 2, .size = size}, folder_ / "views",
-                 OutputGuard(true), {}, stop_));
     FitJob job;
-    job.input = ReadFitFolder(folder_ / "views", 0).value();
+    job.input = Views(mesh, {.views = 8, .held_out = 2, .size = size});
     job.out = folder_ / out;
     job.config.start = StartShape::kHull;
     job.config.steps = 40;
@@ -27,29 +21,13 @@ class HullFit : public TempFolderTest {
     job.config.checkpoint_every = 20;
     return job;
   }
-  Bytes Read(const std::string& out) { return ReadFile(folder_ / out / "mesh.glb").value(); }
-  StopFlag stop_ = false;
 };
 
 TEST_F(HullFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   for (const bool colors : {false, true}) {
-    const std::string whole = colors ? "whole_colors" : "whole", parts = whole + "_parts";
-    FitJob job = Job(whole);
+    FitJob job = Job(colors ? "colors" : "texture");
     job.config.vertex_colors = colors;
-    ASSERT_TRUE(RunFit(job, Workers(1), {}, stop_).ok());
-    job.out = folder_ / parts;
-    for (const std::uint64_t stop_at : {5u, 16u, 20u, 29u}) {
-      const auto stop = [&](const Progress& p) {
-        stop_ = p.stage == "fitting" && p.done == stop_at;
-      };
-      const auto stopped = RunFit(job, Workers(2), stop, stop_);
-      ASSERT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-      stop_ = false;
-      job.existing = ExistingRun::kContinue;
-    }
-    const auto resumed = Ok(RunFit(job, Workers(7), {}, stop_));
-    EXPECT_EQ(resumed->first_step, 29);
-    EXPECT_EQ(Read(whole), Read(parts));
+    ExpectSameInParts(job, {5, 16, 20, 29});
   }
 }
 
@@ -84,7 +62,7 @@ TEST_F(HullFit, TheAreaPullsThinHullsLess) {
 // What a sphere cannot: the hole of a ring.
 TEST_F(HullFit, KeepsTheHole) {
   FitJob job = Job("ring");
-  ASSERT_TRUE(RunFit(job, Workers(2), {}, stop_).ok());
+  Ok(Run(job).status());
   const auto mesh = Ok(io::LoadMesh(job.out / "mesh.glb"));
   for (const glm::vec3& p : mesh->mesh.positions) EXPECT_GT(std::hypot(p.x, p.z), 0.02f);
 }

@@ -7,11 +7,9 @@
 
 #include "fit/hull/hull_mesh.h"
 #include "fit/hull/mask_distance.h"
-#include "fit/make_views.h"
-#include "scene/shapes.h"
+#include "fit/views_fixture.h"
 #include "scene/simplify.h"
 #include "scene/topology.h"
-#include "support/temp_folder.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train::hull_test {
@@ -48,19 +46,16 @@ TEST(MaskDistance, OfNoPlaceIsFarOutside) {
   EXPECT_LT(DistanceOf(std::vector<float>{1, 0}, 2, 1).At(3e38f, -3e38f), -1e38f);
 }
 
-class Hull : public TempFolderTest {
+class Hull : public ViewsTest {
  protected:
-  FitInput Views(const Mesh& mesh, int size = 96) {
-    Ok(MakeViews(mesh, {.views = 24, .held_out = 0, .size = size}, folder_ / "views",
-                 OutputGuard(true), {}, stop_));
-    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
+  FitInput Pictures(const Mesh& mesh, int size = 96) {
+    return Views(mesh, {.views = 24, .held_out = 0, .size = size});
   }
   static long Euler(const Mesh& mesh) {
     const auto edges = BuildTopology(mesh.faces, mesh.positions.size()).edges.size();
     return static_cast<long>(mesh.positions.size()) - static_cast<long>(edges) +
            static_cast<long>(mesh.faces.size());
   }
-  StopFlag stop_ = false;
 };
 
 Mesh Together(const Mesh& a, const Mesh& b) {
@@ -73,7 +68,7 @@ Mesh Together(const Mesh& a, const Mesh& b) {
 
 TEST_F(Hull, ContainsTheObjectAndIsLittleLarger) {
   const Mesh box = Box({0, 0, 0}, {0.9f, 0.5f, 0.6f});
-  const FitInput input = Views(box);
+  const FitInput input = Pictures(box);
   const Workers workers(2);
   const auto grid = Ok(Carve(input, {}, workers));
   int inside = 0, missing = 0, more = 0;
@@ -100,7 +95,7 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
       mesh = Together(mesh, Box({x + side, 0, 0}, {0.08f, 0.44f, 0.1f}));
     }
   }
-  const auto hull = Ok(HullMesh(Views(mesh), {}, Workers(2)));
+  const auto hull = Ok(HullMesh(Pictures(mesh), {}, Workers(2)));
   EXPECT_EQ(Euler(*hull), 0);
   const auto truth = Voxelize(mesh, 32), found = Voxelize(*hull, 32);
   EXPECT_GT(VoxelIou(*truth, *found), 0.7);
@@ -109,7 +104,7 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
 
 // A long focal length makes pixels, and with them cells, far smaller than what the masks show.
 TEST_F(Hull, HasNoMoreCellsThanImagesResolve) {
-  FitInput input = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 16);
+  FitInput input = Pictures(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 16);
   for (Camera& camera : input.cameras) camera.fx *= 100;
   const auto grid = Ok(Carve(input, {.cell_pixels = 0.5}, Workers(1)));
   EXPECT_LT(*std::max_element(grid->size.begin(), grid->size.end()), 2 * 16 / 0.5 + 9);
@@ -120,7 +115,7 @@ TEST_F(Hull, HasLargerCellsWhereItHasTooManyHandles) {
   const Workers workers(2);
   HullOptions no_faces;
   no_faces.most_faces = 0;
-  const FitInput ring = Views(Torus(0.3f, 0.12f, 24, 12), 64);
+  const FitInput ring = Pictures(Torus(0.3f, 0.12f, 24, 12), 64);
   const auto fine = HullMesh(ring, {}, workers), few = HullMesh(ring, no_faces, workers);
   const double cell = CarveOptions().cell_pixels;
   const auto coarse = HullMesh(ring, {.carve = {.cell_pixels = 2 * cell}}, workers);
@@ -128,14 +123,14 @@ TEST_F(Hull, HasLargerCellsWhereItHasTooManyHandles) {
   EXPECT_EQ(few->positions, coarse->positions);
   EXPECT_EQ(few->faces, coarse->faces);
   EXPECT_NE(few->positions, fine->positions);
-  const FitInput box = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
+  const FitInput box = Pictures(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
   const auto plain = HullMesh(box, {}, workers), none = HullMesh(box, no_faces, workers);
   ASSERT_TRUE(plain.ok() && none.ok());
   EXPECT_EQ(plain->positions, none->positions);
 }
 
 TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {
-  const FitInput input = Views(Torus(0.3f, 0.12f, 24, 12), 64);
+  const FitInput input = Pictures(Torus(0.3f, 0.12f, 24, 12), 64);
   const auto one = HullMesh(input, {}, Workers(1)), many = HullMesh(input, {}, Workers(5));
   ASSERT_TRUE(one.ok() && many.ok());
   EXPECT_EQ(one->positions, many->positions);
@@ -144,7 +139,7 @@ TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {
 
 // Two of 24 masks are empty: without tolerance nothing is left, with it all but what they forgive.
 TEST_F(Hull, ToleratesBadMasks) {
-  FitInput input = Views(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
+  FitInput input = Pictures(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
   const std::size_t plane = input.images.pixels();
   for (const std::size_t v : {3u, 11u})
     std::fill_n(input.images.alpha.begin() + static_cast<std::ptrdiff_t>(v * plane), plane, 0.0f);

@@ -9,7 +9,7 @@
 #include "fit/masks/floor.h"
 #include "fit/masks/holes.h"
 #include "fit/masks/start_masks.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::masks_test {
 
@@ -72,15 +72,7 @@ class Capture {
     return held / all;
   }
 
-  double Iou(std::span<const float> alpha) const {
-    double both = 0, either = 0;
-    for (std::size_t p = 0; p < truth_.size(); ++p) {
-      const bool a = alpha[p] >= 0.5f, b = truth_[p];
-      both += a && b;
-      either += a || b;
-    }
-    return both / either;
-  }
+  const std::vector<float>& truth() const { return truth_; }
 
  private:
   void AddView(int v) {
@@ -110,7 +102,7 @@ class Capture {
     const float ball = Hit(eye, ray, static_cast<float>(kRadius), -1);
     const bool through = ball > 0 && thing_ == Thing::kDrilled && Through(eye, ray);
     const bool lining = ball > 0 && thing_ == Thing::kLined && IsLining(eye + ball * ray, ray);
-    truth_.push_back(ball > 0 && !through);
+    truth_.push_back(ball > 0 && !through ? 1.0f : 0.0f);
     special_.push_back(through || lining);
     if (lining) return 0.95f * kWood;
     if (ball > 0 && !through) return Ball(eye + ball * ray);
@@ -167,7 +159,8 @@ class Capture {
   Thing thing_;
   glm::vec3 axis_{0};  // of the hole
   FitInput input_;
-  std::vector<bool> truth_, special_;
+  std::vector<float> truth_;  // masks
+  std::vector<bool> special_;
 };
 
 TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
@@ -177,7 +170,7 @@ TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
   for (const auto& [place, least] : cases) {
     const Capture capture(place);
     const auto found = Ok(FindMasks(capture.input(), workers));
-    EXPECT_GT(capture.Iou(found->alpha), least) << static_cast<int>(place);
+    EXPECT_GT(MaskIou(found->alpha, capture.truth()), least) << static_cast<int>(place);
     for (const double agreement : found->agreement) EXPECT_GT(agreement, 0.8);
   }
 }
@@ -187,7 +180,7 @@ TEST(FitMasks, HoldWhatHasTheColourOfTheTable) {
   const auto found = FindMasks(capture.input(), Workers(2));
   ASSERT_TRUE(found.ok()) << found.status().message();
   EXPECT_GT(capture.Held(found->alpha), 0.6);  // 0.1 without
-  EXPECT_GT(capture.Iou(found->alpha), 0.91);
+  EXPECT_GT(MaskIou(found->alpha, capture.truth()), 0.91);
 }
 
 TEST(FitMasks, KeepHolesThatShowTheFloor) {
@@ -195,7 +188,7 @@ TEST(FitMasks, KeepHolesThatShowTheFloor) {
   const auto found = FindMasks(capture.input(), Workers(2));
   ASSERT_TRUE(found.ok()) << found.status().message();
   EXPECT_LT(capture.Held(found->alpha), 0.3);
-  EXPECT_GT(capture.Iou(found->alpha), 0.85);
+  EXPECT_GT(MaskIou(found->alpha, capture.truth()), 0.85);
 }
 
 // A square frame of 3 pixels around 9 x 9, with a gap of `gap` pixels on the left.
@@ -285,8 +278,7 @@ TEST_F(FitMaskFiles, AreReadBackToTheBit) {
   EXPECT_EQ(again.images.alpha, job_.input.images.alpha);
   EXPECT_FALSE(job_.input.mask_agreement.has_value());
   std::filesystem::remove(job_.out / "masks" / "view 3.png");
-  const Status missing = ReadMasks(job_.out / "masks", &again);
-  EXPECT_NE(missing.message().find("view 3.png: no such mask"), std::string::npos);
+  ExpectMessage(ReadMasks(job_.out / "masks", &again), "view 3.png: no such mask");
 }
 
 TEST_F(FitMaskFiles, AreSoughtWhereNoImageHasOne) {

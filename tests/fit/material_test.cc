@@ -10,12 +10,8 @@
 #include <glm/geometric.hpp>
 
 #include "base/rng.h"
-#include "fit/make_views.h"
-#include "fit/run.h"
 #include "fit/unknowns.h"
-#include "io/mesh_file.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::material_test {
 
@@ -26,7 +22,7 @@ ParameterBlock BlockOf(const Unknowns& unknowns, Parameter what) {
   return *std::ranges::find(unknowns.blocks(), what, &ParameterBlock::what);
 }
 
-class LitFit : public TempFolderTest {
+class LitFit : public ViewsTest {
  protected:
   // An egg in four colours; images are of it under light from kSun and a little from everywhere.
   void SetUp() override {
@@ -36,10 +32,8 @@ class LitFit : public TempFolderTest {
       mesh_.colors.emplace_back(x ? 0.8f : 0.4f, y ? 0.7f : 0.35f, x == y ? 0.6f : 0.3f, 1.0f);
     }
     for (glm::vec3& p : mesh_.positions) p.y *= 0.8f;
-    Ok(MakeViews(mesh_, {.views = 12, .held_out = 0, .size = kSize}, folder_ / "views",
-                 OutputGuard(), {}, stop_));
-    input_ = ReadFitFolder(folder_ / "views", 0).value();
-    truth_ = io::LoadMesh(folder_ / "views" / "truth.glb")->mesh;
+    input_ = Views(mesh_, {.views = 12, .held_out = 0, .size = kSize});
+    truth_ = Truth();
     Light();
   }
   void Light() {
@@ -105,14 +99,13 @@ class LitFit : public TempFolderTest {
 
   Mesh mesh_, truth_;
   FitInput input_;
-  StopFlag stop_ = false;
 };
 
 TEST_F(LitFit, TheRightKindFindsColorsAndLight) {
   std::array<double, 3> errors = {};
   for (const auto kind : {MaterialKind::kUnlit, MaterialKind::kLambert, MaterialKind::kPhong}) {
     const std::string name = "kind" + std::to_string(static_cast<int>(kind));
-    Ok(RunFit(Job(kind, name), Workers(2), {}, stop_).status());
+    Ok(Run(Job(kind, name)).status());
     const Path glb = folder_ / name / "mesh.glb";
     errors[static_cast<std::size_t>(kind)] = ColorError(glb);
     const double off = LightError(glb);
@@ -129,21 +122,9 @@ TEST_F(LitFit, TheRightKindFindsColorsAndLight) {
 
 TEST_F(LitFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   for (const auto kind : {MaterialKind::kLambert, MaterialKind::kPhong}) {
-    const std::string whole = "whole" + std::to_string(static_cast<int>(kind));
-    FitJob job = Job(kind, whole);
+    FitJob job = Job(kind, "whole" + std::to_string(static_cast<int>(kind)));
     job.config.steps = 60;
-    ASSERT_TRUE(RunFit(job, Workers(1), {}, stop_).ok());
-    job.out = folder_ / (whole + "_parts");
-    for (const std::uint64_t step : {11u, 37u}) {  // while colours rest, and after
-      const auto stopped = RunFit(
-          job, Workers(3), [&](const Progress& p) { stop_ = p.done == step; }, stop_);
-      ASSERT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-      stop_ = false;
-      job.existing = ExistingRun::kContinue;
-    }
-    ASSERT_TRUE(RunFit(job, Workers(2), {}, stop_).ok());
-    EXPECT_EQ(ReadFile(folder_ / whole / "mesh.glb").value(),
-              ReadFile(job.out / "mesh.glb").value());
+    ExpectSameInParts(job, {11, 37});  // while colours rest, and after
   }
 }
 
@@ -196,7 +177,7 @@ TEST_F(LitFit, TheFirstHarmonicRests) {
 TEST_F(LitFit, AMaterialBringsItsLight) {
   FitJob job = Job(MaterialKind::kPhong, "both");
   job.config.lighting = Lighting::kLambert;
-  ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "material", "leave out the lighting");
+  ExpectMessage(Run(job).status(), "material", "leave out the lighting");
 }
 
 // Directions of harmonics, where the light is known.

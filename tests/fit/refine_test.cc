@@ -8,10 +8,9 @@
 
 #include "fit/find_camera.h"
 #include "fit/input.h"
+#include "fit/views_fixture.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
-#include "scene/shapes.h"
-#include "support/expect.h"
 
 namespace tilegrad::train::refine_test {
 
@@ -113,13 +112,10 @@ TEST(RefineMesh, TheCameraSeesTheMeshThatIsGiven) {
     job.alpha = false;
     job.options.width = job.options.height = kSize;
     ASSERT_TRUE(renderer.Render(*scene, job).ok());
-    double both = 0, either = 0;
-    for (std::size_t p = 0; p < picture.pixels(); ++p) {
-      const bool a = renderer.images().face_ids[p] >= 0, b = picture.alpha[p] >= 0.5f;
-      both += a && b;
-      either += a || b;
-    }
-    EXPECT_NEAR(both / either, refined->after.silhouette_iou, 0.03) << steps;
+    std::vector<float> drawn;
+    for (const std::int32_t face : renderer.images().face_ids)
+      drawn.push_back(face >= 0 ? 1.0f : 0.0f);
+    EXPECT_NEAR(MaskIou(drawn, picture.alpha), refined->after.silhouette_iou, 0.03) << steps;
   }
 }
 

@@ -9,31 +9,21 @@
 #include <cmath>
 #include <sstream>
 
-#include "fit/make_views.h"
 #include "fit/transforms.h"
+#include "fit/views_fixture.h"
 #include "io/image_file.h"
-#include "io/mesh_file.h"
 #include "nn/context.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
 #include "train/report/html.h"
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::train::run_test {
 
-class Fit : public TempFolderTest {
+class Fit : public ViewsTest {
  protected:
-  void SetUp() override {
-    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
-    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    Ok(MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", OutputGuard(), {},
-                 stop_));
-  }
+  void SetUp() override { Views(ColoredBox(), {.views = 8, .held_out = 2, .size = 64}); }
   FitJob Job(const std::string& out) {
     FitJob job;
-    auto input = ReadFitFolder(folder_ / "views", 0);
-    EXPECT_TRUE(input.ok()) << input.status().message();
-    if (input.ok()) job.input = std::move(*input);
+    job.input = Input();
     job.out = folder_ / out;
     job.config.steps = 60;
     job.config.template_level = 2;
@@ -42,13 +32,7 @@ class Fit : public TempFolderTest {
     job.config.timelapse = 3;
     return job;
   }
-  Result<FitOutcome> Run(const FitJob& job, int workers = 2) {
-    const Workers w(workers);
-    return RunFit(job, w, {}, stop_);
-  }
   Bytes Read(const Path& path) { return Ok(ReadFile(path)).value(); }
-
-  StopFlag stop_ = false;
 };
 
 // The mesh to turn, its size, and settings with what they mean.
@@ -67,11 +51,10 @@ void CheckReport(const std::string& page, const Mesh& mesh) {
 }
 
 TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
-  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
   FitJob job = Job("run");
   job.config.steps = 400;
   job.config.template_level = 3;
-  job.truth = truth->mesh;
+  job.truth = Truth();
   const auto outcome = Ok(Run(job));
   EXPECT_EQ(outcome->held_out.size(), 2u);
   // The sphere itself: 13.5 dB, 0.78 and 0.69.
@@ -109,39 +92,21 @@ TEST(FitConfigText, HasTheNamesOfChoices) {
 }
 
 TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
-  ASSERT_TRUE(Run(Job("whole"), 1).ok());
-  FitJob job = Job("parts");
-  const Workers workers(2);
-  const auto stop_late = [&](const Progress& p) { stop_ = p.done == 27; };
-  const auto stopped = RunFit(job, workers, stop_late, stop_);
-  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-  EXPECT_NE(stopped.status().message().find("everything is saved"), std::string::npos);
-  stop_ = false;
-  EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
-  job.existing = ExistingRun::kContinue;
-  const auto resumed = Ok(Run(job, 7));
-  EXPECT_EQ(resumed->first_step, 27);
-  EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
+  ExpectSameInParts(Job("whole"), {27});
 }
 
 TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
   FitJob job = Job("run");
   job.config.checkpoint_every = 5;
-  const Workers workers(2);
-  const auto stop_at = [&](std::uint64_t step) {
-    return RunFit(
-        job, workers, [&, step](const Progress& p) { stop_ = p.done == step; }, stop_);
-  };
-  EXPECT_EQ(stop_at(12).status().code(), StatusCode::kCancelled);
+  StopAt(job, 12);
+  EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
   const Path newest = ListCheckpoints(job.out).back();
   std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);
   std::vector<std::string> warnings;
   job.warn = [&](const std::string& warning) { warnings.push_back(warning); };
   job.existing = ExistingRun::kContinue;
-  stop_ = false;
-  EXPECT_EQ(stop_at(13).status().code(), StatusCode::kCancelled);
-  ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
+  StopAt(job, 13);
+  ExpectOnly(warnings, newest.filename().string());
 }
 
 // Going on from an older checkpoint would throw away what a newer version did.
@@ -270,8 +235,7 @@ TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
 
 TEST_F(Fit, RefinesCameras) {
   FitJob job = Job("run");
-  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
-  job.start = truth->mesh;
+  job.start = Truth();
   job.config.parameters[Parameter::kCamera] = true;
   job.config.perturb_cameras = 5;
   job.config.steps = 200;
@@ -282,7 +246,6 @@ TEST_F(Fit, RefinesCameras) {
 
 // Every parameter moves, under the light that it needs.
 TEST_F(Fit, EveryParameterCanBeFitted) {
-  const auto truth = Ok(io::LoadMesh(folder_ / "views" / "truth.glb"));
   const std::pair<Parameter, Lighting> cases[] = {{Parameter::kColors, Lighting::kNone},
                                                   {Parameter::kTexture, Lighting::kLambert},
                                                   {Parameter::kUv, Lighting::kNone},
@@ -300,7 +263,7 @@ TEST_F(Fit, EveryParameterCanBeFitted) {
     job.config.levels = 1;  // every step sees the same
     job.config.vertex_colors = parameter == Parameter::kColors;
     const bool sphere = parameter == Parameter::kTexture || parameter == Parameter::kUv;
-    if (!sphere) job.start = truth->mesh;
+    if (!sphere) job.start = Truth();
     const auto outcome = Run(job);
     ASSERT_TRUE(outcome.ok()) << NameOf(parameter) << ": " << outcome.status().message();
     const auto log = Ok(ReadText(job.out / "metrics.jsonl"));

@@ -8,13 +8,11 @@
 #include <cstring>
 #include <limits>
 
-#include "fit/make_views.h"
 #include "fit/poses/crop.h"
 #include "fit/poses/input_poses.h"
 #include "fit/poses/pictures.h"
 #include "fit/score.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::find_poses_test {
 
@@ -47,12 +45,11 @@ TEST(PosePictures, KeepTheShorterSide) {
   }
 }
 
-class Poses : public TempFolderTest {
+class Poses : public ViewsTest {
  protected:
-  FitInput Input(int views) {
-    Ok(MakeViews(Thing(), {.views = views, .held_out = 2, .size = 64, .lowest = -20, .highest = 60},
-                 folder_ / "views", OutputGuard(true), {}, stop_));
-    return Ok(ReadFitFolder(folder_ / "views", 0)).value();
+  FitInput Pictures(int views) {
+    return Views(Thing(),
+                 {.views = views, .held_out = 2, .size = 64, .lowest = -20, .highest = 60});
   }
   InputPosesJob Job() const {
     InputPosesJob job;
@@ -63,8 +60,6 @@ class Poses : public TempFolderTest {
     const Workers w(workers);
     return FindInputPoses(job, input, w, {}, stop_);
   }
-
-  StopFlag stop_ = false;
 };
 
 double MeanError(const FitInput& input) {
@@ -82,7 +77,7 @@ double MeanError(const FitInput& input) {
 }
 
 TEST_F(Poses, AreFoundFromMasksAndColours) {
-  FitInput input = Input(20);
+  FitInput input = Pictures(20);
   // What the search must not see.
   const std::vector<Camera> given = input.cameras;
   for (const int i : input.training) {
@@ -99,7 +94,7 @@ TEST_F(Poses, AreFoundFromMasksAndColours) {
 }
 
 TEST_F(Poses, HeldOutCamerasFollow) {
-  FitInput input = Input(12);
+  FitInput input = Pictures(12);
   InputPosesJob job = Job();
   job.options.starts = job.options.sweeps = 1;
   ASSERT_TRUE(Find(job, &input).ok());
@@ -115,7 +110,7 @@ TEST_F(Poses, HeldOutCamerasFollow) {
 }
 
 TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
-  const FitInput input = Input(8);
+  const FitInput input = Pictures(8);
   InputPosesJob job = Job();
   job.options.starts = job.options.sweeps = 1;
   FitInput one = input, two = input, again = input;
@@ -138,7 +133,7 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
 
 // The searches that a stopped call came through are not done again.
 TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
-  const FitInput input = Input(8);
+  const FitInput input = Pictures(8);
   InputPosesJob job = Job();
   job.options.starts = 2;
   job.options.sweeps = 1;
@@ -169,7 +164,7 @@ TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
 
 // Of other images it says nothing.
 TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
-  FitInput input = Input(8);
+  FitInput input = Pictures(8);
   InputPosesJob job = Job();
   job.options.starts = 2;
   job.options.sweeps = 1;
@@ -190,15 +185,15 @@ TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
 }
 
 TEST_F(Poses, SaysWhatIsMissing) {
-  FitInput few = Input(5);
+  FitInput few = Pictures(5);
   EXPECT_NE(Find(Job(), &few).message().find("6 or more are needed"), std::string::npos);
-  FitInput empty = Input(8);
+  FitInput empty = Pictures(8);
   std::fill_n(empty.images.alpha.begin(), empty.images.pixels(), 0.0f);
   EXPECT_NE(Find(Job(), &empty).message().find("its mask is empty"), std::string::npos);
   FitInput bare = empty;
   bare.masked = false;
   EXPECT_NE(Find(Job(), &bare).message().find("plain background"), std::string::npos);
-  FitInput stopped = Input(8);
+  FitInput stopped = Pictures(8);
   stop_ = true;
   EXPECT_EQ(Find(Job(), &stopped).code(), StatusCode::kCancelled);
 }
