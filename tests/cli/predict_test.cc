@@ -121,7 +121,7 @@ TEST_F(Predict, TellsItsStagesAndEndsAtCtrlC) {
   EXPECT_EQ(whole.Finish(), 0) << whole.said();
   for (const char* stage : {"loading the network", "predicting from ", "looking for the camera",
                             "refining", "drawing ", "coding the animation"})
-    EXPECT_NE(whole.said().find(stage), std::string::npos) << stage << "\n" << whole.said();
+    ExpectIn(whole.said(), stage);
   TerminalProgram cut("predict --refine 100000" + to, 200);
   ASSERT_TRUE(cut.AwaitText("refining")) << cut.said();
   EXPECT_LT(cut.Interrupt(), 2);  // one, on a machine that does other work, too

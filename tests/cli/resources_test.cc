@@ -236,7 +236,7 @@ TEST_F(TerminalTest, EveryStageOfAFitIsTold) {
   }
   // Short ones leave nothing behind, and where there is no terminal say nothing.
   const Outcome logged = RunProgram("fit " + In("v") + " --steps 20 --out " + In("g"));
-  EXPECT_EQ(logged.output.find("reading images"), std::string::npos) << logged.output;
+  ExpectNotIn(logged.output, "reading images");
 }
 
 // Before there is anything to save, in the search for cameras, and while it fits.

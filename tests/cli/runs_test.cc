@@ -83,7 +83,7 @@ TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
   EXPECT_EQ(said.output.find("sample sheet", at + 1), std::string::npos) << said.output;
   EXPECT_TRUE(Exists("run/samples/step_00000010.png"));
   const Outcome quiet = RunProgram(Start("quiet") + " --quiet");
-  EXPECT_EQ(quiet.output.find("sample sheet"), std::string::npos) << quiet.output;
+  ExpectNotIn(quiet.output, "sample sheet");
 }
 
 TEST_F(Runs, AreExtendedIfAskedTo) {
@@ -164,8 +164,7 @@ TEST_F(Runs, ReportsCountTheStepsOfTheNetwork) {
   const std::string log = ReadText(folder_ / "run/metrics.jsonl").value();
   Write("run/metrics.jsonl", log.substr(0, log.rfind("{\"step\":3")));
   Done("report --run " + In("run") + " --models 0");
-  EXPECT_NE(ReadText(folder_ / "run/report.html")->find("was trained for 3 steps"),
-            std::string::npos);
+  ExpectIn(*ReadText(folder_ / "run/report.html"), "was trained for 3 steps");
 }
 
 TEST_F(Runs, OfFitsAreAnimated) {
@@ -197,7 +196,7 @@ TEST_F(Runs, HaveALivePage) {
   const Json said = Done("live " + In("run"));
   EXPECT_EQ(said["page"], page.string());
   EXPECT_EQ(said["address"], "file://" + page.string());
-  EXPECT_NE(ReadText(script)->find("\"finished\":true"), std::string::npos);
+  ExpectIn(*ReadText(script), "\"finished\":true");
 }
 
 TEST_F(Runs, AreTheOnlyFoldersToLookAt) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "scene/shapes.h"
+#include "support/expect.h"
 
 namespace tilegrad::train::doctor_test {
 
@@ -63,7 +64,7 @@ struct Patient {
 
 void ExpectBlocked(const Finding& finding, const std::string& word) {
   EXPECT_TRUE(finding.blocked) << finding.sentence;
-  EXPECT_NE(finding.sentence.find(word), std::string::npos) << finding.sentence;
+  ExpectIn(finding.sentence, word);
 }
 
 TEST(Doctor, HealthyParametersHaveNoComplaint) {
@@ -99,7 +100,7 @@ TEST(Doctor, AllLossFartherThanDeltaReaches) {
   patient.MoveMesh(0.85f, 0);  // beside where the image shows it
   patient.render.delta = 1e-6;
   const Finding finding = patient.Ask(Parameter::kPositions);
-  EXPECT_NE(finding.sentence.find("out of reach of delta"), std::string::npos) << finding.sentence;
+  ExpectIn(finding.sentence, "out of reach of delta");
 }
 
 TEST(Doctor, OnlyTheSilhouetteCounts) {

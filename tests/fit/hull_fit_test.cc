@@ -42,7 +42,7 @@ TEST_F(HullFit, ChartsWithoutRoomGetALargerTexture) {
   job.config.texture_size = 2;
   job.config.start = StartShape::kAuto;
   const auto sphere = Ok(PrepareFit(job, Workers(1)));
-  EXPECT_NE(sphere->note.find("no hull: a texture of 8 x 8"), std::string::npos) << sphere->note;
+  ExpectIn(sphere->note, "no hull: a texture of 8 x 8");
 }
 
 // The ring is 3 pixels thick, the box 14.

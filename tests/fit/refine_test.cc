@@ -157,7 +157,7 @@ TEST(RefineMesh, APictureWithoutAnObjectIsAnError) {
   empty.alpha.resize(empty.pixels());
   const auto refined = RefineMesh(Figure({0.4f, 0.35f, 0.4f}), empty, {.steps = 5}, workers);
   ASSERT_FALSE(refined.ok());
-  EXPECT_NE(refined.status().message().find("no object"), std::string::npos);
+  ExpectMessage(refined.status(), "no object");
 }
 
 // A grey map in longitude and latitude takes the picture's colours, on both sides.

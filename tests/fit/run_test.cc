@@ -37,17 +37,14 @@ class Fit : public ViewsTest {
 
 // The mesh to turn, its size, and settings with what they mean.
 void CheckReport(const std::string& page, const Mesh& mesh) {
-  const auto has = [&](const std::string& text) {
-    EXPECT_NE(page.find(text), std::string::npos) << text;
-  };
+  const auto has = [&](const std::string& text) { ExpectIn(page, text); };
   has("<th scope=\"row\">lighting</th><td>none</td><td>lighting model</td>");
   has("<th scope=\"row\">views_per_step</th><td>4</td><td>images per step</td>");
   has(fmt::format("<th scope=\"row\">faces</th><td>{}</td>", WithCommas(std::ssize(mesh.faces))));
   has(fmt::format("<td>{} × {} texels</td>", mesh.textures[0].image.width,
                   mesh.textures[0].image.height));
   has("\"texture\":{\"image\":\"data:image/png;base64,");
-  EXPECT_EQ(page.find("{{"), std::string::npos);
-  EXPECT_EQ(page.find("src=\"http"), std::string::npos);
+  ExpectNotIn(page, "{{", "src=\"http");
 }
 
 TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
@@ -280,13 +277,12 @@ TEST_F(Fit, ThePageSaysWhichViewsItShows) {
   FitJob job = Job("run");
   job.config.steps = 1;
   ASSERT_TRUE(Run(job).ok());
-  EXPECT_NE(ReadText(job.out / "report.html")->find(">Held-out views<"), std::string::npos);
+  ExpectIn(*ReadText(job.out / "report.html"), ">Held-out views<");
   job = Job("fitted");
   job.config.steps = 1;
   job.input.held_out.clear();
   ASSERT_TRUE(Run(job).ok());
-  EXPECT_NE(ReadText(job.out / "report.html")->find(">Fitted views, the first 6 of 8<"),
-            std::string::npos);
+  ExpectIn(*ReadText(job.out / "report.html"), ">Fitted views, the first 6 of 8<");
 }
 
 TEST_F(Fit, ErrorsNameTheCure) {

@@ -16,7 +16,7 @@ class Ops : public ::testing::Test {
   Var Random(const Shape& shape) { return RandomParameter(context_, {shape}, rng_); }
   void ExpectRefused(const Var& y, const char* word) {
     EXPECT_FALSE(y.valid()) << word;
-    EXPECT_NE(context_.TakeStatus().message().find(word), std::string::npos) << word;
+    ExpectMessage(context_.TakeStatus(), word);
   }
 
   Workers workers_{2};
@@ -133,8 +133,7 @@ TEST_F(Ops, OperandsOfTwoContextsAreRefused) {
   EXPECT_FALSE(other.TakeStatus().ok());
   for (const Var& foreign : {y, broken}) {
     EXPECT_FALSE((x + foreign).valid());
-    EXPECT_NE(context_.TakeStatus().message().find("add: operands are of two contexts"),
-              std::string::npos);
+    ExpectMessage(context_.TakeStatus(), "add: operands are of two contexts");
     EXPECT_FALSE(other.TakeStatus().ok());
     EXPECT_FALSE(Concat({x, foreign}, 0).valid());
     EXPECT_FALSE(context_.TakeStatus().ok());

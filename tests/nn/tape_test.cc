@@ -13,6 +13,7 @@
 #include "base/rng.h"
 #include "nn/memory.h"
 #include "nn/nn.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn::tape_test {
 
@@ -25,7 +26,7 @@ class Tape : public ::testing::Test {
   std::string Message() { return context_.TakeStatus().message(); }
   void ExpectRefused(const Var& y, const char* word) {
     EXPECT_FALSE(y.valid()) << word;
-    EXPECT_NE(Message().find(word), std::string::npos) << word;
+    ExpectIn(Message(), word);
   }
 
   Workers workers_{1};

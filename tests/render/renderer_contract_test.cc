@@ -218,8 +218,7 @@ TEST(ShadedPlan, LinesNameEveryStageWithItsCount) {
   EXPECT_EQ(lines[0], "forward");
   for (std::size_t i = 0; i < report.stages.size(); ++i) {
     const auto& stage = report.stages[i];
-    EXPECT_NE(lines[i + 1].find(stage.name), std::string::npos);
-    EXPECT_NE(lines[i + 1].find(std::to_string(stage.count)), std::string::npos);
+    ExpectIn(lines[i + 1], stage.name, std::to_string(stage.count));
     EXPECT_GE(stage.milliseconds, 0);
     EXPECT_FALSE(stage.what.empty());
   }
@@ -262,7 +261,7 @@ class Overflow : public testing::Test {
       const Status status = Render(scene);
       EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << target;
       for (const char* part : {"overflows", image}) {
-        EXPECT_NE(status.message().find(part), std::string::npos) << status.message();
+        ExpectMessage(status, part);
       }
     }
   }

@@ -277,7 +277,7 @@ TEST(RivalRenderer, ErrorsSayWhatDoesNotFit) {
     return renderer.Render(batch, options, {std::span(alpha).first(pixels), {}}).message();
   };
   const auto expect = [&](const std::string& text, const std::string& part) {
-    EXPECT_NE(text.find(part), std::string::npos) << text;
+    ExpectIn(text, part);
   };
   BatchT<float> batch = scene.Batch();
   expect(message(batch, {}, 8), "alpha has 8 numbers, expected 256");

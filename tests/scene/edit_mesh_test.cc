@@ -328,7 +328,7 @@ TEST(Unwrap, SaysThatThereIsNoRoom) {
   }
   const Status done = Unwrap({.width = 16, .height = 16}, &many);
   ASSERT_FALSE(done.ok());
-  EXPECT_NE(done.message().find("400 charts"), std::string::npos);
+  ExpectMessage(done, "400 charts");
 }
 
 // Faces near a pole span up to a quarter of the map; one that ran backwards would span most of it.

@@ -10,6 +10,7 @@
 #include "scene/mesh.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
+#include "support/expect.h"
 
 namespace tilegrad::scene_test {
 
@@ -156,13 +157,13 @@ TEST(Topology, CountsBoundaryAndNonmanifoldEdges) {
 TEST(Mesh, ValidateNamesArrayAndIndex) {
   Mesh mesh = Box({0, 0, 0}, {1, 1, 1});
   mesh.faces[3][1] = 8;
-  EXPECT_NE(Validate(mesh).message().find("faces[3][1] is 8"), std::string::npos);
+  ExpectMessage(Validate(mesh), "faces[3][1] is 8");
   mesh.faces[3][1] = 0;
   mesh.positions[2].y = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(Validate(mesh).message().find("positions[2][1] is nan"), std::string::npos);
+  ExpectMessage(Validate(mesh), "positions[2][1] is nan");
   mesh.positions[2].y = 0;
   mesh.colors.resize(3);
-  EXPECT_NE(Validate(mesh).message().find("colors"), std::string::npos);
+  ExpectMessage(Validate(mesh), "colors");
 }
 
 TEST(Mesh, NormalizeCentresAndScales) {

@@ -382,8 +382,7 @@ TEST(SingleImageConfig, N3mrVerticesHaveNoOffsets) {
   config.network.sphere.n3mr_vertices = true;
   EXPECT_TRUE(CheckConfig(config).ok());
   config.network.sphere.symmetric = true;
-  EXPECT_NE(CheckConfig(config).message().find("network.n3mr_vertices has no offsets"),
-            std::string::npos);
+  ExpectMessage(CheckConfig(config), "network.n3mr_vertices has no offsets");
 }
 
 TEST(RivalConfig, UnknownWordsNameTheKnownOnes) {

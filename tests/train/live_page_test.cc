@@ -129,7 +129,7 @@ TEST_F(LivePageTest, SaysHowItEnded) {
   EXPECT_EQ(State()["error"], "");
   ASSERT_TRUE(page.Finish(Status(StatusCode::kIo, "</script> is full")).ok());
   EXPECT_EQ(State()["error"], "</script> is full");
-  EXPECT_EQ(ReadText(run_ / "live/state.js")->find("</script>"), std::string::npos);
+  ExpectNotIn(*ReadText(run_ / "live/state.js"), "</script>");
 }
 
 TEST_F(LivePageTest, KeepsFewFilesAndNoneOfBefore) {

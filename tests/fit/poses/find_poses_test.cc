@@ -127,8 +127,7 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
   Write("other/cameras_start.json", std::string(R"({"agreement": 1, "poses": [[1, 2]]})"));
   FitInput broken = input;
   const Status refused = Find(job, &broken);
-  EXPECT_NE(refused.message().find("8 poses of twelve numbers"), std::string::npos)
-      << refused.message();
+  ExpectMessage(refused, "8 poses of twelve numbers");
 }
 
 // The searches that a stopped call came through are not done again.
@@ -186,13 +185,13 @@ TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
 
 TEST_F(Poses, SaysWhatIsMissing) {
   FitInput few = Pictures(5);
-  EXPECT_NE(Find(Job(), &few).message().find("6 or more are needed"), std::string::npos);
+  ExpectMessage(Find(Job(), &few), "6 or more are needed");
   FitInput empty = Pictures(8);
   std::fill_n(empty.images.alpha.begin(), empty.images.pixels(), 0.0f);
-  EXPECT_NE(Find(Job(), &empty).message().find("its mask is empty"), std::string::npos);
+  ExpectMessage(Find(Job(), &empty), "its mask is empty");
   FitInput bare = empty;
   bare.masked = false;
-  EXPECT_NE(Find(Job(), &bare).message().find("plain background"), std::string::npos);
+  ExpectMessage(Find(Job(), &bare), "plain background");
   FitInput stopped = Pictures(8);
   stop_ = true;
   EXPECT_EQ(Find(Job(), &stopped).code(), StatusCode::kCancelled);

@@ -11,6 +11,7 @@
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/kernel_test_util.h"
 #include "nn/kernels/kernel_trial.h"
+#include "support/expect.h"
 
 namespace tilegrad::nn::conv2d_test {
 
@@ -105,7 +106,7 @@ TEST(Conv2d, CheckRefusesShapesThatHaveNoOutput) {
   EXPECT_FALSE((Conv2dShape{1, 1, 3, 3, 1, 3, 3, 0, 0}.Check().ok()));
   EXPECT_FALSE((Conv2dShape{1, 0, 3, 3, 1, 3, 3, 1, 0}.Check().ok()));
   const Status status = Conv2dShape{1, 1, 3, 3, 1, 5, 6, 1, 0}.Check();
-  EXPECT_NE(status.message().find("5x6"), std::string::npos) << status.message();
+  ExpectMessage(status, "5x6");
 }
 
 // Every kind of kernel; odd extents and paddings, so that tiles hang over each edge; channels that

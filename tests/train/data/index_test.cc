@@ -159,7 +159,7 @@ TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(folder_).ok
 // Datasets of before have none; a shape of its own is written nowhere.
 TEST_F(IndexTest, ShapesAreOptional) {
   auto models = ReadModels(folder_, ReadDatasetInfo(folder_).value()).value();
-  EXPECT_EQ(ReadText(ModelsPath(folder_)).value().find("shape"), std::string::npos);
+  ExpectNotIn(ReadText(ModelsPath(folder_)).value(), "shape");
   EXPECT_EQ(CountShapes(models), models.size());
   models[1].shape = "one";
   ASSERT_TRUE(WriteModels(folder_, ReadDatasetInfo(folder_).value(), models).ok());
@@ -264,8 +264,7 @@ TEST_F(IndexTest, ModelFilesThatAreNotWhatTheyShould) {
     ASSERT_TRUE(io::SaveNpz(file, changed).ok());
     const auto data = dataset->Load(0);
     ASSERT_FALSE(data.ok());
-    EXPECT_NE(data.status().message().find(file.string()), std::string::npos);
-    EXPECT_NE(data.status().message().find(name), std::string::npos) << data.status().message();
+    ExpectMessage(data.status(), file.string(), name);
   };
   auto changed = arrays;
   changed.erase("occupancy");
@@ -316,8 +315,8 @@ TEST(FewModels, NamesTheRemedies) {
                            "schedule.mirrored=0.5", "tilegrad fit"})
     EXPECT_NE(fixed.find(part), std::string::npos) << part << " is not in: " << fixed;
   const std::string streamed = *AdviceOnFewModels(Models(7, 2), true);
-  EXPECT_EQ(streamed.find("stream.share"), std::string::npos) << streamed;
-  EXPECT_NE(streamed.find("tilegrad fit"), std::string::npos) << streamed;
+  ExpectNotIn(streamed, "stream.share");
+  ExpectIn(streamed, "tilegrad fit");
 }
 
 }  // namespace tilegrad::train::few_models_test

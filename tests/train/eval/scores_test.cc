@@ -151,7 +151,7 @@ Evaluation Named(const std::string& name) {
 TEST(EvaluationTable, MarkdownHoldsNoHtmlAndNoFurtherCells) {
   const std::string text = FormatMarkdown(Named("<b onclick=x>|[y](z)\n*"));
   EXPECT_EQ(text.find('<'), std::string::npos) << text;
-  EXPECT_NE(text.find("&lt;b onclick=x&gt;\\|\\[y\\](z)\\\\n\\*"), std::string::npos) << text;
+  ExpectIn(text, "&lt;b onclick=x&gt;\\|\\[y\\](z)\\\\n\\*");
   // The table's lines: heading, dashes, one method; three cells each.
   int lines = 0;
   std::istringstream in(text);
@@ -171,7 +171,7 @@ TEST_F(WrittenEvaluation, NamesNeedNotBeUtf8) {
   ASSERT_TRUE(WriteEvaluation(folder_, Named("caf\xe9")).ok());
   const auto back = Ok(ReadEvaluation(folder_));
   EXPECT_EQ((*back)->classes[0], "caf\xe9");
-  EXPECT_NE(ReadText(folder_ / "eval.md").value().find("caf\\\\xe9"), std::string::npos);
+  ExpectIn(ReadText(folder_ / "eval.md").value(), "caf\\\\xe9");
 }
 
 // Standard errors and paired differences, on numbers worked out by hand.
@@ -217,8 +217,8 @@ TEST(Paired, FindsADifferenceThatMeansHide) {
   EXPECT_TRUE(IouOf(comparison).better());
   EXPECT_FALSE(IouOf(ComparePaired(second, first).value()).better());
   const std::string text = FormatComparison(comparison);
-  EXPECT_NE(text.find("3D IoU                  +3.0 ± 0.6  better"), std::string::npos) << text;
-  EXPECT_NE(text.find("F-score                 +0.0 ± 0.0  a tie"), std::string::npos) << text;
+  ExpectIn(text, "3D IoU                  +3.0 ± 0.6  better",
+           "F-score                 +0.0 ± 0.0  a tie");
   EXPECT_EQ(ComparisonJson(comparison)["measures"]["iou"]["verdict"], "better");
 }
 
@@ -269,8 +269,7 @@ TEST_F(WrittenErrors, ComeBackAndAreShown) {
   constant.mean.light_angle = 60;
   evaluation.rows.insert(evaluation.rows.begin(), constant);
   const std::string table = FormatTable(evaluation);
-  for (const char* part : {"60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50"})
-    EXPECT_NE(table.find(part), std::string::npos) << part << "\n" << table;
+  ExpectIn(table, "60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50");
   ASSERT_TRUE(WriteEvaluation(folder_, evaluation).ok());
   const auto back = Ok(ReadEvaluation(folder_));
   EXPECT_EQ((*back)->rows[1].error->light_angle, 2);

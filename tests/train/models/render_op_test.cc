@@ -16,6 +16,7 @@
 #include "scene/light_frame.h"
 #include "scene/shapes.h"
 #include "shade/spherical_harmonics_ref.h"
+#include "support/expect.h"
 #include "train/gradient_check.h"
 #include "train/models/camera_ops.h"
 
@@ -113,14 +114,14 @@ TEST(RenderTextured, CubesOfOneColorAreColorsOfFaces) {
   EXPECT_EQ(s.Error(), "");
   s.job.options.rule = rivals::Rule::kSoftRas;
   EXPECT_FALSE(RenderTextured(s.renderer, s.positions, cubes, s.job).alpha.valid());
-  EXPECT_NE(s.Error().find("only N3MR"), std::string::npos);
+  ExpectIn(s.Error(), "only N3MR");
 }
 
 TEST(RenderRival, ErrorsReachTheContext) {
   Setting s;
   const auto expect = [&](const std::string& part) {
     const std::string error = s.Error();
-    EXPECT_NE(error.find(part), std::string::npos) << error;
+    ExpectIn(error, part);
   };
   s.job.options.softras.sigma = -1;
   EXPECT_FALSE(s.Draw({}).alpha.valid());
@@ -230,7 +231,7 @@ TEST(LightFrames, OneLightForEachCamera) {
   const Workers workers(1);
   nn::Context context(workers);
   DirectionsToWorld(nn::Constant(context, context.Full({2, 3}, 1.0)), SomeCameras());
-  EXPECT_NE(context.TakeStatus().message().find("lights [2, 3] of 3 cameras"), std::string::npos);
+  ExpectMessage(context.TakeStatus(), "lights [2, 3] of 3 cameras");
 }
 
 // The renderer on the tape: gradients of everything that a network may predict, in float64 against
@@ -424,7 +425,7 @@ TEST(RenderScenes, WrongShapesAreErrors) {
   nn::Context context(workers);
   Rendering rendering(context, batch, {true}, nn::DType::kF32);
   rendering.Loss();
-  EXPECT_NE(context.TakeStatus().message().find("views each, but 3 cameras"), std::string::npos);
+  ExpectMessage(context.TakeStatus(), "views each, but 3 cameras");
 
   const Batch sound(Lit(Lighting::kLambert));
   SceneRenderer renderer(workers);
@@ -434,8 +435,7 @@ TEST(RenderScenes, WrongShapesAreErrors) {
                {.positions = positions,
                 .light_directions = nn::Constant(context, context.Full({kMeshes, 3}, 1.0))},
                sound.job);
-  EXPECT_NE(context.TakeStatus().message().find("light_directions has the shape [2, 3]"),
-            std::string::npos);
+  ExpectMessage(context.TakeStatus(), "light_directions has the shape [2, 3]");
 }
 
 }  // namespace tilegrad::train::render_op_test

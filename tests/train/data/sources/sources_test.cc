@@ -77,10 +77,10 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}));
   EXPECT_EQ(summary->models.size(), 1u);
   ASSERT_EQ(summary->rejected.size(), 1u);
-  EXPECT_NE(summary->rejected[0].reason.find("c.obj"), std::string::npos);
+  ExpectIn(summary->rejected[0].reason, "c.obj");
   ASSERT_EQ(summary->ignored.size(), 2u);
-  EXPECT_NE(summary->ignored[0].file.find("readme.md"), std::string::npos);
-  EXPECT_NE(summary->ignored[1].file.find("notes.txt"), std::string::npos);
+  ExpectIn(summary->ignored[0].file, "readme.md");
+  ExpectIn(summary->ignored[1].file, "notes.txt");
 }
 
 // Models that nobody published are used without their textures.
@@ -128,13 +128,13 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   ASSERT_EQ(ignored.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_EQ(ignored[i].file, (folder_ / "set" / expected[i].first).string());
-    EXPECT_NE(ignored[i].reason.find(expected[i].second), std::string::npos) << ignored[i].reason;
+    ExpectIn(ignored[i].reason, expected[i].second);
   }
   // Where nothing is left, the error has the first of them.
   std::filesystem::remove(folder_ / "set/solid/a.OBJ");
   const auto none = FolderSource(folder_ / "set");
   ASSERT_FALSE(none.ok());
-  EXPECT_NE(none.status().message().find("deep/inner"), std::string::npos);
+  ExpectMessage(none.status(), "deep/inner");
   std::filesystem::remove(folder_ / "set/empty/.hidden");  // our own
 }
 
@@ -165,19 +165,19 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
   Write("split.txt", "03001627/a1 test\n03001627/b2 exam\n");
   const auto wrong = Listed();
   ASSERT_FALSE(wrong.ok());
-  EXPECT_NE(wrong.status().message().find("line 2"), std::string::npos);
+  ExpectMessage(wrong.status(), "line 2");
 
   Write("split.txt", "03001627/d4 test\n");
   const auto none = Listed();
   ASSERT_FALSE(none.ok());
-  EXPECT_NE(none.status().message().find("that the list names"), std::string::npos);
+  ExpectMessage(none.status(), "that the list names");
 }
 
 TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {
   const auto source = SweetHome3dSource(folder_);
   ASSERT_FALSE(source.ok());
   EXPECT_EQ(source.status().code(), StatusCode::kNotFound);
-  EXPECT_NE(source.status().message().find("apt-get install"), std::string::npos);
+  ExpectMessage(source.status(), "apt-get install");
 }
 
 TEST(SweetHome3d, ListIsCompiledIn) {
@@ -241,7 +241,7 @@ TEST_F(SourcesTest, NmrFilesThatDoNotFitAreErrors) {
                  {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}}));
   const auto source = NmrSource(folder_);
   ASSERT_FALSE(source.ok());
-  EXPECT_NE(source.status().message().find("car_val_voxels.npz"), std::string::npos);
+  ExpectMessage(source.status(), "car_val_voxels.npz");
 }
 
 using Vec = glm::dvec3;

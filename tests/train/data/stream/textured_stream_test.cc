@@ -123,10 +123,10 @@ TEST(LightDraw, HarmonicsHaveTheDirection) {
 TEST(LightDraw, WordsAndRangesAreChecked) {
   LightConfig config;
   config.model = "neon";
-  EXPECT_NE(CheckConfig(config).message().find("light.model is \"neon\""), std::string::npos);
+  ExpectMessage(CheckConfig(config), "light.model is \"neon\"");
   config = {};
   config.from = "below";
-  EXPECT_NE(CheckConfig(config).message().find("light.from is \"below\""), std::string::npos);
+  ExpectMessage(CheckConfig(config), "light.from is \"below\"");
   config = {};
   config.shininess_low = 40;
   EXPECT_FALSE(CheckConfig(config).ok());
@@ -167,8 +167,7 @@ TEST(TexturedStream, ViewsCanBeChanged) {
   const std::size_t image = before.size() / 2;
   EXPECT_EQ(std::memcmp(swapped->data(), before.data() + image, image * sizeof(float)), 0);
   EXPECT_NE(std::memcmp(swapped->data(), before.data(), image * sizeof(float)), 0);
-  EXPECT_NE(stream.Change(0, std::span(other).first(1)).message().find("2 views were drawn"),
-            std::string::npos);
+  ExpectMessage(stream.Change(0, std::span(other).first(1)), "2 views were drawn");
 }
 
 // An object that is set up in given views is the one that Render draws at that position.

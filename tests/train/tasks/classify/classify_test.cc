@@ -89,20 +89,17 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
   const auto back = Ok(ReadEvaluation(run));
   EXPECT_EQ((*back)->rows[2].mean.accuracy, evaluation->rows[2].mean.accuracy);
-  EXPECT_EQ(ReadText(run / "eval.json")->find("\"iou\""), std::string::npos);
+  ExpectNotIn(*ReadText(run / "eval.json"), "\"iou\"");
   const std::string table = FormatTable(*evaluation);
-  EXPECT_NE(table.find("Accuracy (%) on 6 models of the test split, 4 views"), std::string::npos)
-      << table;
-  EXPECT_EQ(table.find("IoU"), std::string::npos) << table;
+  ExpectIn(table, "Accuracy (%) on 6 models of the test split, 4 views");
+  ExpectNotIn(table, "IoU");
 
   const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
   Ok(WriteReport(job, workers_, kSilent).status());
   const std::string page = ReadText(job.out).value();
-  for (const char* part :
-       {"to classify an object", "a mean accuracy of", "nearest training picture",
-        "most frequent class", "called red", "accuracy, %"})
-    EXPECT_NE(page.find(part), std::string::npos) << part;
-  EXPECT_EQ(page.find("3D IoU at"), std::string::npos);
+  ExpectIn(page, "to classify an object", "a mean accuracy of", "nearest training picture",
+           "most frequent class", "called red", "accuracy, %");
+  ExpectNotIn(page, "3D IoU at");
 }
 
 TEST_F(ClassifyTest, OtherClassesAreRefused) {

@@ -71,7 +71,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   EXPECT_GT(*mean.light_angle, 5);
   EXPECT_EQ(*dark.texture_l1, *ours.texture_l1);
   EXPECT_GT(*dark.lit_l1, *ours.lit_l1);  // lit pictures are darker than textures
-  EXPECT_NE(FormatTable(*evaluation).find("texture + light L1"), std::string::npos);
+  ExpectIn(FormatTable(*evaluation), "texture + light L1");
   ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
   const auto read = ReadEvaluation(run);
   ASSERT_TRUE(read.ok() && read->has_value());
@@ -80,10 +80,8 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   const ReportJob page{run, data, folder_ / "page.html", 2};
   const auto report = Ok(WriteReport(page, workers_, kSilent));
   const std::string text = ReadText(page.out).value();
-  for (const char* part : {"to predict shape, texture and light", "texture + light L1",
-                           "true light", "another view", "Angle of the light"}) {
-    EXPECT_NE(text.find(part), std::string::npos) << part;
-  }
+  ExpectIn(text, "to predict shape, texture and light", "texture + light L1", "true light",
+           "another view", "Angle of the light");
 }
 
 TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
@@ -155,8 +153,7 @@ TEST_F(TexturedTask, StartsAsTheNetworkOfAnotherRun) {
   const auto log = Ok(ReadLog(run_));
   std::string names;
   for (const auto& value : log->back().values) names += value.first + " ";
-  EXPECT_NE(names.find("adversarial "), std::string::npos) << names;
-  EXPECT_NE(names.find("critic_distance critic_penalty "), std::string::npos) << names;
+  ExpectIn(names, "adversarial ", "critic_distance critic_penalty ");
 }
 
 TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
