@@ -160,16 +160,6 @@ TEST_F(ReadBudgetTest, TheEnvironmentSetsIt) {
   }
 }
 
-TEST_F(ReadBudgetTest, FilesCount) {
-  const Path file = Write("a", std::string(60, 'x'));
-  EXPECT_TRUE(ReadFile(file).ok());
-  const ReadBudget budget(100);
-  EXPECT_TRUE(ReadFile(file).ok());
-  const auto second = ReadText(file);
-  EXPECT_EQ(second.status().code(), StatusCode::kResourceExhausted);
-  ExpectMessage(second.status(), file.string());
-}
-
 class ScratchBytesTest : public TempFolderTest {
  protected:
   ScratchBytesTest() { ::setenv("TMPDIR", folder_.c_str(), 1); }
