@@ -12,6 +12,7 @@
 #include <iostream>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "api/c_caller.h"
@@ -86,6 +87,16 @@ class CApi : public testing::Test {
     return tilegrad_last_error(renderer);
   }
   tilegrad_status Render() { return tilegrad_render(renderer, &c.scene, 1, &options, frame); }
+  // Of a request for one gradient that cannot be had.
+  template <class T>
+  std::string ErrorOfRequest(T tilegrad_scene_gradients::*what, std::type_identity_t<T> where) {
+    tilegrad_frame_gradients d_frame;
+    tilegrad_frame_gradients_init(&d_frame);
+    tilegrad_scene_gradients d_scene;
+    tilegrad_scene_gradients_init(&d_scene);
+    d_scene.*what = where;
+    return ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0));
+  }
   // The gradients of the rendered frame, for cotangents `d`, are `g`, bit by bit.
   void ExpectGradients(const FrameGradients& d, const TestGradients<float>& g) {
     tilegrad_frame_gradients d_frame;
@@ -195,39 +206,41 @@ TEST_F(CApi, AFrameHoldsNothingAfterAnyError) {
   EXPECT_EQ(images.count, 0);
 }
 
-TEST_F(CApi, APointerThatWasForgottenIsNoEmptyArray) {
-  const tilegrad_scene sound = c.scene;
-  c.scene.faces = nullptr;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: faces is NULL, but face_count is 18");
-  c.scene = sound;
-  c.scene.positions = nullptr;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: positions is NULL, but vertices is 16");
-  c.scene = sound;
-  c.scene.textures = nullptr;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: textures is NULL, but texture_count is 1");
-  c.scene = sound;
-  c.scene.surfaces = nullptr;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: surfaces is NULL, but surface_count is 1");
+// A pointer that was forgotten is no empty array; a size of -1 is none.
+TEST_F(CApi, WrongScenesAreNamed) {
+  constexpr std::size_t kMinusOne = SIZE_MAX;
+  const std::pair<void (*)(CScene&), const char*> cases[] = {
+      {[](CScene& of) { of.scene.faces = nullptr; }, "faces is NULL, but face_count is 18"},
+      {[](CScene& of) { of.scene.positions = nullptr; }, "positions is NULL, but vertices is 16"},
+      {[](CScene& of) { of.scene.textures = nullptr; }, "textures is NULL, but texture_count is 1"},
+      {[](CScene& of) { of.scene.surfaces = nullptr; }, "surfaces is NULL, but surface_count is 1"},
+      {[](CScene& of) { of.scene.light_count = kMinusOne; },
+       "light_count is 18446744073709551615, must be in 0..2147483647"},
+      {[](CScene& of) { of.scene.vertices = kMinusOne / 2; },
+       "vertices is 9223372036854775807, must be in 0..2147483647"},
+      {[](CScene& of) { of.scene.lighting = 4; }, "shading.lighting is 4, must be in 0..3"},
+      {[](CScene& of) { of.texture.width = -5; },
+       "textures[0]: is -5 x 4 texels; each side must be in 1..16384"},
+      {[](CScene& of) { of.scene.struct_size = 0; },
+       "scene.struct_size is 0: call tilegrad_..._init first"}};
+  for (const auto& [spoil, message] : cases) {
+    const tilegrad_scene scene = c.scene;
+    const tilegrad_texture texture = c.texture;
+    spoil(c);
+    EXPECT_EQ(ErrorOf(Render()), std::string("scene 0: ") + message);
+    c.scene = scene;
+    c.texture = texture;
+  }
 }
 
 // Their arrays would stay as they were, whatever that was.
 TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
   ASSERT_EQ(Render(), TILEGRAD_OK);
-  tilegrad_frame_gradients d_frame;
-  tilegrad_frame_gradients_init(&d_frame);
-  tilegrad_scene_gradients d_scene;
-  tilegrad_scene_gradients_init(&d_scene);
   float numbers[48] = {};
-  d_scene.sh = numbers;
-  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+  EXPECT_EQ(ErrorOfRequest(&tilegrad_scene_gradients::sh, numbers),
             "scene 0: d_scene.sh is requested, but the scene has none");
-  d_scene.sh = nullptr;
-  d_scene.normals = numbers;
-  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+  EXPECT_EQ(ErrorOfRequest(&tilegrad_scene_gradients::normals, numbers),
             "scene 0: d_scene.normals is requested, but the scene has none");
-}
-
-TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
   c.scene.textures = nullptr;
   c.scene.texture_count = 0;
   c.surface.texture = -1;
@@ -235,36 +248,12 @@ TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
   c.scene.light_count = 0;
   c.scene.lighting = 0;
   ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
-  tilegrad_frame_gradients d_frame;
-  tilegrad_frame_gradients_init(&d_frame);
-  tilegrad_scene_gradients d_scene;
-  tilegrad_scene_gradients_init(&d_scene);
   float* textures[1] = {};
-  d_scene.textures = textures;
-  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
-            "scene 0: d_scene.textures is requested, but the scene has none");
   tilegrad_light d_light = {};
-  d_scene.textures = nullptr;
-  d_scene.lights = &d_light;
-  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+  EXPECT_EQ(ErrorOfRequest(&tilegrad_scene_gradients::textures, textures),
+            "scene 0: d_scene.textures is requested, but the scene has none");
+  EXPECT_EQ(ErrorOfRequest(&tilegrad_scene_gradients::lights, &d_light),
             "scene 0: d_scene.lights is requested, but the scene has none");
-}
-
-// -1 as a size, for one.
-TEST_F(CApi, CountsBeyondAnyArrayAreNamed) {
-  const std::size_t none = static_cast<std::size_t>(-1);
-  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, none, &options, frame)),
-            "count is 18446744073709551615, must be in 0..2147483647");
-  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 2147483647, &options, frame)),
-            "scene 0: scene is NULL");
-  const tilegrad_scene sound = c.scene;
-  c.scene.light_count = none;
-  EXPECT_EQ(ErrorOf(Render()),
-            "scene 0: light_count is 18446744073709551615, must be in 0..2147483647");
-  c.scene = sound;
-  c.scene.vertices = none / 2;
-  EXPECT_EQ(ErrorOf(Render()),
-            "scene 0: vertices is 9223372036854775807, must be in 0..2147483647");
 }
 
 TEST_F(CApi, StructsOfAnArrayHaveOneSize) {
@@ -289,15 +278,10 @@ TEST_F(CApi, SaysWhatIsWrong) {
             "scene 0: scene is NULL");
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, &options, nullptr)), "frame is NULL");
   EXPECT_EQ(tilegrad_render(nullptr, &c.scene, 1, &options, frame), TILEGRAD_INVALID_ARGUMENT);
-  c.scene.lighting = 4;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: shading.lighting is 4, must be in 0..3");
-  c.scene.lighting = 2;
-  c.texture.width = -5;
-  EXPECT_EQ(ErrorOf(Render()),
-            "scene 0: textures[0]: is -5 x 4 texels; each side must be in 1..16384");
-  c.texture.width = 5;
-  c.scene.struct_size = 0;
-  EXPECT_EQ(ErrorOf(Render()), "scene 0: scene.struct_size is 0: call tilegrad_..._init first");
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, SIZE_MAX, &options, frame)),
+            "count is 18446744073709551615, must be in 0..2147483647");
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 2147483647, &options, frame)),
+            "scene 0: scene is NULL");
   tilegrad_images images;
   tilegrad_images_init(&images);
   ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);

@@ -37,13 +37,13 @@ class Fit : public ViewsTest {
 
 // The mesh to turn, its size, and settings with what they mean.
 void CheckReport(const std::string& page, const Mesh& mesh) {
-  const auto has = [&](const std::string& text) { ExpectIn(page, text); };
-  has("<th scope=\"row\">lighting</th><td>none</td><td>lighting model</td>");
-  has("<th scope=\"row\">views_per_step</th><td>4</td><td>images per step</td>");
-  has(fmt::format("<th scope=\"row\">faces</th><td>{}</td>", WithCommas(std::ssize(mesh.faces))));
-  has(fmt::format("<td>{} × {} texels</td>", mesh.textures[0].image.width,
-                  mesh.textures[0].image.height));
-  has("\"texture\":{\"image\":\"data:image/png;base64,");
+  ExpectIn(
+      page, "<th scope=\"row\">lighting</th><td>none</td><td>lighting model</td>",
+      "<th scope=\"row\">views_per_step</th><td>4</td><td>images per step</td>",
+      fmt::format("<th scope=\"row\">faces</th><td>{}</td>", WithCommas(std::ssize(mesh.faces))),
+      fmt::format("<td>{} × {} texels</td>", mesh.textures[0].image.width,
+                  mesh.textures[0].image.height),
+      "\"texture\":{\"image\":\"data:image/png;base64,");
   ExpectNotIn(page, "{{", "src=\"http");
 }
 
@@ -286,25 +286,23 @@ TEST_F(Fit, ThePageSaysWhichViewsItShows) {
 }
 
 TEST_F(Fit, ErrorsNameTheCure) {
-  FitJob job = Job("run");
-  job.config.parameters[Parameter::kSh] = true;
-  ExpectMessage(Run(job).status(), "sh cannot be fitted", "spherical harmonics");
-  job = Job("run");
-  job.input.masked = false;
-  ExpectMessage(Run(job).status(), "mask");
-  job = Job("run");
-  job.config.steps = 0;
-  ExpectMessage(Run(job).status(), "steps is 0");
-  job = Job("run");
-  job.config.perturb_cameras = NAN;
-  ExpectMessage(Run(job).status(), "perturb_cameras is nan");
-  job = Job("run");
-  job.config.timelapse = -1;
-  ExpectMessage(Run(job).status(), "timelapse is -1");
-  job = Job("run");
-  job.config.lighting = Lighting::kLambert;
-  job.config.light_direction = {0, 0, 0};
-  ExpectMessage(Run(job).status(), "light_direction is 0 0 0");
+  const auto refused = [&](const auto& change, const auto&... parts) {
+    FitJob job = Job("run");
+    change(job);
+    ExpectMessage(Run(job).status(), parts...);
+  };
+  refused([](FitJob& job) { job.config.parameters[Parameter::kSh] = true; }, "sh cannot be fitted",
+          "spherical harmonics");
+  refused([](FitJob& job) { job.input.masked = false; }, "mask");
+  refused([](FitJob& job) { job.config.steps = 0; }, "steps is 0");
+  refused([](FitJob& job) { job.config.perturb_cameras = NAN; }, "perturb_cameras is nan");
+  refused([](FitJob& job) { job.config.timelapse = -1; }, "timelapse is -1");
+  refused(
+      [](FitJob& job) {
+        job.config.lighting = Lighting::kLambert;
+        job.config.light_direction = {0, 0, 0};
+      },
+      "light_direction is 0 0 0");
   EXPECT_EQ(ReadFitFolder(folder_ / "none", 0).status().code(), StatusCode::kNotFound);
   Write("broken/transforms.json", std::string("{\"frames\": [{\"file_path\": \"a.png\"}]}"));
   ExpectMessage(ReadFitFolder(folder_ / "broken", 0).status(), "frame 0", "camera_angle_x");
