@@ -272,6 +272,35 @@ TEST_F(CApi, ImagesWithoutInitAreNotWritten) {
   EXPECT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_INVALID_ARGUMENT);
 }
 
+// An image that was asked for is never NULL; of a scene without the parts for it it is zeros, which
+// pull at nothing.
+TEST_F(CApi, ImagesOfWhatIsNotThereAreZeros) {
+  c.scene.uvs = {};
+  c.scene.textures = nullptr;
+  c.scene.texture_count = 0;
+  c.surface.texture = -1;
+  for (const int size : {3, 40}) {
+    options.width = options.height = size;
+    ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
+    tilegrad_images images;
+    tilegrad_images_init(&images);
+    ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+    ASSERT_NE(images.uv, nullptr);
+    ASSERT_NE(images.depth, nullptr);
+    const std::vector<float> ones(static_cast<std::size_t>(2 * size * size), 1.0f);
+    EXPECT_EQ(std::count(images.uv, images.uv + ones.size(), 0.0f), std::ssize(ones));
+    tilegrad_frame_gradients d_frame;
+    tilegrad_frame_gradients_init(&d_frame);
+    d_frame.uv = ones.data();
+    std::vector<float> d_positions(48, 7.0f);
+    tilegrad_scene_gradients d_scene;
+    tilegrad_scene_gradients_init(&d_scene);
+    d_scene.positions = d_positions.data();
+    ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK);
+    EXPECT_EQ(d_positions, std::vector<float>(48, 0.0f));
+  }
+}
+
 TEST_F(CApi, SaysWhatIsWrong) {
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, nullptr, frame)), "options is NULL");
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 1, &options, frame)),

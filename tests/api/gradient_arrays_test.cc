@@ -2,7 +2,6 @@
 // Arrays that gradients go to, which are the caller's: added to, shared by scenes, refused, left as
 // they were after an error.
 #include <gtest/gtest.h>
-#include <tilegrad/c.h>
 
 #include <algorithm>
 #include <cmath>
@@ -386,49 +385,6 @@ TEST(ApiNothing, ABatchOfNoImagesHasNone) {
   EXPECT_TRUE(frame.images().face_ids.empty() && truth.images().face_ids.empty());
   EXPECT_TRUE(renderer.Backward(frame, {}, {}).ok());
   EXPECT_TRUE(reference.Backward(truth, {}, {}).ok());
-}
-
-// In C an image that was asked for is never NULL.
-TEST(ApiNothing, IsBackgroundInC) {
-  const float positions[] = {-1, -1, -2, 1, -1, -2, 0, 1, -2};
-  const std::int32_t faces[] = {0, 1, 2};
-  tilegrad_renderer* const renderer = tilegrad_renderer_create(1);
-  tilegrad_frame* const frame = tilegrad_frame_create();
-  tilegrad_scene scene;
-  tilegrad_scene_init(&scene);
-  scene.positions = positions;
-  scene.vertices = 3;
-  scene.faces = faces;
-  scene.face_count = 1;
-  scene.camera.fx = scene.camera.fy = 20;
-  scene.camera.cx = scene.camera.cy = 8;
-  tilegrad_options options;
-  tilegrad_options_init(&options);
-  options.color = options.attributes = 0;
-  options.uv = options.depth = 1;
-  for (const int size : {3, 40}) {
-    options.width = options.height = size;
-    ASSERT_EQ(tilegrad_render(renderer, &scene, 1, &options, frame), TILEGRAD_OK);
-    tilegrad_images images;
-    tilegrad_images_init(&images);
-    ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
-    ASSERT_NE(images.uv, nullptr);
-    ASSERT_NE(images.depth, nullptr);
-    const auto numbers = static_cast<std::size_t>(2 * size * size);
-    EXPECT_TRUE(Holds<float>({images.uv, numbers}, numbers, 0.0f));
-    const std::vector<float> ones(numbers, 1.0f);
-    tilegrad_frame_gradients d_frame;
-    tilegrad_frame_gradients_init(&d_frame);
-    d_frame.uv = ones.data();
-    std::vector<float> d_positions(9, 7.0f);
-    tilegrad_scene_gradients d_scene;
-    tilegrad_scene_gradients_init(&d_scene);
-    d_scene.positions = d_positions.data();
-    ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK);
-    EXPECT_TRUE(Holds<float>(d_positions, 9, 0.0f));
-  }
-  tilegrad_frame_destroy(frame);
-  tilegrad_renderer_destroy(renderer);
 }
 
 }  // namespace tilegrad::gradient_arrays_test

@@ -37,49 +37,47 @@ class BrokenGltfTest : public TempFolderTest {
   Status LoadGlb(const Bytes& bytes) { return LoadMesh(Write("bad.glb", bytes)).status(); }
 };
 
-TEST_F(BrokenGltfTest, AccessorBeyondItsView) {
-  Json json = Triangle();
-  json["accessors"][0]["count"] = 4;
-  ExpectMessage(Load(json), "bad.gltf", "mesh 0 primitive 0", "POSITION", "4 elements");
-  json["accessors"][0]["count"] = 1'000'000'000'000;
-  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer view");
-  json = Triangle();
-  json["accessors"][0]["byteOffset"] = 4;
-  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer view");
-}
+struct Edit {
+  const char* place;
+  Json value;
+  std::vector<std::string> words = {};
+};
 
 // 2^64 - 12 plus an element of 12 bytes is 0: sums of offsets must not wrap.
-TEST_F(BrokenGltfTest, OffsetsThatWrapAround) {
-  Json json = Triangle();
-  json["accessors"][0]["byteOffset"] = std::uint64_t(-12);
-  json["accessors"][0]["count"] = 1;
-  ExpectMessage(Load(json), "bad.gltf");
-  json = Triangle();
-  json["bufferViews"][0]["byteOffset"] = std::uint64_t(-12);
-  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer");
-  json["bufferViews"][0]["byteOffset"] = 20;
-  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer");
-}
-
-TEST_F(BrokenGltfTest, ReferencesToNowhere) {
-  const std::vector<std::pair<const char*, Json>> edits = {
-      {"/meshes/0/primitives/0/attributes/POSITION", 7},
-      {"/meshes/0/primitives/0/attributes/POSITION", -1},
-      {"/meshes/0/primitives/0/indices", 9},
-      {"/accessors/0/bufferView", 5},
-      {"/accessors/1/bufferView", -3},
-      {"/bufferViews/0/buffer", 2},
-      {"/bufferViews/1/buffer", -2},
-      {"/nodes/0/mesh", 3},
-      {"/nodes/0/children", {4}},
-      {"/scenes/0/nodes", {11}},
-      {"/buffers/0/uri", "missing.bin"},
-      {"/buffers/0/byteLength", 4000000000u}};
-  for (const auto& [place, value] : edits) {
+TEST_F(BrokenGltfTest, NumbersAndReferencesThatAreWrong) {
+  const std::string beyond = "beyond its buffer";
+  const Edit edits[] = {{"/asset/version", "1.0", {"version \"1.0\""}},
+                        {"/accessors/0/count", 2, {"index 2 is 2, but there are 2 vertices"}},
+                        {"/accessors/0/count", 4, {"mesh 0 primitive 0", "POSITION", "4 elements"}},
+                        {"/accessors/0/count", 1'000'000'000'000, {beyond + " view"}},
+                        {"/accessors/0/byteOffset", 4, {beyond + " view"}},
+                        {"/accessors/0/byteOffset", std::uint64_t(-12)},
+                        {"/bufferViews/0/byteOffset", std::uint64_t(-12), {beyond}},
+                        {"/bufferViews/0/byteOffset", 20, {beyond}},
+                        {"/bufferViews/0/byteStride", 13},
+                        {"/accessors/1/componentType", 5126, {"indices must be unsigned"}},
+                        {"/accessors/0/componentType", 5125, {"not allowed in an attribute"}},
+                        {"/accessors/0/type", "VEC2", {"expected 3 numbers"}},
+                        {"/nodes/0/scale", {1e39, 1, 1}},
+                        {"/meshes/0/primitives/0/attributes/POSITION", 7},
+                        {"/meshes/0/primitives/0/attributes/POSITION", -1},
+                        {"/meshes/0/primitives/0/indices", 9},
+                        {"/accessors/0/bufferView", 5},
+                        {"/accessors/1/bufferView", -3},
+                        {"/bufferViews/0/buffer", 2},
+                        {"/bufferViews/1/buffer", -2},
+                        {"/nodes/0/mesh", 3},
+                        {"/nodes/0/children", {4}},
+                        {"/scenes/0/nodes", {11}},
+                        {"/buffers/0/uri", "missing.bin"},
+                        {"/buffers/0/byteLength", 4000000000u}};
+  for (const Edit& edit : edits) {
+    SCOPED_TRACE(edit.place + (" = " + edit.value.dump()));
     Json json = Triangle();
-    json[Json::json_pointer(place)] = value;
-    SCOPED_TRACE(place);
-    ExpectMessage(Load(json), "bad.gltf");
+    json[Json::json_pointer(edit.place)] = edit.value;
+    const Status status = Load(json);
+    ExpectMessage(status, "bad.gltf");
+    for (const std::string& word : edit.words) ExpectIn(status.message(), word);
   }
 }
 
@@ -102,27 +100,6 @@ TEST_F(BrokenGltfTest, MaterialsAndTexturesThatAreNotThere) {
   expect_one(json, "texture 3 has no image");
 }
 
-TEST_F(BrokenGltfTest, IndexOutOfRange) {
-  Json json = Triangle();
-  json["accessors"][0]["count"] = 2;
-  ExpectMessage(Load(json), "bad.gltf", "index 2 is 2, but there are 2 vertices");
-}
-
-TEST_F(BrokenGltfTest, ComponentTypesThatAreNotAllowed) {
-  Json json = Triangle();
-  json["accessors"][1]["componentType"] = 5126;
-  ExpectMessage(Load(json), "bad.gltf", "indices must be unsigned");
-  json = Triangle();
-  json["accessors"][0]["componentType"] = 5125;
-  ExpectMessage(Load(json), "bad.gltf", "not allowed in an attribute");
-  json = Triangle();
-  json["accessors"][0]["type"] = "VEC2";
-  ExpectMessage(Load(json), "bad.gltf", "expected 3 numbers");
-  json = Triangle();
-  json["bufferViews"][0]["byteStride"] = 13;
-  ExpectMessage(Load(json), "bad.gltf");
-}
-
 TEST_F(BrokenGltfTest, AttributesOfDifferentLengths) {
   Json json = Triangle();
   json["accessors"].push_back(
@@ -140,9 +117,6 @@ TEST_F(BrokenGltfTest, NonFinitePosition) {
       "data:application/octet-stream;base64,"
       "AADAfwAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAEAAAACAAAA";
   ExpectMessage(Load(json), "bad.gltf", "positions[0][0] is nan");
-  json = Triangle();
-  json["nodes"][0]["scale"] = {1e39, 1, 1};
-  ExpectMessage(Load(json), "bad.gltf");
 }
 
 TEST_F(BrokenGltfTest, NodesThatAreNoTree) {
@@ -195,12 +169,6 @@ TEST_F(BrokenGltfTest, VersionsThatA2Point0ReaderIsNotEnoughFor) {
   ExpectMessage(Load(json), "bad.gltf", "\"2.1\"");
   json["asset"]["minVersion"] = "3.0";
   ExpectMessage(Load(json), "bad.gltf", "\"3.0\"");
-}
-
-TEST_F(BrokenGltfTest, Version1) {
-  Json json = Triangle();
-  json["asset"]["version"] = "1.0";
-  ExpectMessage(Load(json), "bad.gltf", "version \"1.0\"");
 }
 
 // An image whose place in the buffer is wrong costs the texture, not the mesh.

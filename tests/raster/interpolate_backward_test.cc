@@ -15,6 +15,7 @@
 #include "base/simd_target.h"
 #include "raster/conventions.h"
 #include "raster/interpolate_ref.h"
+#include "raster/mesh_cast.h"
 #include "raster/visibility_ref.h"
 #include "support/expect.h"
 
@@ -59,24 +60,6 @@ ScreenMeshBuffers JitteredGrid(int width, int height, Rng* rng) {
   return out;
 }
 
-ScreenMeshBuffersT<double> ToDouble(const ScreenMeshBuffers& m) {
-  ScreenMeshBuffersT<double> out;
-  out.x.assign(m.x.begin(), m.x.end());
-  out.y.assign(m.y.begin(), m.y.end());
-  out.depth.assign(m.depth.begin(), m.depth.end());
-  out.inverse_depth.assign(m.inverse_depth.begin(), m.inverse_depth.end());
-  out.v0 = m.v0;
-  out.v1 = m.v1;
-  out.v2 = m.v2;
-  out.source_face = m.source_face;
-  out.reject = m.reject;
-  out.source_vertices = m.source_vertices;
-  out.source_faces = m.source_faces;
-  out.width = m.width;
-  out.height = m.height;
-  return out;
-}
-
 // A band with everything that is read and the truth.
 struct Case {
   int width, row_begin, row_end, channels;
@@ -111,7 +94,7 @@ struct Case {
 
  private:
   void FindTruth() {
-    const ScreenMeshBuffersT<double> buffers = ToDouble(mesh);
+    const ScreenMeshBuffersT<double> buffers = MeshCast<double>(mesh);
     const ScreenMeshT<double> view = buffers.View();
     const std::vector<double> values(attributes.begin(), attributes.end());
     const AttributeViewT<const double> in{values, channels, rate};

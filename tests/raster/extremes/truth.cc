@@ -11,6 +11,7 @@
 #include "raster/conventions.h"
 #include "raster/extremes/bounded.h"
 #include "raster/extremes/scenes.h"
+#include "raster/mesh_cast.h"
 #include "raster/project.h"
 #include "raster/visibility_ref.h"
 #include "render/mesh_ref.h"
@@ -55,26 +56,6 @@ class Comparison {
   CheckCounts* counts_;
   std::string failure_;
 };
-
-template <class To, class From>
-raster::ScreenMeshBuffersT<To> MeshCast(const raster::ScreenMeshBuffersT<From>& m) {
-  raster::ScreenMeshBuffersT<To> out;
-  out.x.assign(m.x.begin(), m.x.end());
-  out.y.assign(m.y.begin(), m.y.end());
-  out.depth.assign(m.depth.begin(), m.depth.end());
-  out.inverse_depth.assign(m.inverse_depth.begin(), m.inverse_depth.end());
-  out.v0 = m.v0;
-  out.v1 = m.v1;
-  out.v2 = m.v2;
-  out.source_face = m.source_face;
-  for (const auto& c : m.clipped) out.clipped.push_back({c.a, c.b, To(c.t)});
-  out.reject = m.reject;
-  out.source_vertices = m.source_vertices;
-  out.source_faces = m.source_faces;
-  out.width = m.width;
-  out.height = m.height;
-  return out;
-}
 
 // All pixels, or some if that were too many pairs with faces.
 std::vector<std::size_t> PixelsToCheck(const ExtremeScene& e, Rng* rng) {
@@ -127,7 +108,7 @@ class Truth {
     raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
     mesh_ = buffers_.View();
     soft_ = SoftSceneOf(buffers_, e.options);
-    prepared_.buffers = MeshCast<Bounded>(buffers_);
+    prepared_.buffers = raster::MeshCast<Bounded>(buffers_);
     prepared_.mesh = prepared_.buffers.View();
     prepared_.scene = &view_;
     prepared_.given = {scene_.attributes, scene_.channels, scene_.rate};
