@@ -5,8 +5,8 @@ import os
 import pathlib
 import pickle
 import signal
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -87,18 +87,13 @@ class Predict(FolderTest):
         expected = self._python(predictor.predict(image, refine=10))
         again = pickle.loads(pickle.dumps(predictor)).predict(image, refine=10)
         self.assertEqual(self._python(again), expected)
-        got: list[np.ndarray] = []
-        threads = [threading.Thread(target=lambda: got.append(
-            predictor.predict(image, refine=10).positions))
-                   for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        with ThreadPoolExecutor(4) as pool:
+            got = [mesh.positions for mesh in pool.map(
+                lambda _: predictor.predict(image, refine=10), range(4))]
         child = os.fork()
         if child == 0:
             mesh = predictor.predict(image, refine=10)
-            same = len(got) == 4 and all(np.array_equal(mesh.positions, p) for p in got)
+            same = all(np.array_equal(mesh.positions, p) for p in got)
             os._exit(0 if same else 1)
         self.assertEqual(os.waitpid(child, 0)[1], 0)
 

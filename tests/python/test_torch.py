@@ -4,8 +4,8 @@
 import copy
 import math
 import pickle
-import threading
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 from unittest import mock
 
 import numpy as np
@@ -301,19 +301,9 @@ class Modules(unittest.TestCase):
         """Renders and backwards of four threads at once are those of one."""
         data = _Rendered()
         alone = [data[i] for i in range(4)]
-        got = [None] * 4
-
-        def work(i):
-            for _ in range(3):
-                got[i] = data[i]
-
-        threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        for pair, expected in zip(got, alone):
-            self.assertTrue(all(torch.equal(a, b) for a, b in zip(pair, expected)))
+        with ThreadPoolExecutor(4) as pool:
+            for i, pair in enumerate(pool.map(data.__getitem__, 3 * list(range(4)))):
+                self.assertTrue(all(torch.equal(a, b) for a, b in zip(pair, alone[i % 4])))
 
     def test_forked_workers(self):
         data = _Rendered()

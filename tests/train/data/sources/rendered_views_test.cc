@@ -187,11 +187,22 @@ TEST_F(RenderedSets, Nmr) {
 // A truncated picture, a missing file, and a class without models.
 class BrokenMembersOfSets : public RenderedSets {
  protected:
+  // `renders` is the folder of the classes.
+  void WriteSet(void (*write)(const Path&, const std::vector<MiniatureModel>&), float half_extent,
+                const char* renders = "") {
+    models_ = MiniatureModels(half_extent);
+    write(Set(), models_);
+    std::filesystem::create_directories(Set() / renders / "04256520");
+  }
+  Path OfModel(const char* folder, std::size_t m) const {
+    return Set() / folder / models_[m].synset / models_[m].id;
+  }
   static void Truncate(const Path& file) {
     std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   }
-  void ExpectTwoBroken(const Source& source, const std::string& truncated,
+  void ExpectTwoBroken(Result<Source> opened, const std::string& truncated,
                        const std::string& missing) const {
+    const Source source = Ok(std::move(opened)).value();
     const auto refused = Build(source);
     ExpectMessage(refused.status(), "2 of 10 cannot be used, more than 1 %");
     ExpectMessage(refused.status(), "--allow-broken");
@@ -205,60 +216,46 @@ class BrokenMembersOfSets : public RenderedSets {
     ExpectIn(summary->ignored[0].file + " " + summary->ignored[0].reason, "04256520",
              "holds no model");
   }
+
+  std::vector<MiniatureModel> models_;
 };
 
 TEST_F(BrokenMembersOfSets, Choy) {
-  const auto models = MiniatureModels(0.45f);
-  WriteChoy(Set(), models);
-  const Path renders = Set() / "ShapeNetRendering";
-  Truncate(renders / models[1].synset / models[1].id / "rendering/07.png");
-  std::filesystem::remove(Set() / "ShapeNetVox32" / models[7].synset / models[7].id /
-                          "model.binvox");
-  std::filesystem::create_directories(renders / "04256520");
-  ExpectTwoBroken(Ok(ChoySource(Set(), {}, 64)).value(), "07.png", "model.binvox");
+  WriteSet(WriteChoy, 0.45f, "ShapeNetRendering");
+  Truncate(OfModel("ShapeNetRendering", 1) / "rendering/07.png");
+  std::filesystem::remove(OfModel("ShapeNetVox32", 7) / "model.binvox");
+  ExpectTwoBroken(ChoySource(Set(), {}, 64), "07.png", "model.binvox");
 }
 
 TEST_F(BrokenMembersOfSets, Dvr) {
-  const auto models = MiniatureModels(0.5f);
-  WriteDvr(Set(), models);
-  Truncate(Set() / models[1].synset / models[1].id / "mask/0007.png");
-  std::filesystem::remove(Set() / models[7].synset / models[7].id / "cameras.npz");
-  std::filesystem::create_directories(Set() / "04256520");
-  ExpectTwoBroken(Ok(DvrSource(Set(), {}, 64)).value(), "0007.png", "cameras.npz");
+  WriteSet(WriteDvr, 0.5f);
+  Truncate(OfModel("", 1) / "mask/0007.png");
+  std::filesystem::remove(OfModel("", 7) / "cameras.npz");
+  ExpectTwoBroken(DvrSource(Set(), {}, 64), "0007.png", "cameras.npz");
 }
 
 TEST_F(BrokenMembersOfSets, Dibr) {
-  const auto models = MiniatureModels(0.45f);
-  WriteDibr(Set(), models);
-  Truncate(Set() / models[1].synset / models[1].id / "7.png");
-  std::filesystem::remove(Set() / models[7].synset / models[7].id / "7.npy");
-  std::filesystem::create_directories(Set() / "04256520");
-  ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "7.png", "7.npy");
+  WriteSet(WriteDibr, 0.45f);
+  Truncate(OfModel("", 1) / "7.png");
+  std::filesystem::remove(OfModel("", 7) / "7.npy");
+  ExpectTwoBroken(DibrSource(Set(), {}, 64), "7.png", "7.npy");
 }
 
 // Meshes and points of renders are only for scores, but they are the model's.
 TEST_F(BrokenMembersOfSets, MeshesOfDibr) {
-  const auto models = MiniatureModels(0.45f);
-  WriteDibr(Set(), models);
-  const auto mesh = [&](int m) {
-    const auto& model = models[static_cast<std::size_t>(m)];
-    return "set/" + model.synset + "/" + model.id + "/model-0.45.obj";
-  };
-  Write(mesh(1), "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
-  Write(mesh(7), "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  std::filesystem::create_directories(Set() / "04256520");
-  ExpectTwoBroken(Ok(DibrSource(Set(), {}, 64)).value(), "no triangles", "finite");
+  WriteSet(WriteDibr, 0.45f);
+  Ok(WriteTextAtomic(OfModel("", 1) / "model-0.45.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"));
+  Ok(WriteTextAtomic(OfModel("", 7) / "model-0.45.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  ExpectTwoBroken(DibrSource(Set(), {}, 64), "no triangles", "finite");
 }
 
 TEST_F(BrokenMembersOfSets, PointsOfDvr) {
-  const auto models = MiniatureModels(0.5f);
-  WriteDvr(Set(), models);
-  std::filesystem::create_directories(Set() / "04256520");
+  WriteSet(WriteDvr, 0.5f);
   const std::pair<std::size_t, std::vector<float>> points[] = {{1, {0, NAN, 0}}, {7, {0, 0, 7e9f}}};
   for (const auto& [m, point] : points)
-    Ok(io::SaveNpz(Set() / models[m].synset / models[m].id / "pointcloud.npz",
+    Ok(io::SaveNpz(OfModel("", m) / "pointcloud.npz",
                    {{"points", io::MakeNpy<float>({1, 3}, point)}}));
-  ExpectTwoBroken(Ok(DvrSource(Set(), {}, 64)).value(), "not within", "not within");
+  ExpectTwoBroken(DvrSource(Set(), {}, 64), "not within", "not within");
 }
 
 // Pictures of nothing, and a class without models.

@@ -20,21 +20,6 @@
 
 namespace tilegrad::train::classify_test {
 
-constexpr const char* kConfig = R"(name = "tiny"
-[task]
-kind = "classify"
-[network]
-channels = 4
-most = 8
-levels = 3
-[schedule]
-steps = 60
-batch = 8
-shift = 2
-log_every = 1
-sample_every = 30
-checkpoint_every = 7
-)";
 constexpr int kSize = 16;
 const Watch kSilent = {[](const Progress&) {}};
 
@@ -56,9 +41,10 @@ Status WriteColored(const Path& folder, const std::vector<std::string>& classes)
 class ClassifyTest : public TempFolderTest {
  protected:
   void SetUp() override { Ok(WriteColored(folder_ / "data", {"blue", "green", "red"})); }
-  Status TrainRun() {
+  Status TrainRun(const std::vector<std::string>& settings = {}) {
     TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "tiny.toml"));
+    TILEGRAD_ASSIGN(job.config, ParseConfig(kTinyClassifier + "steps = 60\nshift = 2\n", "tiny"));
+    TILEGRAD_TRY(ApplyOverrides(settings, &job.config));
     job.run = folder_ / "run";
     job.data = folder_ / "data";
     return Train(job, workers_, kSilent).status();
@@ -119,12 +105,7 @@ TEST_F(ClassifyTest, OneClassIsNothingToLearn) {
 }
 
 TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {
-  TrainJob job;
-  job.config = ParseConfig(kConfig, "tiny.toml").value();
-  ASSERT_TRUE(ApplyOverrides({"network.levels=6"}, &job.config).ok());
-  job.run = folder_ / "run";
-  job.data = folder_ / "data";
-  ExpectMessage(Train(job, workers_, kSilent).status(), "16 pixels", "at least 32");
+  ExpectMessage(TrainRun({"network.levels=6"}), "16 pixels", "at least 32");
 }
 
 TEST_F(ClassifyTest, PicturesAreMovedAndMirrored) {
