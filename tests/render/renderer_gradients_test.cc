@@ -7,7 +7,6 @@
 #include <map>
 #include <string>
 
-#include "base/simd_target.h"
 #include "proof/complex_step.h"
 #include "proof/owned_scene.h"
 #include "render/trial.h"
@@ -164,20 +163,17 @@ void Check(const SceneRecipe& recipe, std::uint64_t seed, Tally* tally) {
 
 class ShadedSimd : public testing::TestWithParam<SceneRecipe> {
  protected:
-  void TearDown() override { ASSERT_TRUE(ForceTarget("").ok()); }
-
   // Rounding may put a pixel on the other side of a choice (texel, clamp, horizon), whose gradient
   // jumps: one scene in 500 may be off by that.
   void Over(std::uint64_t first, int least) {
-    for (const auto& target : RunnableTargets()) {
-      ASSERT_TRUE(ForceTarget(target).ok());
+    for (const std::string target : EveryTarget()) {
       Tally tally;
       for (int n = 0; n < least * 13 / 10; ++n) {
         Check(GetParam(), first + static_cast<std::uint64_t>(n), &tally);
       }
-      EXPECT_LE(tally.far, tally.trials / 500) << target;
+      EXPECT_LE(tally.far, tally.trials / 500);
       for (const auto& kind : test::KindsOf(GetParam())) {
-        EXPECT_GE(tally.seen[kind], least) << target << " " << kind;
+        EXPECT_GE(tally.seen[kind], least) << kind;
       }
     }
   }

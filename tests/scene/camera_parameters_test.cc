@@ -85,13 +85,9 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
     P64 d;
     CameraFromParametersAdjointRef(p, CameraAdjoint(p, point, w), &d);
     PC step;
-    std::copy_n(p.rotation, 6, step.rotation);
-    std::copy_n(p.translation, 3, step.translation);
-    step.fx = p.fx;
-    step.fy = p.fy;
-    step.cx = p.cx;
-    step.cy = p.cy;
     const auto entries = Entries<Complex>(step);
+    const auto numbers = Entries<double>(p);
+    for (std::size_t i = 0; i < numbers.size(); ++i) entries[i].get() = numbers[i];
     const auto gradient = Entries<double>(d);
     ASSERT_EQ(entries.size(), 13u);
     double largest = 0;

@@ -63,6 +63,13 @@ Camera FromAbove() {
 
 class Layers : public testing::Test {
  protected:
+  // Cuts the first material out by these alphas from left to right.
+  void CutOut(std::initializer_list<int> alphas) {
+    AddAlphaTexture(alphas, &mesh_);
+    mesh_.materials[0].base_color_texture = 0;
+    mesh_.materials[0].nearest = true;
+    mesh_.materials[0].alpha_mode = AlphaMode::kMask;
+  }
   Picture Draw(PictureRequest request = {}) {
     const MeshScene made(mesh_, {});
     Scene scene = made.scene();
@@ -97,10 +104,7 @@ TEST_F(Layers, OpaqueMeshesHaveNoCover) {
 
 TEST_F(Layers, AMaskIsCutOutAndShowsWhatIsBehind) {
   AddWall(1, Paint(kRed), &mesh_);
-  AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0;
-  mesh_.materials[0].nearest = true;
-  mesh_.materials[0].alpha_mode = AlphaMode::kMask;
+  CutOut({0, 255});
   Picture picture = Draw();
   ExpectNear(At(picture, 1, 4), {0, 0, 0, 0});  // nothing is behind
   ExpectNear(At(picture, 6, 4), kRed);
@@ -166,10 +170,7 @@ TEST_F(Layers, PanesThatCutEachOther) {
 
 TEST_F(Layers, SamplesOfAPixelAreAveraged) {
   AddWall(1, Paint(kRed), &mesh_);
-  AddAlphaTexture({0, 255, 255, 255, 255, 255, 255, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0;
-  mesh_.materials[0].nearest = true;
-  mesh_.materials[0].alpha_mode = AlphaMode::kMask;
+  CutOut({0, 255, 255, 255, 255, 255, 255, 255});
   const Picture fine = Draw({.supersampling = 4});
   float covered = 0;
   for (int x = 0; x < kSize; ++x) {
@@ -190,10 +191,7 @@ TEST_F(Layers, SamplesOfAPixelAreAveraged) {
 // Depth and faces show the nearest that is there: a hole shows what is behind it.
 TEST_F(Layers, ExactImagesLookThroughHoles) {
   AddWall(1, Paint(kRed), &mesh_);
-  AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0;
-  mesh_.materials[0].nearest = true;
-  mesh_.materials[0].alpha_mode = AlphaMode::kMask;
+  CutOut({0, 255});
   AddWall(-1, Glass(kGreen, 0.1f), &mesh_);
   const Picture picture = Draw({.depth = true, .normals = true, .uv = true, .face_ids = true});
   const std::size_t left = 4 * kSize + 1, right = 4 * kSize + 6, pixels = kSize * kSize;
@@ -215,11 +213,8 @@ TEST_F(Layers, DatasetsCutMasksOutAndDrawGlassOpaque) {
   LitRenderer renderer;
   auto glass = Ok(renderer.RenderStraight(mesh_, FromAbove(), kSize));
   EXPECT_EQ(glass->at(4, 4)[3], 255);
-  AddAlphaTexture({0, 255}, &mesh_);
-  mesh_.materials[0].base_color_texture = 0;
-  mesh_.materials[0].nearest = true;
+  CutOut({0, 255});
   mesh_.materials[0].base_color.a = 1;
-  mesh_.materials[0].alpha_mode = AlphaMode::kMask;
   const auto cut = Ok(renderer.RenderStraight(mesh_, FromAbove(), kSize));
   EXPECT_EQ(cut->at(1, 4)[3], 0);
   EXPECT_EQ(cut->at(6, 4)[3], 255);
