@@ -155,8 +155,8 @@ TEST(RefineMesh, APictureWithoutAnObjectIsAnError) {
   empty.width = empty.height = kSize;
   empty.color.resize(3 * empty.pixels());
   empty.alpha.resize(empty.pixels());
-  const auto refined = RefineMesh(Figure({0.4f, 0.35f, 0.4f}), empty, {.steps = 5}, workers);
-  ExpectMessage(refined.status(), "no object");
+  ExpectMessage(RefineMesh(Figure({0.4f, 0.35f, 0.4f}), empty, {.steps = 5}, workers).status(),
+                "no object");
 }
 
 // A grey map in longitude and latitude takes the picture's colours, on both sides.

@@ -417,8 +417,8 @@ class CheckpointTest : public TempFolderTest {
   // Neither an older checkpoint nor none, and all files as they are.
   void ExpectStops(const std::string& reason) {
     std::vector<Path> before = Files();
-    const Status status = LoadNewestCheckpoint(context_, folder_).status();
-    ExpectMessage(status, "step_00000020", reason, "nothing was changed", "move this file away");
+    ExpectMessage(LoadNewestCheckpoint(context_, folder_).status(), "step_00000020", reason,
+                  "nothing was changed", "move this file away");
     EXPECT_EQ(Files(), before);
   }
   std::vector<Path> Files() const {

@@ -126,8 +126,7 @@ TEST(Mip, LevelsAreMeansAndSizesAreChecked) {
   EXPECT_EQ(MipSizes({4, 16}, 1).value().size(), 2u);
   EXPECT_EQ(MipSizes({4, 16}, 0).value().size(), 1u);
   EXPECT_EQ(MipSizes({32, 160}, 5).value().size(), 6u);
-  const auto odd = MipSizes({32, 160}, -1);
-  ExpectMessage(odd.status(), "32 x 160", "max_mip_level to 5");
+  ExpectMessage(MipSizes({32, 160}, -1).status(), "32 x 160", "max_mip_level to 5");
   const Numbers<double> fine = {0, 1, 2, 3, 10, 11, 12, 13};
   Numbers<double> coarse(2), last(1);
   HalveTexture<double>({fine, {2, 4}}, 1, Workers(1), coarse);

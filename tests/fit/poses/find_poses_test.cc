@@ -126,8 +126,7 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
   // One that does not fit these images.
   Write("other/cameras_start.json", std::string(R"({"agreement": 1, "poses": [[1, 2]]})"));
   FitInput broken = input;
-  const Status refused = Find(job, &broken);
-  ExpectMessage(refused, "8 poses of twelve numbers");
+  ExpectMessage(Find(job, &broken), "8 poses of twelve numbers");
 }
 
 // The searches that a stopped call came through are not done again.

@@ -105,8 +105,7 @@ TEST(Conv2d, CheckRefusesShapesThatHaveNoOutput) {
   EXPECT_FALSE((Conv2dShape{1, 1, 3, 3, 1, 5, 5, 1, 0}.Check().ok()));
   EXPECT_FALSE((Conv2dShape{1, 1, 3, 3, 1, 3, 3, 0, 0}.Check().ok()));
   EXPECT_FALSE((Conv2dShape{1, 0, 3, 3, 1, 3, 3, 1, 0}.Check().ok()));
-  const Status status = Conv2dShape{1, 1, 3, 3, 1, 5, 6, 1, 0}.Check();
-  ExpectMessage(status, "5x6");
+  ExpectMessage(Conv2dShape{1, 1, 3, 3, 1, 5, 6, 1, 0}.Check(), "5x6");
 }
 
 // Every kind of kernel; odd extents and paddings, so that tiles hang over each edge; channels that

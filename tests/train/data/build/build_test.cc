@@ -98,8 +98,7 @@ TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
   const auto stopped = Build(*source, folder_ / "parts", 1, stop_after_four);
   ASSERT_FALSE(stopped.ok());
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
-  const auto incomplete = Dataset::Open(folder_ / "parts");
-  ExpectMessage(incomplete.status(), "not complete");
+  ExpectMessage(Dataset::Open(folder_ / "parts").status(), "not complete");
 
   stop_ = false;
   const auto resumed = Ok(Build(*source, folder_ / "parts"));
@@ -123,8 +122,7 @@ TEST_F(BuildTest, OneProcessAtATime) {
   const auto source = ProceduralSource(1, 3);
   {
     const auto lock = Ok(FolderLock::Take(folder_ / "set"));
-    const auto refused = Build(*source, folder_ / "set");
-    ExpectMessage(refused.status(), "another process");
+    ExpectMessage(Build(*source, folder_ / "set").status(), "another process");
     EXPECT_FALSE(std::filesystem::exists(folder_ / "set" / "dataset.json"));
   }
   EXPECT_TRUE(Build(*source, folder_ / "set").ok());

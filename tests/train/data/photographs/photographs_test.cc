@@ -157,8 +157,8 @@ TEST_F(PhotographsTest, WhatIsFarFromAnyPictureNamesThePhotograph) {
 TEST_F(PhotographsTest, PicturesAreReadWithTheirMasks) {
   PhotographSet set = WriteMiniature(folder_, "cub");
   std::filesystem::remove(set.photographs[1].image);
-  const auto missing = PhotoStore::Load(set, {0, 1}, {}, 16, workers_, {});
-  ExpectMessage(missing.status(), "bar_1.png", "dataset --source cub leaves out");
+  ExpectMessage(PhotoStore::Load(set, {0, 1}, {}, 16, workers_, {}).status(), "bar_1.png",
+                "dataset --source cub leaves out");
   set.photographs[0].mask = {3, 3, std::vector<bool>(9, true)};
   ExpectMessage(PhotoStore::Load(set, {0}, {}, 16, workers_, {}).status(), "60 x 48 pixels",
                 "3 x 3");

@@ -208,8 +208,8 @@ TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
   std::string row = Row("one");
   const std::string text = kHead + row.replace(row.find("\t-x\t") + 1, 2, "-z");
   auto turned = Ok(PackageModels({"planes", text, {"blur"}}, folder_));
-  const auto again = BuildDataset(**turned, options, folder_ / "out", Workers(1), {});
-  ExpectMessage(again.status(), "other settings");
+  ExpectMessage(BuildDataset(**turned, options, folder_ / "out", Workers(1), {}).status(),
+                "other settings");
   std::vector<std::unique_ptr<ModelSource>> one;
   one.push_back(std::move(*turned));
   EXPECT_NE(CombineSources("planes", std::move(one))->facts().version, source->facts().version);

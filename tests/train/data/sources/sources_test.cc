@@ -132,8 +132,7 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   }
   // Where nothing is left, the error has the first of them.
   std::filesystem::remove(folder_ / "set/solid/a.OBJ");
-  const auto none = FolderSource(folder_ / "set");
-  ExpectMessage(none.status(), "deep/inner");
+  ExpectMessage(FolderSource(folder_ / "set").status(), "deep/inner");
   std::filesystem::remove(folder_ / "set/empty/.hidden");  // our own
 }
 
@@ -162,12 +161,10 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
   EXPECT_EQ((*listed)->entries()[1].split, Split::kValidation);
 
   Write("split.txt", "03001627/a1 test\n03001627/b2 exam\n");
-  const auto wrong = Listed();
-  ExpectMessage(wrong.status(), "line 2");
+  ExpectMessage(Listed().status(), "line 2");
 
   Write("split.txt", "03001627/d4 test\n");
-  const auto none = Listed();
-  ExpectMessage(none.status(), "that the list names");
+  ExpectMessage(Listed().status(), "that the list names");
 }
 
 TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {
@@ -236,8 +233,7 @@ TEST_F(SourcesTest, NmrFilesThatDoNotFitAreErrors) {
   const std::vector<std::uint8_t> small(16);
   Ok(io::SaveNpz(folder_ / "car_val_voxels.npz",
                  {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}}));
-  const auto source = NmrSource(folder_);
-  ExpectMessage(source.status(), "car_val_voxels.npz");
+  ExpectMessage(NmrSource(folder_).status(), "car_val_voxels.npz");
 }
 
 using Vec = glm::dvec3;
