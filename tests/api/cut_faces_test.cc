@@ -116,6 +116,16 @@ TEST(CutFaces, DepthAndWeightsKeepTheirDigits) {
   EXPECT_GT(pixels, 40000);
 }
 
+template <class T>
+std::vector<double> PullAtPositions(RendererT<T>* renderer, const FrameT<T>& frame,
+                                    const FrameGradientsT<T>& d_frame) {
+  std::vector<T> d_positions(9);
+  SceneGradientsT<T> d_scene;
+  d_scene.positions = d_positions;
+  EXPECT_TRUE(renderer->Backward(frame, d_frame, {&d_scene, 1}).ok());
+  return {d_positions.begin(), d_positions.end()};
+}
+
 // Alpha of a wall, and how all of its images pull at its positions.
 template <class T>
 std::pair<std::vector<double>, std::vector<double>> AlphaAndPull(RendererT<T>* renderer,
@@ -132,11 +142,7 @@ std::pair<std::vector<double>, std::vector<double>> AlphaAndPull(RendererT<T>* r
   FrameGradientsT<T> d_frame;
   d_frame.alpha = d_alpha;
   d_frame.attributes = d_attributes;
-  std::vector<T> d_positions(9);
-  SceneGradientsT<T> d_scene;
-  d_scene.positions = d_positions;
-  EXPECT_TRUE(renderer->Backward(frame, d_frame, {&d_scene, 1}).ok());
-  return {{images.alpha.begin(), images.alpha.end()}, {d_positions.begin(), d_positions.end()}};
+  return {{images.alpha.begin(), images.alpha.end()}, PullAtPositions(renderer, frame, d_frame)};
 }
 
 // Alpha counts the pieces of a cut face, so these must not depend on where it starts or how it is
@@ -179,17 +185,14 @@ template <class T>
 std::vector<double> AttributesPull(RendererT<T>* renderer, const FrameT<T>& frame,
                                    const std::vector<bool>& seen) {
   test::Numbers numbers;
-  std::vector<T> d_attributes(seen.size()), d_positions(9);
+  std::vector<T> d_attributes(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const auto d = static_cast<T>(static_cast<float>(numbers.Next()));
     if (seen[i]) d_attributes[i] = d;
   }
   FrameGradientsT<T> d_frame;
   d_frame.attributes = d_attributes;
-  SceneGradientsT<T> d_scene;
-  d_scene.positions = d_positions;
-  EXPECT_TRUE(renderer->Backward(frame, d_frame, {&d_scene, 1}).ok());
-  return {d_positions.begin(), d_positions.end()};
+  return PullAtPositions(renderer, frame, d_frame);
 }
 
 // Corners are rounded at some 1e4 pixels, by 5e-4 pixels of images 40 high: 1e-5; of pixels that

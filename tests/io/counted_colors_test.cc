@@ -4,18 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/gltf_fixture.h"
 #include "io/mesh_file.h"
 #include "scene/image.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::io::counted_colors_test {
 
-using Json = nlohmann::json;
-
-constexpr int kByte = 5121, kShort = 5123, kFloat = 5126;
 const glm::vec4 kOrange(1, 128 / 255.0f, 0, 1), kWhite(1);
 
 void ExpectNear(const glm::vec4& got, const glm::vec4& want) {
@@ -23,7 +19,7 @@ void ExpectNear(const glm::vec4& got, const glm::vec4& want) {
       << got.r << " " << got.g << " " << got.b << " " << got.a;
 }
 
-class CountedColors : public TempFolderTest {
+class CountedColors : public GltfTest {
  protected:
   // With one warning that has `said`; "" for none.
   Mesh Load(const Path& path, const std::string& said) {
@@ -36,36 +32,22 @@ class CountedColors : public TempFolderTest {
 
   // A triangle for each list of nine or twelve numbers; an empty one: without colours.
   template <class T>
-  Path Gltf(const std::vector<std::vector<T>>& colors, int type, bool normalized,
+  Path Gltf(const std::vector<std::vector<T>>& colors, bool normalized,
             const Json& factor = {1, 1, 1, 1}) {
-    Json json = Json::parse(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-                                "nodes": [{"mesh": 0}], "bufferViews": [], "accessors": []})");
-    std::string data;
-    const auto add = [&](const auto& values, int component, const char* kind) {
-      data.resize((data.size() + 3) / 4 * 4);
-      const std::size_t at = data.size(), size = values.size() * sizeof(values[0]);
-      data.append(reinterpret_cast<const char*>(values.data()), size);
-      json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", size}});
-      json["accessors"].push_back({{"bufferView", json["bufferViews"].size() - 1},
-                                   {"componentType", component},
-                                   {"count", 3},
-                                   {"type", kind}});
-      return json["accessors"].size() - 1;
-    };
-    const auto place = add(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}, kFloat, "VEC3");
-    json["materials"] = {{{"name", "m"}, {"pbrMetallicRoughness", {{"baseColorFactor", factor}}}}};
-    json["meshes"] = {{{"primitives", Json::array()}}};
+    Begin(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+              "nodes": [{"mesh": 0}], "bufferViews": [], "accessors": []})");
+    const int place = Add<float>("VEC3", {0, 0, 0, 1, 0, 0, 0, 1, 0});
+    json_["materials"] = {{{"name", "m"}, {"pbrMetallicRoughness", {{"baseColorFactor", factor}}}}};
+    json_["meshes"] = {{{"primitives", Json::array()}}};
     for (const std::vector<T>& list : colors) {
       Json primitive = {{"attributes", {{"POSITION", place}}}, {"material", 0}};
       if (!list.empty()) {
-        primitive["attributes"]["COLOR_0"] = add(list, type, list.size() == 12 ? "VEC4" : "VEC3");
-        if (normalized) json["accessors"].back()["normalized"] = true;
+        primitive["attributes"]["COLOR_0"] = Add(list.size() == 12 ? "VEC4" : "VEC3", list);
+        if (normalized) json_["accessors"].back()["normalized"] = true;
       }
-      json["meshes"][0]["primitives"].push_back(primitive);
+      json_["meshes"][0]["primitives"].push_back(primitive);
     }
-    json["buffers"] = {{{"uri", "a.bin"}, {"byteLength", data.size()}}};
-    Write("a.bin", data);
-    return Write("a.gltf", json.dump());
+    return File();
   }
 };
 
@@ -76,16 +58,16 @@ std::vector<std::uint8_t> OrangeBytes() {
 std::vector<float> OrangeFloats() { return {255, 128, 0, 255, 128, 0, 255, 128, 0}; }
 
 TEST_F(CountedColors, OfGltfThatAreNotNormalised) {
-  const Mesh bytes = Load(Gltf<std::uint8_t>({OrangeBytes()}, kByte, false), "read as 0 to 255");
+  const Mesh bytes = Load(Gltf<std::uint8_t>({OrangeBytes()}, false), "read as 0 to 255");
   ASSERT_EQ(bytes.colors.size(), 3u);
   for (const glm::vec4& color : bytes.colors) ExpectNear(color, kOrange);
   const std::uint16_t full = 65535, half = 128 * 257;
   const std::vector<std::uint16_t> shorts = {full, half, 0,    full, full, half,
                                              0,    full, full, half, 0,    full};
-  const Mesh words = Load(Gltf<std::uint16_t>({shorts}, kShort, false), "read as 0 to 65535");
+  const Mesh words = Load(Gltf<std::uint16_t>({shorts}, false), "read as 0 to 65535");
   for (const glm::vec4& color : words.colors) ExpectNear(color, kOrange);
   // As the format has it: linear.
-  const Mesh plain = Load(Gltf<std::uint8_t>({OrangeBytes()}, kByte, true), "");
+  const Mesh plain = Load(Gltf<std::uint8_t>({OrangeBytes()}, true), "");
   for (const glm::vec4& color : plain.colors)
     ExpectNear(color, {1, LinearToSrgb(128 / 255.0f), 0, 1});
   EXPECT_NEAR(plain.colors.at(0).g, 0.735, 0.003);
@@ -93,23 +75,22 @@ TEST_F(CountedColors, OfGltfThatAreNotNormalised) {
 
 TEST_F(CountedColors, OfGltfAsFractions) {
   for (const glm::vec4& color :
-       Load(Gltf<float>({OrangeFloats()}, kFloat, false), "read as 0 to 255").colors)
+       Load(Gltf<float>({OrangeFloats()}, false), "read as 0 to 255").colors)
     ExpectNear(color, kOrange);
   std::vector<float> alpha;
   for (int v = 0; v < 3; ++v) alpha.insert(alpha.end(), {255, 128, 0, 51});
-  ExpectNear(Load(Gltf<float>({alpha}, kFloat, false), "0 to 255").colors.at(0),
+  ExpectNear(Load(Gltf<float>({alpha}, false), "0 to 255").colors.at(0),
              {1, 128 / 255.0f, 0, 0.2f});
-  const Mesh light = Load(Gltf<float>({{0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1}}, kFloat, false), "");
+  const Mesh light = Load(Gltf<float>({{0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1}}, false), "");
   ExpectNear(light.colors.at(0), {LinearToSrgb(0.5f), 0, 1, 1});
-  const Mesh bright =
-      Load(Gltf<float>({{1.5f, 0.5f, 0, 0, 0, 0, 0, 0, 0}}, kFloat, false), "cut to 1");
+  const Mesh bright = Load(Gltf<float>({{1.5f, 0.5f, 0, 0, 0, 0, 0, 0, 0}}, false), "cut to 1");
   ExpectNear(bright.colors.at(0), {1, LinearToSrgb(0.5f), 0, 1});
 }
 
 // A part without colours is white beside one that counts to 255, not black.
 TEST_F(CountedColors, OfOnePartOnly) {
   const Mesh mesh =
-      Load(Gltf<float>({OrangeFloats(), {}, {0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1}}, kFloat, false),
+      Load(Gltf<float>({OrangeFloats(), {}, {0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1}}, false),
            "read as 0 to 255");
   ASSERT_EQ(mesh.colors.size(), 9u);
   ExpectNear(mesh.colors[0], kOrange);
@@ -170,13 +151,13 @@ TEST_F(CountedColors, OfMaterials) {
   ASSERT_EQ(loaded->warnings.size(), 2u);
   EXPECT_EQ(loaded->warnings[0], "material \"a\": its colour (255, 128, 0) is read as 0 to 255");
   const Json factor = {255, 128, 0, 1};
-  const Mesh mesh = Load(Gltf<float>({{}}, kFloat, false, factor), "(255, 128, 0) is read as");
+  const Mesh mesh = Load(Gltf<float>({{}}, false, factor), "(255, 128, 0) is read as");
   ExpectNear(mesh.materials.at(0).base_color, kOrange);
 }
 
 // In the file's own numbers, not those that sRGB makes of them.
 TEST_F(CountedColors, WarningsHaveTheFilesNumbers) {
-  const Mesh mesh = Load(Gltf<float>({{}}, kFloat, false, {2, 0.5, 0.25, 1}),
+  const Mesh mesh = Load(Gltf<float>({{}}, false, {2, 0.5, 0.25, 1}),
                          "material \"m\": its colour (2, 0.5, 0.25) is cut to 1");
   ExpectNear(mesh.materials.at(0).base_color, {1, LinearToSrgb(0.5f), LinearToSrgb(0.25f), 1});
 }
@@ -185,7 +166,7 @@ TEST_F(CountedColors, WarningsHaveTheFilesNumbers) {
 TEST_F(CountedColors, ThatAreNotFiniteAreErrors) {
   const float inf = std::numeric_limits<float>::infinity();
   for (const float bad : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
-    const Path path = Gltf<float>({{255, bad, 0, 255, 128, 0, 255, 128, 0}}, kFloat, false);
+    const Path path = Gltf<float>({{255, bad, 0, 255, 128, 0, 255, 128, 0}}, false);
     ExpectMessage(LoadMesh(path).status(), "a.gltf", "colors");
   }
 }

@@ -296,21 +296,23 @@ TEST(Sgi, RunsRepeatAndSixteenBitsAreRounded) {
   EXPECT_EQ(image->pixels, Bytes(100, 1));
 }
 
+// Of a file with another byte.
+Status With(std::size_t at, int value) {
+  Bytes file = Encoded({});
+  file[at] = static_cast<std::uint8_t>(value);
+  return DecodeImage(file, "a.rgb").status();
+}
+
 TEST(Sgi, HeadersThatLie) {
-  const auto with = [](std::size_t at, int value) {
-    Bytes file = Encoded({});
-    file[at] = static_cast<std::uint8_t>(value);
-    return DecodeImage(file, "a.rgb").status();
-  };
-  ExpectMessage(with(2, 2), "a.rgb", "storage 2");
-  ExpectMessage(with(3, 3), "a.rgb", "3 bytes a sample");
-  ExpectMessage(with(5, 4), "a.rgb", "4 dimensions");
-  ExpectMessage(with(107, 3), "a.rgb", "palette");
-  ExpectMessage(with(11, 5), "a.rgb", "5 channels");
-  ExpectMessage(with(7, 0), "a.rgb", "0 x 2 pixels");
-  ExpectMessage(with(6, 255), "a.rgb", "65283 x 2 pixels");
-  ExpectMessage(with(8, 64), "a.rgb", "16386");
-  ExpectMessage(with(8, 63), "a.rgb", "of row tables");
+  ExpectMessage(With(2, 2), "a.rgb", "storage 2");
+  ExpectMessage(With(3, 3), "a.rgb", "3 bytes a sample");
+  ExpectMessage(With(5, 4), "a.rgb", "4 dimensions");
+  ExpectMessage(With(107, 3), "a.rgb", "palette");
+  ExpectMessage(With(11, 5), "a.rgb", "5 channels");
+  ExpectMessage(With(7, 0), "a.rgb", "0 x 2 pixels");
+  ExpectMessage(With(6, 255), "a.rgb", "65283 x 2 pixels");
+  ExpectMessage(With(8, 64), "a.rgb", "16386");
+  ExpectMessage(With(8, 63), "a.rgb", "of row tables");
   Bytes large = Header({.width = 16384, .height = 16384, .channels = 4}, 0);
   ExpectMessage(DecodeImage(large, "a.rgb").status(), "a.rgb", "truncated");
 }
@@ -318,17 +320,12 @@ TEST(Sgi, HeadersThatLie) {
 TEST(Sgi, RowsThatDoNotFit) {
   const Picture p;
   const std::size_t tables = 512, rows = 512 + 8 * p.Rows();
-  const auto with = [](std::size_t at, int value) {
-    Bytes file = Encoded({});
-    file[at] = static_cast<std::uint8_t>(value);
-    return DecodeImage(file, "a.rgb").status();
-  };
-  ExpectMessage(with(tables, 1), "a.rgb", "row 0 of channel 0", "beyond the end");
-  ExpectMessage(with(tables + 4 * p.Rows() + 5, 1), "a.rgb", "row 1 of channel 0",
+  ExpectMessage(With(tables, 1), "a.rgb", "row 0 of channel 0", "beyond the end");
+  ExpectMessage(With(tables + 4 * p.Rows() + 5, 1), "a.rgb", "row 1 of channel 0",
                 "beyond the end");
-  ExpectMessage(with(rows, 4), "a.rgb", "longer than the picture is wide");
-  ExpectMessage(with(rows, 0), "a.rgb", "shorter than the picture is wide");
-  ExpectMessage(with(tables + 4 * p.Rows() + 3, 3), "a.rgb", "ends within a run");
+  ExpectMessage(With(rows, 4), "a.rgb", "longer than the picture is wide");
+  ExpectMessage(With(rows, 0), "a.rgb", "shorter than the picture is wide");
+  ExpectMessage(With(tables + 4 * p.Rows() + 3, 3), "a.rgb", "ends within a run");
 }
 
 }  // namespace tilegrad::io::exr_sgi_test

@@ -3,26 +3,20 @@
 // targets, skins, specular-glossiness, and extensions that are not read.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <nlohmann/json.hpp>
 
+#include "io/gltf_fixture.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::io::gltf_features_test {
 
-using Json = nlohmann::json;
-
-constexpr int kByte = 5121, kShort = 5123, kFloat = 5126;
-
 // The triangle (0,0,0), (1,0,0), (0,1,0), and what a test adds to it.
-class GltfFeatures : public TempFolderTest {
+class GltfFeatures : public GltfTest {
  protected:
   GltfFeatures() {
-    json_ = Json::parse(R"({
+    Begin(R"({
       "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
       "meshes": [{"primitives": [{"attributes": {}, "material": 0}]}], "materials": [{"name": "m"}],
       "bufferViews": [], "accessors": []})");
@@ -34,27 +28,6 @@ class GltfFeatures : public TempFolderTest {
     return json_["accessors"][Attributes()[attribute].get<std::size_t>()];
   }
 
-  template <class T>
-  int AddView(const std::vector<T>& values) {
-    data_.resize((data_.size() + 3) / 4 * 4);
-    const std::size_t at = data_.size(), size = values.size() * sizeof(T);
-    data_.resize(at + size);
-    std::memcpy(data_.data() + at, values.data(), size);
-    json_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", size}});
-    return static_cast<int>(json_["bufferViews"].size()) - 1;
-  }
-  // An accessor of these numbers; its index.
-  template <class T>
-  int Add(const std::string& type, const std::vector<T>& values) {
-    const std::size_t width = type == "MAT4" ? 16 : type == "SCALAR" ? 1 : type.back() - '0';
-    json_["accessors"].push_back({{"bufferView", AddView(values)},
-                                  {"componentType", sizeof(T) == 1   ? kByte
-                                                    : sizeof(T) == 2 ? kShort
-                                                                     : kFloat},
-                                  {"count", values.size() / width},
-                                  {"type", type}});
-    return static_cast<int>(json_["accessors"].size()) - 1;
-  }
   // Replaces vertices of the positions; `at` is of any width.
   template <class T>
   void MakeSparse(const std::vector<T>& at, const std::vector<float>& values) {
@@ -63,17 +36,9 @@ class GltfFeatures : public TempFolderTest {
     Accessor("POSITION")["sparse"] = {
         {"count", at.size()}, {"indices", indices}, {"values", {{"bufferView", AddView(values)}}}};
   }
-  Path File() {
-    Write("a.bin", std::string(data_.begin(), data_.end()));
-    json_["buffers"] = {{{"uri", "a.bin"}, {"byteLength", data_.size()}}};
-    return Write("a.gltf", json_.dump());
-  }
   LoadedMesh Load() { return Ok(LoadMesh(File())).value(); }
   std::vector<glm::vec3> Positions() { return Load().mesh.positions; }
   Status Error() { return LoadMesh(File()).status(); }
-
-  Json json_;
-  std::vector<char> data_;
 };
 
 using Points = std::vector<glm::vec3>;

@@ -11,6 +11,12 @@
 
 namespace tilegrad::io::ply_off_test {
 
+// A text file's header, `extra` lines in it, up to the first properties of its vertices.
+std::string Vertices(int count, const std::string& extra = "") {
+  return "ply\nformat ascii 1.0\n" + extra + "element vertex " + std::to_string(count) +
+         "\nproperty float x\nproperty float y\nproperty float z\n";
+}
+
 class PlyOffTest : public TempFolderTest {
  protected:
   Status LoadPly(const std::string& text) { return LoadMesh(Write("bad.ply", text)).status(); }
@@ -72,9 +78,7 @@ TEST_F(PlyOffTest, PlyOfEveryEncodingIsTheSame) {
 
 TEST_F(PlyOffTest, PlyWithATexture) {
   ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 77)).ok());
-  const std::string vertices =
-      "ply\nformat ascii 1.0\ncomment texturefile my wood.png\nelement vertex 3\n"
-      "property float x\nproperty float y\nproperty float z\n";
+  const std::string vertices = Vertices(3, "comment texturefile my wood.png\n");
   const std::string by_vertex = vertices +
                                 "property float s\nproperty float t\nelement face 1\nproperty list "
                                 "uchar int vertex_index\nend_header\n"
@@ -152,9 +156,7 @@ TEST_F(PlyOffTest, BrokenOff) {
 // --- colours of faces, several textures, strips ---
 
 std::string Square(const std::string& extra, const std::string& faces, const std::string& body) {
-  return "ply\nformat ascii 1.0\n" + extra +
-         "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n" + faces +
-         "end_header\n9 9 9\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + body;
+  return Vertices(5, extra) + faces + "end_header\n9 9 9\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + body;
 }
 
 const glm::vec4 kRed(1, 0, 0, 1), kGreen(0, 1, 0, 1), kBlue(0, 0, 1, 1), kWhite(1);
@@ -241,11 +243,10 @@ TEST_F(PlyOffTest, PlyStrips) {
 // Faces before the vertices that they use.
 TEST_F(PlyOffTest, PlyElementsInAnyOrder) {
   const std::string text =
-      "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement edge "
-      "1\n"
-      "property int a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
-      "z\nend_header\n"
-      "4 0 1 2 3\n7\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+      Vertices(4,
+               "element face 1\nproperty list uchar int vertex_indices\nelement edge 1\n"
+               "property int a\n") +
+      "end_header\n4 0 1 2 3\n7\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
   const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
   EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
   ExpectOnly(loaded->warnings, "\"edge\"");
@@ -253,8 +254,8 @@ TEST_F(PlyOffTest, PlyElementsInAnyOrder) {
 
 TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
   const std::string text =
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
-      "z\nproperty float quality\nproperty float f_dc_0\nproperty list uchar int ring\nelement "
+      Vertices(3) +
+      "property float quality\nproperty float f_dc_0\nproperty list uchar int ring\nelement "
       "face 1\nproperty list uchar int vertex_index\nproperty int flags\nend_header\n"
       "0 0 0 1 1 0\n1 0 0 1 1 0\n0 1 0 1 1 1 2\n3 0 1 2 0\n";
   const auto loaded = Ok(LoadMesh(Write("a.ply", text)));
@@ -267,9 +268,7 @@ TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
 
 // Wherever nobody reads them.
 TEST_F(PlyOffTest, PlyNumbersThatNobodyReadsMayBeAnything) {
-  const std::string vertices =
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
-      "z\n";
+  const std::string vertices = Vertices(3);
   const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
   for (const std::string none : {"nan", "-nan", "NaN", "inf", "-inf", "Infinity", "-nan(ind)",
                                  "1.#QNAN", "-1.#IND00", "1.#INF", "1e999", "n/a"}) {
@@ -317,8 +316,8 @@ TEST_F(PlyOffTest, PlyBinaryNumbersThatNobodyReadsMayBeAnything) {
 // Normals follow from the surface; what does not is an error that names the place.
 TEST_F(PlyOffTest, PlyNumbersThatAreRead) {
   const auto text = [](const std::string& vertex) {
-    return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
-           "float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float "
+    return Vertices(3) +
+           "property float nx\nproperty float ny\nproperty float nz\nproperty float "
            "red\nproperty float green\nproperty float blue\nproperty float s\nproperty float "
            "t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" +
            vertex + "\n1 0 0 0 0 2 1 0 0 1 0\n0 1 0 0 1 0 0 0 1 0 1\n3 0 1 2\n";
@@ -342,12 +341,9 @@ TEST_F(PlyOffTest, PlyTextureCoordinatesThatAreLeftOutAreSaid) {
       "property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_indices\n"
       "property list uchar float texcoord\n";
   const auto load = [&](const std::string& second) {
-    return LoadMesh(
-        Write("a.ply",
-              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
-              "y\nproperty float z\n" +
-                  faces + "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n" +
-                  "3 0 1 2 6 0 0 1 0 1 1\n" + second));
+    return LoadMesh(Write("a.ply", Vertices(4) + faces +
+                                       "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n" +
+                                       "3 0 1 2 6 0 0 1 0 1 1\n" + second));
   };
   const auto both = Ok(load("3 0 2 3 6 0 0 1 1 0 1\n"));
   ExpectOnly(both->warnings, "coordinates of vertices left out");

@@ -130,13 +130,8 @@ TEST_F(KillResume, TwoKillsWithTexturesAndLight) {
 
 TEST_F(KillResume, TwoKillsWithACritic) {
   Write("tiny.toml", kTinyTextured);
-  settings_ = {"--set", "adversarial.weight=0.5",
-               "--set", "adversarial.features=1",
-               "--set", "adversarial.base=4",
-               "--set", "adversarial.halvings=2",
-               "--set", "adversarial.updates=2",
-               "--set", "adversarial.learning_rate=1e-3",
-               "--set", "adversarial.place=interpolates"};
+  for (const std::string& setting : kTinyCritic)
+    settings_.insert(settings_.end(), {"--set", setting});
   CheckKills(2);
 }
 
