@@ -9,10 +9,8 @@
 #include "data/photographs/miniature.h"
 #include "nn/nn.h"
 #include "same_run.h"
-#include "support/temp_folder.h"
-#include "tiny_run.h"
+#include "tiny_run_fixture.h"
 #include "train/run/checkpoint.h"
-#include "train/trainer.h"
 
 namespace tilegrad::train::every_task_test {
 
@@ -45,10 +43,9 @@ const TinyKind kKinds[] = {
      "cub"},
 };
 
-class EveryTask : public TempFolderTest, public testing::WithParamInterface<TinyKind> {
+class EveryTask : public TinyRunTest, public testing::WithParamInterface<TinyKind> {
  protected:
   void SetUp() override {
-    std::filesystem::create_directories(folder_ / "data");
     Ok(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes, 2));
     if (std::string_view(GetParam().data) == "cub") WriteMiniature(folder_ / "cub", "cub");
     settings_ = GetParam().settings;
@@ -59,22 +56,9 @@ class EveryTask : public TempFolderTest, public testing::WithParamInterface<Tiny
 
   // A run that the configuration names.
   void NeedRun(const std::string& run, const std::string& config, const std::string& key) {
-    const std::vector<std::string> own = {"schedule.steps=2"};
-    TrainJob job = JobOf(run, config, own);
-    job.data = folder_ / "data";
-    ASSERT_TRUE(Train(job, Workers(1), {}).ok());
+    const TinyRun tiny{.run = run, .config = config, .settings = {"schedule.steps=2"}};
+    Ok(Train(tiny).status());
     settings_.push_back(key + (folder_ / run).string());
-  }
-
-  TrainJob JobOf(const std::string& run, const std::string& config,
-                 const std::vector<std::string>& settings) {
-    TrainJob job;
-    job.config = ParseConfig(config, "tiny").value();
-    Ok(OverrideFields(settings, job.config.Fields()));
-    job.data = folder_ / GetParam().data;
-    job.run = folder_ / run;
-    job.existing = ExistingRun::kContinue;
-    return job;
   }
 
   struct How {
@@ -88,13 +72,13 @@ class EveryTask : public TempFolderTest, public testing::WithParamInterface<Tiny
     settings.push_back("schedule.portions=" + std::to_string(how.portions));
     settings.push_back("schedule.steps=" + std::to_string(how.steps));
     settings.push_back("schedule.sample_every=" + std::to_string(how.sample_every));
-    TrainJob job = JobOf(how.run, GetParam().config, settings);
-    job.drawn = how.drawn;
-    StopFlag stop = false;
-    const auto stop_after = [&](const Progress& p) {
-      if (p.stage == "training" && p.done >= static_cast<std::size_t>(how.stop)) stop = true;
-    };
-    const auto outcome = Train(job, Workers(how.workers), {stop_after, &stop});
+    const auto outcome = Train({.run = how.run,
+                                .config = GetParam().config,
+                                .settings = settings,
+                                .data = GetParam().data,
+                                .workers = how.workers,
+                                .stop_at = static_cast<std::size_t>(how.stop),
+                                .drawn = how.drawn});
     EXPECT_EQ(outcome.ok(), how.stop == kNever) << outcome.status().message();
   }
   void ExpectSame(const std::string& a, const std::string& b, int steps = kSteps) {
@@ -102,7 +86,6 @@ class EveryTask : public TempFolderTest, public testing::WithParamInterface<Tiny
     ExpectSameCurves(folder_ / a, folder_ / b, steps);
   }
 
-  Workers workers_{1};
   nn::Context context_{workers_};
   std::vector<std::string> settings_;
 };

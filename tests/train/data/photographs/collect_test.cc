@@ -8,13 +8,9 @@
 #include <cmath>
 
 #include "scene/weak_perspective_ref.h"
-#include "support/temp_folder.h"
-#include "train/config.h"
 #include "train/data/photographs/miniature.h"
 #include "train/data/photographs/pascal3d_miniature.h"
-#include "train/predictor.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::collect_test {
 
@@ -27,7 +23,7 @@ double Iou(const PhotoMask& a, const PhotoMask& b) {
   return static_cast<double>(both) / std::max(either, 1);
 }
 
-class CollectTest : public TempFolderTest {
+class CollectTest : public TinyRunTest {
  protected:
   Result<CollectionSummary> Collect(const CollectionJob& job, const std::string& out,
                                     int workers = 2) const {
@@ -36,24 +32,19 @@ class CollectTest : public TempFolderTest {
 
   // Twenty steps, and the scores of the test part.
   void ExpectTrains(const std::string& data) const {
-    TrainJob job;
-    job.config = ParseConfig(kTinyPhotographs, "tiny").value();
-    job.config.schedule.steps = 20;
-    job.data = folder_ / data;
-    job.run = folder_ / (data + "_run");
-    Ok(train::Train(job, workers_, {}).status());
-    const auto predictor = Ok(Predictor::Load(job.run, workers_));
-    const TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
-    const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, {}));
-    EXPECT_LT(*scores->rows[0].mean.mask_loss, 0.95);
+    const std::string run = data + "_run";
+    Ok(Train({.run = run,
+              .config = kTinyPhotographs,
+              .settings = {"schedule.steps=20"},
+              .data = data})
+           .status());
+    EXPECT_LT(*Ok(Evaluate(run, data))->rows[0].mean.mask_loss, 0.95);
   }
 
   // The first half of a file.
   static void CutFile(const Path& file) {
     std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   }
-
-  Workers workers_{2};
 };
 
 TEST_F(CollectTest, ReadsPascal3dByItsOwnAnnotations) {

@@ -9,16 +9,13 @@
 #include "io/npz.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
-#include "support/temp_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/sources/miniatures.h"
 #include "train/data/sources/split_list.h"
 #include "train/eval/scores.h"
 #include "train/metrics/metrics.h"
-#include "train/predictor.h"
 #include "train/tasks/task.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::rendered_views_test {
 
@@ -28,7 +25,7 @@ constexpr double kMaskIou = 0.98;
 
 using Source = std::unique_ptr<ModelSource>;
 
-class RenderedSets : public TempFolderTest {
+class RenderedSets : public TinyRunTest {
  protected:
   Path Set() const { return folder_ / "set"; }
   Path Data() const { return folder_ / "data"; }
@@ -82,16 +79,13 @@ class RenderedSets : public TempFolderTest {
   }
 
   Evaluation TrainAndEvaluate(std::optional<VoxelRule> rule = std::nullopt) const {
-    const Workers workers(2);
-    TrainJob job;
-    job.data = Data();
-    job.run = folder_ / "run";
-    job.config = Ok(ParseConfig(kTinyConfig + "steps = 20\n", "tiny")).value();
-    if (!PathExists(job.run)) Ok(Train(job, workers, {}).status());
-    const auto predictor = Ok(Predictor::Load(job.run, workers));
-    TaskEvaluation evaluation{.run = job.run, .data = job.data, .predictor = *predictor};
+    const Path run = folder_ / "run";
+    if (!PathExists(run))
+      Ok(Train({.config = kTinyConfig, .settings = {"schedule.steps=20"}}).status());
+    const auto predictor = Ok(Predictor::Load(run, workers_));
+    TaskEvaluation evaluation{.run = run, .data = Data(), .predictor = *predictor};
     evaluation.voxels = rule;
-    return Ok(predictor->task().Evaluate(evaluation, workers, {})).value();
+    return Ok(predictor->task().Evaluate(evaluation, workers_, {})).value();
   }
   void ExpectEvaluation(const char* rule) const {
     const Evaluation scores = TrainAndEvaluate();

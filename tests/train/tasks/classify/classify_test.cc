@@ -7,21 +7,15 @@
 
 #include "base/rng.h"
 #include "nn/nn.h"
-#include "support/temp_folder.h"
-#include "train/config.h"
 #include "train/data/dataset_files.h"
-#include "train/predictor.h"
-#include "train/report/report.h"
 #include "train/run/log.h"
 #include "train/tasks/classify/model.h"
 #include "train/tasks/classify/perceptual_network.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::classify_test {
 
 constexpr int kSize = 16;
-const Watch kSilent = {[](const Progress&) {}};
 
 // Noise with more red, green or blue in it, by class.
 Status WriteColored(const Path& folder, const std::vector<std::string>& classes) {
@@ -38,22 +32,17 @@ Status WriteColored(const Path& folder, const std::vector<std::string>& classes)
                                  }});
 }
 
-class ClassifyTest : public TempFolderTest {
+class ClassifyTest : public TinyRunTest {
  protected:
   void SetUp() override { Ok(WriteColored(folder_ / "data", {"blue", "green", "red"})); }
-  Status TrainRun(const std::vector<std::string>& settings = {}) {
-    TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(kTinyClassifier + "steps = 60\nshift = 2\n", "tiny"));
-    TILEGRAD_TRY(ApplyOverrides(settings, &job.config));
-    job.run = folder_ / "run";
-    job.data = folder_ / "data";
-    return Train(job, workers_, kSilent).status();
+  Status TrainRun(const std::vector<std::string>& settings = {}) const {
+    const std::string config = kTinyClassifier + "steps = 60\nshift = 2\n";
+    return Train({.config = config, .settings = settings}).status();
   }
   Path Trained() {
     Ok(TrainRun());
     return folder_ / "run";
   }
-  Workers workers_{2};
   nn::Context context_{workers_};
 };
 
@@ -67,8 +56,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   EXPECT_TRUE(predictor->template_mesh().positions.empty());
   ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * kSize * kSize)).status(),
                 "predicts no meshes");
-  const auto evaluation =
-      Ok(predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent));
+  const auto evaluation = Ok(Evaluate("run", "data"));
   ASSERT_EQ(evaluation->rows.size(), 3u);
   EXPECT_NEAR(evaluation->rows[0].mean.main(), 1.0 / 3, 1e-12);
   EXPECT_GT(evaluation->rows[2].mean.main(), 0.9);
@@ -80,9 +68,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   ExpectIn(table, "Accuracy (%) on 6 models of the test split, 4 views");
   ExpectNotIn(table, "IoU");
 
-  const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
-  Ok(WriteReport(job, workers_, kSilent).status());
-  const std::string page = ReadText(job.out).value();
+  const std::string page = Page("run", "data", 3);
   ExpectIn(page, "to classify an object", "a mean accuracy of", "nearest training picture",
            "most frequent class", "called red", "accuracy, %");
   ExpectNotIn(page, "3D IoU at");
@@ -90,12 +76,10 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
 
 TEST_F(ClassifyTest, OtherClassesAreRefused) {
   const Path run = Trained();
-  const auto predictor = Ok(Predictor::Load(run, workers_));
   ASSERT_TRUE(WriteColored(folder_ / "other", {"blue", "red"}).ok());
   std::filesystem::remove(run / "training_models.txt");  // which would be refused before
-  ExpectMessage(
-      predictor->task().Evaluate({run, folder_ / "other", *predictor}, workers_, kSilent).status(),
-      "other", "2 classes", "3 that the network was trained on");
+  ExpectMessage(Evaluate("run", "other").status(), "other", "2 classes",
+                "3 that the network was trained on");
 }
 
 TEST_F(ClassifyTest, OneClassIsNothingToLearn) {
@@ -158,13 +142,12 @@ TEST_F(ClassifyTest, PerceptualNetworksThatAreNoneAreNamed) {
   EXPECT_EQ(LoadPerceptualNetwork(context_, {.file = folder_ / "none"}).status().code(),
             StatusCode::kNotFound);
   ASSERT_TRUE(WriteNoiseDataset(folder_ / "noise").ok());
-  TrainJob job;
-  job.config = ParseConfig(kTinyConfig, "tiny.toml").value();
-  ASSERT_TRUE(ApplyOverrides({"schedule.steps=1"}, &job.config).ok());
-  job.run = folder_ / "meshes";
-  job.data = folder_ / "noise";
-  ASSERT_TRUE(Train(job, workers_, kSilent).ok());
-  ExpectMessage(LoadPerceptualNetwork(context_, {.file = job.run}).status(), "meshes",
+  Ok(Train({.run = "meshes",
+            .config = kTinyConfig,
+            .settings = {"schedule.steps=1"},
+            .data = "noise"})
+         .status());
+  ExpectMessage(LoadPerceptualNetwork(context_, {.file = folder_ / "meshes"}).status(), "meshes",
                 "\"single_image\"", "\"classify\"");
 }
 

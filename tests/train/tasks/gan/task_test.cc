@@ -9,67 +9,35 @@
 
 #include "nn/gradient_check.h"
 #include "nn/nn.h"
-#include "support/temp_folder.h"
 #include "train/gradient_check.h"
-#include "train/predictor.h"
-#include "train/report/report.h"
 #include "train/same_run.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/step.h"
 #include "train/tasks/gan/watch.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::gan_task_test {
 
-const Watch kSilent = {[](const Progress&) {}};
-
-class GanTaskTest : public TempFolderTest {
+class GanTaskTest : public TinyRunTest {
  protected:
   GanTaskTest() : context_(workers_) {
-    std::filesystem::create_directories(folder_ / "data");
-    EXPECT_TRUE(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes).ok());
+    Ok(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes));
+    Ok(Train({.run = "textured", .config = kTinyTextured, .settings = {"schedule.steps=2"}})
+           .status());
   }
-  void TrainTextures() {
-    auto config = Ok(ParseConfig(kTinyTextured, "tiny.toml"));
-    ValueOf<std::int64_t>(*config, "schedule.steps") = 2;
-    TrainJob job;
-    job.config = std::move(*config);
-    job.data = folder_ / "data";
-    job.run = folder_ / "textured";
-    Ok(Train(job, workers_, kSilent).status());
-  }
-  struct Job {
-    std::string run;
-    std::vector<std::string> settings = {};
-    int workers = 2;
-    std::size_t stop_at = 1000;  // steps
-  };
-  Result<RunOutcome> TrainGan(const Job& at) const {
-    TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(kTinyGan, "gan.toml"));
-    std::vector<std::string> settings = {"textures.run=" + (folder_ / "textured").string()};
-    settings.insert(settings.end(), at.settings.begin(), at.settings.end());
-    TILEGRAD_TRY(OverrideFields(settings, job.config.Fields()));
-    job.data = folder_ / "data";
-    job.run = folder_ / at.run;
-    job.existing = ExistingRun::kContinue;
-    StopFlag stop = false;
-    const auto stop_at = [&](const Progress& progress) {
-      if (progress.stage == "training" && progress.done >= at.stop_at) stop = true;
-    };
-    return Train(job, Workers(at.workers), {stop_at, &stop});
+  Result<RunOutcome> TrainGan(TinyRun gan) const {
+    gan.config = kTinyGan;
+    gan.settings.insert(gan.settings.begin(), "textures.run=" + (folder_ / "textured").string());
+    return Train(gan);
   }
   std::vector<nn::NamedTensor> Final(const std::string& run) {
     return FinalTensors(context_, folder_ / run, 12);
   }
 
-  Workers workers_{2};
   nn::Context context_;
 };
 
 TEST_F(GanTaskTest, StoppedInEachStageAndContinuedEndsInTheSameBits) {
-  ASSERT_NO_FATAL_FAILURE(TrainTextures());
   Ok(TrainGan({"whole"}).status());
   const auto first = TrainGan({.run = "stopped", .workers = 1, .stop_at = 4});
   EXPECT_EQ(first.status().code(), StatusCode::kCancelled) << first.status().message();
@@ -82,7 +50,6 @@ TEST_F(GanTaskTest, StoppedInEachStageAndContinuedEndsInTheSameBits) {
 }
 
 TEST_F(GanTaskTest, ShapesLearnFirstAndThenStay) {
-  ASSERT_NO_FATAL_FAILURE(TrainTextures());
   ASSERT_TRUE(TrainGan({.run = "shape", .settings = {"schedule.steps=6"}}).ok());
   ASSERT_TRUE(TrainGan({"both"}).ok());
   const auto shape = Ok(LoadNewestCheckpoint(context_, folder_ / "shape"));
@@ -110,7 +77,6 @@ TEST_F(GanTaskTest, ShapesLearnFirstAndThenStay) {
 }
 
 TEST_F(GanTaskTest, ASecondRunStartsWithTheShapesOfTheFirst) {
-  ASSERT_NO_FATAL_FAILURE(TrainTextures());
   ASSERT_TRUE(TrainGan({.run = "shape", .settings = {"schedule.steps=6"}}).ok());
   const auto second =
       Ok(TrainGan({.run = "second",
@@ -128,7 +94,6 @@ TEST_F(GanTaskTest, ASecondRunStartsWithTheShapesOfTheFirst) {
 }
 
 TEST_F(GanTaskTest, MakesMeshesAndAReport) {
-  ASSERT_NO_FATAL_FAILURE(TrainTextures());
   ASSERT_TRUE(TrainGan({"run"}).ok());
   const Path run = folder_ / "run";
   EXPECT_TRUE(std::filesystem::exists(run / "samples" / "step_00000012.png"));
@@ -151,9 +116,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   EXPECT_NE(made[0][0].positions, made[0][1].positions);
   EXPECT_EQ(made[0][0].textures[0].image.width, 32);
 
-  const ReportJob page{run, folder_ / "data", folder_ / "page.html", 2};
-  Ok(WriteReport(page, workers_, kSilent).status());
-  const std::string text = ReadText(page.out).value();
+  const std::string text = Page("run", "data", 2);
   ExpectIn(text, "to generate textured objects from noise", "Wasserstein estimate",
            "sample 1 from behind", "Generated meshes, interactive",
            "tilegrad sample --score --run");
@@ -161,7 +124,6 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
 }
 
 TEST_F(GanTaskTest, WhatCannotBeIsAnError) {
-  ASSERT_NO_FATAL_FAILURE(TrainTextures());
   const auto said = [&](const std::string& setting) {
     return TrainGan({.run = "bad", .settings = {setting}}).status();
   };

@@ -6,42 +6,39 @@
 #include <algorithm>
 
 #include "nn/nn.h"
-#include "support/temp_folder.h"
-#include "train/config.h"
 #include "train/data/photographs/miniature.h"
 #include "train/run/log.h"
 #include "train/same_run.h"
 #include "train/tasks/photographs/step.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::adversary_test {
 
 constexpr int kSteps = 12;  // of kTinyPhotographs
 
-class PhotographsWithACritic : public TempFolderTest {
+class PhotographsWithACritic : public TinyRunTest {
  protected:
   PhotographsWithACritic() { WriteMiniature(folder_ / "cub", "cub"); }
 
-  Status Train(const std::string& run, const std::string& more) {
-    TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(std::string(kTinyPhotographs) + more, "tiny"));
-    job.data = folder_ / "cub";
-    job.run = folder_ / run;
-    return train::Train(job, Workers(2), {}).status();
+  Status TrainFirst() const {
+    return Train({.run = "first", .config = kTinyPhotographs, .data = "cub"}).status();
   }
-  std::string Critic() const {
-    return "[start]\nrun = \"" + (folder_ / "first").string() +
-           "\"\n[adversarial]\nweight = 0.5\nfeatures = 1\nbase = 2\nhalvings = 2\n"
-           "learning_rate = 1e-3\n";
+  Status TrainSecond() const {
+    return Train(
+               {.run = "second",
+                .config = kTinyPhotographs,
+                .settings = {"start.run=" + (folder_ / "first").string(), "adversarial.weight=0.5",
+                             "adversarial.features=1", "adversarial.base=2",
+                             "adversarial.halvings=2", "adversarial.learning_rate=1e-3"},
+                .data = "cub"})
+        .status();
   }
-  Workers workers_{1};
   nn::Context context_{workers_};
 };
 
 TEST_F(PhotographsWithACritic, IsKeptAndLoggedInASecondStage) {
-  Ok(Train("first", ""));
-  Ok(Train("second", Critic()));
+  Ok(TrainFirst());
+  Ok(TrainSecond());
   const auto tensors = FinalTensors(context_, folder_ / "second", kSteps);
   EXPECT_TRUE(std::any_of(tensors.begin(), tensors.end(), [](const nn::NamedTensor& tensor) {
     return tensor.name.starts_with("critic.");
@@ -55,9 +52,7 @@ TEST_F(PhotographsWithACritic, IsKeptAndLoggedInASecondStage) {
   }
 }
 
-TEST_F(PhotographsWithACritic, StartsAsARunThatIsThere) {
-  ExpectMessage(Train("second", Critic()), "first");
-}
+TEST_F(PhotographsWithACritic, StartsAsARunThatIsThere) { ExpectMessage(TrainSecond(), "first"); }
 
 // In float64, by a central difference along a random direction of the texture's last layer: h as in
 // task_test.cc.

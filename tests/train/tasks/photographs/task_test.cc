@@ -10,53 +10,27 @@
 #include "nn/nn.h"
 #include "scene/weak_perspective_ref.h"
 #include "support/source_dir.h"
-#include "support/temp_folder.h"
 #include "train/config.h"
 #include "train/data/photographs/miniature.h"
 #include "train/models/photograph_network.h"
-#include "train/predictor.h"
-#include "train/report/report.h"
 #include "train/run/log.h"
 #include "train/tasks/photographs/step.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::photographs_task_test {
 
-constexpr int kSteps = 12;  // of kTinyPhotographs
-const Watch kSilent = {[](const Progress&) {}};
-
-// The mean shape of 42 vertices loses much of its hull to smoothing.
-std::string TinyConfig(int smoothing = 0) {
-  std::string text(kTinyPhotographs);
-  return text.insert(text.find("[photographs]"), fmt::format("smoothing = {}\n", smoothing));
-}
-
-class PhotographsTask : public TempFolderTest {
+class PhotographsTask : public TinyRunTest {
  protected:
   PhotographsTask() { WriteMiniature(folder_ / "cub", "cub"); }
 
-  struct Changes {
-    std::string more = {};
-    int workers = 2;
-    std::int64_t steps = kSteps;
-    std::string data = "cub";
-    int smoothing = 0;
-  };
-  Result<RunOutcome> Train(const std::string& run, const Changes& changes) {
-    TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(TinyConfig(changes.smoothing) + changes.more, "tiny"));
-    job.config.schedule.steps = changes.steps;
-    job.config.schedule.sample_every = 1000;
-    job.extends = true;
-    job.data = folder_ / changes.data;
-    job.run = folder_ / run;
-    job.existing = ExistingRun::kContinue;
-    return train::Train(job, Workers(changes.workers), kSilent);
+  // The mean shape of 42 vertices loses much of its hull to smoothing.
+  Result<RunOutcome> TrainPhotographs(const std::string& run,
+                                      const std::vector<std::string>& settings = {},
+                                      const std::string& data = "cub") const {
+    std::vector<std::string> all = {"network.smoothing=0", "schedule.sample_every=1000"};
+    all.insert(all.end(), settings.begin(), settings.end());
+    return Train({.run = run, .config = kTinyPhotographs, .settings = all, .data = data});
   }
-
-  Workers workers_{2};
-  nn::Context context_{workers_};
 };
 
 // Of bars of one shape the mean shape is the truth, and no network can do better. Of bars whose
@@ -66,19 +40,14 @@ TEST_F(PhotographsTask, LearnsShapesThatTheMeanShapeIsNot) {
   Score scores[2];
   for (const char* deformation : {"0.3", "1000"}) {
     const bool deforms = deformation[0] == '0';
-    const Path run = folder_ / (deforms ? "shapes" : "one_shape");
-    Ok(Train(run.filename().string(),
-             {.more = fmt::format("[loss]\nkeypoint = 100\nlaplacian = 1\nmask = 20\n"
-                                  "deformation = {}\n",
-                                  deformation),
-              .steps = 300,
-              .data = "bars",
-              .smoothing = 2})
+    const char* run = deforms ? "shapes" : "one_shape";
+    Ok(TrainPhotographs(run,
+                        {"loss.keypoint=100", "loss.laplacian=1", "loss.mask=20",
+                         fmt::format("loss.deformation={}", deformation), "schedule.steps=300",
+                         "network.smoothing=2"},
+                        "bars")
            .status());
-    const auto predictor = Ok(Predictor::Load(run, workers_));
-    const TaskEvaluation job{.run = run, .data = folder_ / "bars", .predictor = *predictor};
-    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
-    scores[deforms ? 1 : 0] = evaluation->rows[2].mean;
+    scores[deforms ? 1 : 0] = Ok(Evaluate(run, "bars"))->rows[2].mean;
   }
   EXPECT_GT(*scores[1].pck, *scores[0].pck + 0.05);
   EXPECT_LT(*scores[1].mask_loss, *scores[0].mask_loss - 0.05);
@@ -87,18 +56,15 @@ TEST_F(PhotographsTask, LearnsShapesThatTheMeanShapeIsNot) {
 TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
   for (const char* texture : {"direct", "flow"}) {
     const Path run = folder_ / texture;
-    Ok(Train(texture, {.more = std::string("[loss]\nmask = 2\n") +
-                               (texture[0] == 'f' ? "color_moves = false\n" : ""),
-                       .steps = 60})
-           .status());
+    std::vector<std::string> settings = {"loss.mask=2", "schedule.steps=60"};
+    if (texture[0] == 'f') settings.push_back("loss.color_moves=false");
+    Ok(TrainPhotographs(texture, settings).status());
     const auto log = Ok(ReadLog(run));
     EXPECT_LT(log->back().values[0].second, log->front().values[0].second);
     const auto predictor = Ok(Predictor::Load(run, workers_));
     const auto meshes = Ok(predictor->Predict(std::vector<std::uint8_t>(4 * 16 * 16, 128)));
     EXPECT_EQ((*meshes)[0].textures[0].image.width, 32);
-
-    const TaskEvaluation job{.run = run, .data = folder_ / "cub", .predictor = *predictor};
-    const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
+    const auto evaluation = Ok(Evaluate(texture, "cub"));
     ASSERT_EQ(evaluation->rows.size(), 3u);
     const Score& ours = evaluation->rows[2].mean;
     EXPECT_GT(*ours.pck, 0.1);  // of 60 steps; LearnsShapesThatTheMeanShapeIsNot learns longer
@@ -113,11 +79,8 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
     ASSERT_TRUE(read.ok() && read->has_value());
     EXPECT_EQ((*read)->rows[2].mean.pck, ours.pck);
 
-    const ReportJob page{run, folder_ / "cub", folder_ / "page.html", 2};
-    Ok(WriteReport(page, workers_, kSilent).status());
-    const std::string text = ReadText(page.out).value();
-    ExpectIn(text, "from one photograph", "10 photographs, one of each object", "2D IoU loss",
-             "Cotangent Laplacian");
+    ExpectIn(Page(texture, "cub", 2), "from one photograph", "10 photographs, one of each object",
+             "2D IoU loss", "Cotangent Laplacian");
   }
 }
 
@@ -136,24 +99,15 @@ class CameraHeads : public PhotographsTask, public ::testing::WithParamInterface
 };
 
 TEST_P(CameraHeads, FindTheCameraByAzimuths) {
-  std::string config = TinyConfig();
-  config.replace(config.find("[network]"), 9,
-                 std::string("[network]\nazimuths = 8\nrotation = \"") + GetParam() + "\"");
-  TrainJob job;
-  job.config = ParseConfig(config, "tiny.toml").value();
-  job.config.schedule.steps = 500;
-  job.data = folder_ / "cub";
-  job.run = folder_ / "eight";
-  Ok(train::Train(job, workers_, kSilent).status());
-  const auto log = Ok(ReadLog(job.run));
+  Ok(TrainPhotographs("eight", {"network.azimuths=8", std::string("network.rotation=") + GetParam(),
+                                "schedule.steps=500"})
+         .status());
+  const auto log = Ok(ReadLog(folder_ / "eight"));
   ASSERT_EQ(log->size(), 500u);
   EXPECT_NEAR(MeanOf(*log, "azimuth", 0), std::log(8.0), 0.2);  // all alike
   EXPECT_LT(MeanOf(*log, "azimuth", 450), 0.6 * std::log(8.0));
   EXPECT_LT(MeanOf(*log, "camera", 450), MeanOf(*log, "camera", 0));
-  const auto predictor = Ok(Predictor::Load(job.run, workers_));
-  const TaskEvaluation evaluation{
-      .run = job.run, .data = job.data, .predictor = *predictor, .split = Split::kTrain};
-  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent));
+  const auto scores = Ok(Evaluate("eight", "cub", 24, Split::kTrain));
   EXPECT_EQ(scores->rows.size(), 3u);  // nobody knows where the bars' keypoints truly are
 }
 
@@ -180,11 +134,8 @@ TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
     }
   }
   ASSERT_TRUE(WriteCmrLayout(folder_ / "cub", set).ok());
-  ASSERT_TRUE(Train("run", {}).ok());
-  const auto predictor = Ok(Predictor::Load(folder_ / "run", workers_));
-  const TaskEvaluation job{
-      .run = folder_ / "run", .data = folder_ / "cub", .predictor = *predictor};
-  const auto scores = Ok(predictor->task().Evaluate(job, workers_, kSilent));
+  Ok(TrainPhotographs("run").status());
+  const auto scores = Ok(Evaluate("run", "cub"));
   ASSERT_EQ(scores->rows.size(), 4u);
   EXPECT_EQ(scores->rows[0].method, "true keypoints");
   EXPECT_EQ(scores->rows[0].mean.pck, 1);
@@ -194,19 +145,15 @@ TEST_F(PhotographsTask, TrueKeypointsAreTheCeiling) {
 
 TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
   WriteMiniature(folder_ / "p3d", "pascal3d");
-  Ok(Train("p3d_run", {.data = "p3d"}).status());
-  std::string config = TinyConfig();
-  config.replace(config.find("size = 16"), 9, "size = 16\ncamera = \"predicted\"");
-  TrainJob job;
-  job.config = ParseConfig(config, "tiny.toml").value();
-  job.data = folder_ / "p3d";
-  job.run = folder_ / "camera";
-  Ok(train::Train(job, workers_, kSilent).status());
+  Ok(TrainPhotographs("p3d_run", {}, "p3d").status());
+  Ok(TrainPhotographs("camera", {"photographs.camera=predicted"}, "p3d").status());
 }
 
 TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
-  ExpectMessage(Train("a", {.data = "none"}).status(), "no such folder");
-  ExpectMessage(Train("b", {.more = "[loss]\nnone = 1\n"}).status(), "loss.none");
+  ExpectMessage(TrainPhotographs("a", {}, "none").status(), "no such folder");
+  ExpectMessage(TrainPhotographs("b", {"loss.none=1"}).status(), "loss.none");
+  ExpectMessage(TrainPhotographs("c", {"network.texture=paint"}).status(), "network.texture",
+                "paint");
   PhotographsConfig azimuths;
   azimuths.network.azimuths = 4;
   azimuths.camera = "predicted";
@@ -214,21 +161,10 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   PhotographsConfig rotation;
   rotation.network.rotation = "euler";
   ExpectMessage(CheckConfig(rotation), "network.rotation", "euler");
-  std::string config = TinyConfig();
-  config.replace(config.find("levels = 2"), 10, "levels = 2\ntexture = \"paint\"");
-  TrainJob job;
-  job.config = ParseConfig(config, "tiny.toml").value();
-  job.data = folder_ / "cub";
-  job.run = folder_ / "c";
-  ExpectMessage(train::Train(job, workers_, kSilent).status(), "network.texture", "paint");
-  ASSERT_TRUE(Train("d", {}).ok());
+  Ok(TrainPhotographs("d").status());
   WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
-  ExpectMessage(Train("d", {.steps = 20}).status(), "other photographs");
-  const auto predictor = Ok(Predictor::Load(folder_ / "d", workers_));
-  const TaskEvaluation evaluation{
-      .run = folder_ / "d", .data = folder_ / "cub", .predictor = *predictor};
-  ExpectMessage(predictor->task().Evaluate(evaluation, workers_, kSilent).status(),
-                "was trained on");
+  ExpectMessage(TrainPhotographs("d").status(), "other photographs");
+  ExpectMessage(Evaluate("d", "cub").status(), "was trained on");
 }
 
 // Gradients of the whole step in float64, by central differences along random directions of all

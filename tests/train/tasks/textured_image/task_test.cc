@@ -8,44 +8,27 @@
 #include "scene/camera.h"
 #include "scene/light_frame.h"
 #include "support/source_dir.h"
-#include "support/temp_folder.h"
-#include "train/predictor.h"
-#include "train/report/report.h"
 #include "train/run/log.h"
 #include "train/tasks/textured_image/light_search.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/step.h"
-#include "train/tiny_run.h"
-#include "train/trainer.h"
+#include "train/tiny_run_fixture.h"
 
 namespace tilegrad::train::task_test {
 
-const Watch kSilent = {[](const Progress&) {}};
-
-class TexturedTask : public TempFolderTest {
+class TexturedTask : public TinyRunTest {
  protected:
-  TexturedTask() {
-    std::filesystem::create_directories(folder_ / "data");
-    EXPECT_TRUE(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes).ok());
+  TexturedTask() { Ok(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes)); }
+  Result<RunOutcome> TrainTextured(std::vector<std::string> settings,
+                                   const std::string& run = "run") const {
+    settings.push_back("schedule.steps=12");
+    return Train({.run = run, .config = kTinyTextured, .settings = settings});
   }
-  Path run_ = folder_ / "run";  // that Train makes
-  void Train(const std::string& more) {
-    TrainJob job;
-    auto config = Ok(ParseConfig(std::string(kTinyTextured) + more, "tiny.toml"));
-    job.config = std::move(*config);
-    ValueOf<std::int64_t>(job.config, "schedule.steps") = 12;
-    job.data = folder_ / "data";
-    job.run = run_;
-    const auto outcome = Ok(train::Train(job, workers_, kSilent));
-    EXPECT_TRUE(outcome->finished);
-  }
-
-  Workers workers_{2};
 };
 
 TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
-  ASSERT_NO_FATAL_FAILURE(Train(""));
-  const Path run = folder_ / "run", data = folder_ / "data";
+  EXPECT_TRUE(Ok(TrainTextured({}))->finished);
+  const Path run = folder_ / "run";
   EXPECT_TRUE(std::filesystem::exists(run / "stream.png"));
   EXPECT_TRUE(std::filesystem::exists(run / "samples" / "step_00000010.png"));
   const auto predictor = Ok(Predictor::Load(run, workers_));
@@ -54,8 +37,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   EXPECT_EQ((*meshes)[0].textures[0].image.width, 64);
   EXPECT_EQ((*meshes)[0].corner_uvs.size(), 3 * (*meshes)[0].faces.size());
 
-  const TaskEvaluation job{.run = run, .data = data, .predictor = *predictor, .views_per_model = 3};
-  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
+  const auto evaluation = Ok(Evaluate("run", "data", 3));
   ASSERT_EQ(evaluation->rows.size(), 7u);
   const Score &dark = evaluation->rows[0].mean, &mean = evaluation->rows[1].mean,
               &ours = evaluation->rows[6].mean;
@@ -77,64 +59,42 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   ASSERT_TRUE(read.ok() && read->has_value());
   EXPECT_EQ((*read)->rows[6].mean.light_angle, ours.light_angle);
 
-  const ReportJob page{run, data, folder_ / "page.html", 2};
-  const auto report = Ok(WriteReport(page, workers_, kSilent));
-  const std::string text = ReadText(page.out).value();
-  ExpectIn(text, "to predict shape, texture and light", "texture + light L1", "true light",
-           "another view", "Angle of the light");
+  ExpectIn(Page("run", "data", 2), "to predict shape, texture and light", "texture + light L1",
+           "true light", "another view", "Angle of the light");
 }
 
 TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
-  std::string text(kTinyTextured);
-  text.replace(text.find("[render]"), 8, "[render]\nrule = \"n3mr\"");
-  TrainJob job;
-  job.config = ParseConfig(text, "tiny.toml").value();
-  ValueOf<std::int64_t>(job.config, "schedule.steps") = 4;
-  job.data = folder_ / "data";
-  job.run = run_;
-  const auto outcome = Ok(train::Train(job, workers_, kSilent));
-  const auto predictor = Ok(Predictor::Load(run_, workers_));
-  const TaskEvaluation evaluation{
-      .run = run_, .data = folder_ / "data", .predictor = *predictor, .views_per_model = 2};
-  const auto scores = Ok(predictor->task().Evaluate(evaluation, workers_, kSilent));
-  EXPECT_EQ(scores->rows.size(), 7u);
+  Ok(TrainTextured({"render.rule=n3mr"}).status());
+  EXPECT_EQ(Ok(Evaluate("run", "data", 2))->rows.size(), 7u);
 }
 
-TEST_F(TexturedTask, RulesThatDrawNoTexturesAreErrors) {
-  for (const auto& [rule, light, part] : {std::tuple("softras", "lambert", "\"softras\""),
-                                          {"n3mr", "phong", "N3MR has no light.model"}}) {
-    std::string text(kTinyTextured);
-    text.replace(text.find("[render]"), 8, std::string("[render]\nrule = \"") + rule + "\"");
-    TrainJob job;
-    job.config = ParseConfig(text + "[light]\nmodel = \"" + light + "\"\n", "t").value();
-    job.data = folder_ / "data";
-    job.run = run_;
-    ExpectMessage(train::Train(job, workers_, kSilent).status(), part);
-  }
+TEST_F(TexturedTask, WhatDoesNotFitIsAnError) {
+  const std::pair<std::vector<std::string>, const char*> cases[] = {
+      {{"render.rule=softras", "light.model=lambert"}, "\"softras\""},  // it draws no textures
+      {{"render.rule=n3mr", "light.model=phong"}, "N3MR has no light.model"},
+      {{"light.model=neon"}, "light.model is \"neon\""},
+      {{"start.run=/no/run"}, "/no/run"}};
+  for (const auto& [settings, part] : cases) ExpectMessage(TrainTextured(settings).status(), part);
 }
 
 TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
-  ASSERT_NO_FATAL_FAILURE(Train("[light]\nmodel = \"none\"\n"));
-  const auto predictor = Ok(Predictor::Load(folder_ / "run", workers_));
-  const TaskEvaluation job{.run = folder_ / "run",
-                           .data = folder_ / "data",
-                           .predictor = *predictor,
-                           .views_per_model = 2};
-  const auto evaluation = Ok(predictor->task().Evaluate(job, workers_, kSilent));
+  Ok(TrainTextured({"light.model=none"}).status());
+  const auto evaluation = Ok(Evaluate("run", "data", 2));
   ASSERT_EQ(evaluation->rows.size(), 1u);
   EXPECT_FALSE(evaluation->rows[0].mean.light_angle);
 }
 
 // The second stage of section 5.3 goes on from the network of the first.
 TEST_F(TexturedTask, StartsAsTheNetworkOfAnotherRun) {
-  ASSERT_NO_FATAL_FAILURE(Train(""));
-  const std::string first = run_.string();
-  run_ = folder_ / "second";
-  ASSERT_NO_FATAL_FAILURE(Train("[start]\nrun = \"" + first +
-                                "\"\n[optimizer]\nlearning_rate = 0\n[adversarial]\nweight = "
-                                "0.5\nbase = 4\nhalvings = 2\nlearning_rate = 1e-3\n"));
+  const Path first = folder_ / "run", second = folder_ / "second";
+  Ok(TrainTextured({}).status());
+  Ok(TrainTextured(
+         {"start.run=" + first.string(), "optimizer.learning_rate=0", "adversarial.weight=0.5",
+          "adversarial.base=4", "adversarial.halvings=2", "adversarial.learning_rate=1e-3"},
+         "second")
+         .status());
   nn::Context context(workers_);
-  const auto before = FindCheckpoint(context, first), after = FindCheckpoint(context, run_);
+  const auto before = FindCheckpoint(context, first), after = FindCheckpoint(context, second);
   ASSERT_TRUE(before.ok() && after.ok());
   int same = 0, critic = 0;
   for (const nn::NamedTensor& tensor : before->checkpoint.tensors) {
@@ -150,19 +110,10 @@ TEST_F(TexturedTask, StartsAsTheNetworkOfAnotherRun) {
     critic += tensor.name.starts_with("critic.adam.m") ? 1 : 0;
   EXPECT_GT(same, 20);
   EXPECT_EQ(critic, 6);  // weights and biases of two halvings and the scores
-  const auto log = Ok(ReadLog(run_));
+  const auto log = Ok(ReadLog(second));
   std::string names;
   for (const auto& value : log->back().values) names += value.first + " ";
   ExpectIn(names, "adversarial ", "critic_distance critic_penalty ");
-}
-
-TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
-  TrainJob job;
-  job.config =
-      ParseConfig(std::string(kTinyTextured) + "[start]\nrun = \"/no/run\"\n", "t").value();
-  job.data = folder_ / "data";
-  job.run = run_;
-  ExpectMessage(train::Train(job, workers_, kSilent).status(), "/no/run");
 }
 
 // The files of configs/ name keys that there are, and sizes that go with their images.
@@ -179,14 +130,6 @@ TEST(TexturedConfigs, AreRead) {
     const std::int64_t levels = ValueOf<std::int64_t>(*copy, "network.levels");
     EXPECT_TRUE(CheckImageSize({.levels = levels}, size).ok());
   }
-}
-
-TEST_F(TexturedTask, WordsThatAreNotKnownAreErrors) {
-  TrainJob job;
-  job.config = ParseConfig(std::string(kTinyTextured) + "[light]\nmodel = \"neon\"\n", "t").value();
-  job.data = folder_ / "data";
-  job.run = folder_ / "run";
-  ExpectMessage(train::Train(job, workers_, kSilent).status(), "light.model is \"neon\"");
 }
 
 // Pictures of a painted ball under known lights, whose directions are found again.
