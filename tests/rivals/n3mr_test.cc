@@ -312,14 +312,8 @@ struct SharedScene {
       : corners(Numbers<T>(inputs["face_vertices"][n])),
         textures(Numbers<T>(file["textures"][of["texture"].get<std::string>()][n])),
         d(Numbers<T>(inputs["upstream"][n])) {
-    scene = {corners, textures, of["image_size"], {}, {}};
+    scene = {corners, textures, of["image_size"], n3mr_test::OptionsOf(of, eps), {}};
     d.resize(4 * static_cast<std::size_t>(scene.size * scene.size));
-    scene.options.reduction =
-        of["anti_aliasing"].get<bool>() ? N3mrReduction::kMean : N3mrReduction::kNone;
-    scene.options.fill_back = of["fill_back"];
-    scene.options.eps = eps;
-    scene.options.near_plane = of["near"];
-    scene.options.far_plane = of["far"];
     const auto background = Numbers(of["background"]);
     std::copy_n(background.begin(), 3, scene.colors.background);
     const double texels = static_cast<double>(3 * textures.size() / corners.size());

@@ -297,14 +297,7 @@ struct SharedCase {
         background(Numbers(of["background"])) {
     for (const std::size_t c : {0, 1, 2}) Flatten(of["upstream_rgba"][n][c], &d_color);
     Flatten(of["upstream_rgba"][n][3], &d_alpha);
-    scene = {corners, textures, of["image_size"], {}, {}};
-    SoftRasOptions& o = scene.options;
-    o.distance =
-        one["dist_func"] == "barycentric" ? SoftDistance::kBarycentric : SoftDistance::kEuclidean;
-    o.sigma = one["sigma"];
-    o.dist_eps = one["dist_eps"];
-    o.near_plane = of["near"];
-    o.far_plane = of["far"];
+    scene = {corners, textures, of["image_size"], softras_test::OptionsOf(of, one), {}};
     SoftRasColors& c = scene.colors;
     c.gamma = one["gamma"];
     std::copy_n(background.begin(), 3, c.background);

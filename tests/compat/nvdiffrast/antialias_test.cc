@@ -49,6 +49,13 @@ Numbers<double> Coverage(const Numbers<double>& rast) {
   return out;
 }
 
+// With the scene's own edges, colours of one channel.
+Numbers<double> Antialiased(const Scene<double>& scene, const Numbers<double>& rast,
+                            const Numbers<double>& color) {
+  const EdgeRings rings = BuildEdgeRings(scene.faces);
+  return Antialiased(InputOf(scene, rings, rast, color, 1));
+}
+
 TEST(EdgeRings, GoAroundTheSidesOfEachEdge) {
   // Two faces share (0, 2); three share (4, 5).
   const std::vector<std::int32_t> faces = {0, 1, 2, 2, 3, 0, 4, 5, 6, 5, 4, 7, 8, 4, 5};
@@ -67,8 +74,7 @@ TEST(Antialias, SidesOfARectangleGetTheirShareOfThePixel) {
   const Scene<double> scene = Rectangle(1.8, 6.1, 2.4, 6.0);
   const auto rast = Rasterize(scene).rast;
   const auto color = Coverage(rast);
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto out = Antialiased(scene, rast, color);
   const auto at = [&](int x, int y) { return out[static_cast<std::size_t>(8 * y + x)]; };
   for (int y = 3; y < 5; ++y) {
     const double row[8] = {0, 0.2, 1, 1, 1, 1, 0.1, 0};
@@ -98,8 +104,7 @@ TEST(Antialias, TheSumOfCoverageIsTheArea) {
   }
   const auto rast = Rasterize(scene).rast;
   const auto color = Coverage(rast);
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto out = Antialiased(scene, rast, color);
   double sum = 0, before = 0;
   for (const double v : out) sum += v;
   for (const double v : color) before += v;
@@ -123,8 +128,7 @@ TEST(Antialias, InASoupEveryEdgeIsASilhouette) {
     const auto rast = Rasterize(scene).rast;
     Numbers<double> color;
     for (std::size_t i = 3; i < rast.size(); i += 4) color.push_back(rast[i]);
-    const EdgeRings rings = BuildEdgeRings(scene.faces);
-    const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+    const auto out = Antialiased(scene, rast, color);
     for (std::size_t p = 0; p < 64; ++p) {
       const double expected = p % 8 < 4 ? 1 : p % 8 > 4 || !soup ? 2 : 2 - 0.3;
       EXPECT_NEAR(out[p], expected, 1e-12) << p;
@@ -138,10 +142,7 @@ TEST(Antialias, FacesWithoutAreaHideNoEdge) {
     Scene<double> scene = WavyGrid(2, seed, 24, 24);
     const auto rast = Rasterize(scene).rast;
     const auto color = RandomNumbers<double>(scene.grid().pixels(), 2);
-    const auto blend = [&] {
-      const EdgeRings rings = BuildEdgeRings(scene.faces);
-      return Antialiased(InputOf(scene, rings, rast, color, 1));
-    };
+    const auto blend = [&] { return Antialiased(scene, rast, color); };
     const auto expected = blend();
     for (std::int32_t v = 0; v < 9; ++v) {
       for (std::int32_t w = 0; w < 9; ++w)
@@ -155,8 +156,7 @@ TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
   const Scene<double> scene = WavyGrid(3, 1, 24, 24);
   const auto rast = Rasterize(scene).rast;
   const auto color = RandomNumbers<double>(scene.grid().pixels(), 2);
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto out = Antialiased(scene, rast, color);
   std::size_t changed = 0, inside = 0;
   for (int y = 1; y < 23; ++y) {
     for (int x = 1; x < 23; ++x) {
@@ -181,8 +181,7 @@ TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
     loose.positions.insert(loose.positions.end(), from, from + 4);
     loose.faces[i] = static_cast<std::int32_t>(i);
   }
-  const EdgeRings own = BuildEdgeRings(loose.faces);
-  const auto all = Antialiased(InputOf(loose, own, rast, color, 1));
+  const auto all = Antialiased(loose, rast, color);
   std::size_t more = 0;
   for (std::size_t p = 0; p < all.size(); ++p) more += all[p] != color[p];
   EXPECT_GT(more, changed + 50);
@@ -199,8 +198,7 @@ TEST(Antialias, AFoldIsASilhouetteBeforeAnotherSurface) {
   const auto rast = Rasterize(scene).rast;
   Numbers<double> color;
   for (std::size_t i = 3; i < rast.size(); i += 4) color.push_back(rast[i] == 3 ? 10 : 20);
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto out = Antialiased(scene, rast, color);
   // Column 3, centre 3.5, shows the face and lacks 0.3.
   EXPECT_NEAR(out[8 * 4 + 3], 20 - 0.3 * 10, 1e-12);
   EXPECT_NEAR(out[8 * 4 + 2], 10, 1e-12);
@@ -273,8 +271,7 @@ TEST(Antialias, AnEdgeThatPassesTheEyeIsFollowed) {
   scene.height = scene.width = 20;
   const auto rast = Rasterize(scene).rast;
   const auto color = Coverage(rast);
-  const EdgeRings rings = BuildEdgeRings(scene.faces);
-  const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+  const auto out = Antialiased(scene, rast, color);
   // x/w = 0.3 is column 13, of which it covers nothing, at its left border.
   std::size_t checked = 0;
   for (std::size_t y = 0; y < 20; ++y) {
