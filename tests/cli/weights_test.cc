@@ -133,11 +133,14 @@ TEST_F(Weights, ComeAlongByName) {
 }
 
 // Those of data/weights, which are installed.
-TEST_F(Weights, OfTheRepositoryPredict) {
+TEST_F(Weights, OfTheRepositoryPredictAndSample) {
+  const std::string installed = "cd " + folder_.string() + " && env -u TILEGRAD_WEIGHTS ";
   const std::string to = " --refine 0 --out " + In("out") + " " + Shared("view.png");
-  ExpectIn(ExpectDone("predict" + to, "cd " + folder_.string() + " && env -u TILEGRAD_WEIGHTS "),
-           "share/tilegrad/weights/furniture.safetensors");
+  ExpectIn(ExpectDone("predict" + to, installed), "share/tilegrad/weights/furniture.safetensors");
   EXPECT_TRUE(Exists("out/view_predicted.glb"));
+  ExpectIn(ExpectDone("sample --count 2 --out " + In("cars"), installed),
+           "share/tilegrad/weights/car-generator.safetensors");
+  EXPECT_TRUE(Exists("cars/sample_002.glb"));
 }
 
 TEST_F(Weights, ThatAreMissingAreToldOf) {

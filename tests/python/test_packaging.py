@@ -95,7 +95,8 @@ class Pip(Workspace):
         write = ("import numpy as np; from tilegrad import files; box = np.zeros((64, 64, 4)); "
                  "box[16:48, 20:44] = 1; files.save_image('box.png', box)")
         for command in ([env / "bin/python", "-c", write],
-                        [env / "bin/tilegrad", "predict", "--refine", "0", "box.png"]):
+                        [env / "bin/tilegrad", "predict", "--refine", "0", "box.png"],
+                        [env / "bin/tilegrad", "sample", "--count", "2", "--out", "cars"]):
             subprocess.run(command, check=True, cwd=self.work, env=clean, capture_output=True)
         for binary in [package / "bin/tilegrad", *package.glob("*.so")]:
             lines = subprocess.run(["ldd", binary], capture_output=True, text=True,
