@@ -91,7 +91,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
         and texture, or the colours that `start` has. lighting: as in `Scene`.
     material: "unlit"; "lambert" and "phong" fit a light as well as the colours.
-    quality: "fast", "normal" or "best": 300, 1000 or 3000 steps, unless `steps` says how many.
+    quality: "fast", "normal" or "best": 300, 1200 or 3000 steps, unless `steps` says how many.
     out: the run's folder; None: a temporary one. resume: continues the fit in it; more steps
         extend a finished fit.
     callback: called with each logged step (see `Progress`); returns True to stop. Its exceptions

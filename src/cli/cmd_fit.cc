@@ -450,7 +450,7 @@ void AddNumbers(Command* command, FitConfig* config) {
     return std::string();  // OneOf says what is wrong
   };
   command->Add("--quality", WordCheck{set_steps, ""},
-               "fast, normal or best: 300, 1000 or 3000 steps",
+               "fast, normal or best: 300, 1200 or 3000 steps",
                {OneOf{{"fast", "normal", "best"}}, Excludes{{"--steps"}}});
 }
 

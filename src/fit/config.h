@@ -42,7 +42,7 @@ struct FitConfig {
   int texture_size = 512;  // texels a side; of a sphere: around, and half of it from pole to pole
   Cutout cutout = Cutout::kAuto;
 
-  std::int64_t steps = 1000;  // the most
+  std::int64_t steps = 1200;  // the most
   // Where FitClock::kWindow steps at full resolution lower the images' loss by less than this share
   // of it, the fit goes to its end three times as fast (fit/clock.h). 0: never.
   double stop_gain = 0.03;
