@@ -18,16 +18,19 @@ namespace {
 
 constexpr int kRoundSide = 192;  // pixels of the longer side, about, of all rounds but the last
 constexpr int kRounds = 10;
-constexpr int kLateRounds = 4;  // after them, where masks have false holes
+constexpr int kHoleRounds = 4;  // at most, after them, where masks have false holes
 // Share of the views that may see past a cell of the hull.
 constexpr double kFirstTolerance = 0.15, kLastTolerance = 0.06;
 // ln: of a pixel that nothing of the hull covers, and of one in its silhouette, in later rounds.
 constexpr float kOutsideHull = -5, kInsideHull = 0.4f;
 constexpr float kKept = 5;  // ln: of the rounds, for the last one at full resolution
 constexpr PixelField::Relaxing kRelaxing = {.rounds = 40, .coupling = 0.5f};
-constexpr float kShowsFloor = 0.85f;  // mean agreement with the floor of a hole that shows it
-constexpr float kAgrees = 1;          // of what is beyond the floor: nothing speaks against it
-constexpr float kClosed = 2;          // ln: of what is in one that does not, at least
+// Least mean agreement with the floor of a true hole. In rendered captures true holes have 0.99 or
+// more, parts of the object in the floor's colour 0.75 or less.
+constexpr float kShowsFloor = 0.85f;
+constexpr float kBeyondFloor =
+    1;  // agreement of a ray that misses the known floor: as of a true hole
+constexpr float kInFalseHole = 2;  // ln: odds of a pixel in a false hole, at least
 constexpr float kInsideMask = 0.5f;
 const Progress kDone = {"finding masks", kRounds + 1, kRounds + 1, ""};
 
@@ -39,10 +42,10 @@ Camera Reduced(Camera c, float factor) {
   return c;
 }
 
-// Raises the odds of what false holes hold: `closed` is 1 there.
-void KeepClosed(std::span<const float> closed, std::vector<float>* odds) {
-  for (std::size_t p = 0; p < closed.size(); ++p) {
-    if (closed[p] > 0) (*odds)[p] = std::max((*odds)[p], kClosed);
+// `in_false_hole` [H,W]: 1 there.
+void RaiseOdds(std::span<const float> in_false_hole, std::vector<float>* odds) {
+  for (std::size_t p = 0; p < odds->size(); ++p) {
+    if (in_false_hole[p] > 0) (*odds)[p] = std::max((*odds)[p], kInFalseHole);
   }
 }
 
@@ -71,7 +74,7 @@ class MaskSearch {
   }
 
   void Start(glm::vec3 middle);
-  Status Settle(const Watch& watch);
+  Status RunHoleRounds(const Watch& watch);
   bool CloseFalseHoles();
   std::vector<std::vector<Hole>> FindHoles() const;
   void RelearnFloor(const std::vector<std::vector<Hole>>& holes);
@@ -90,7 +93,7 @@ class MaskSearch {
   std::optional<Floor> floor_;
   std::vector<PixelField> fields_;
   std::vector<float> inside_, on_floor_;  // [N,H,W]
-  std::vector<float> closed_;             // [N,H,W]: 1 in false holes
+  std::vector<float> in_false_hole_;      // [N,H,W]: 1 there
 };
 
 MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers)
@@ -101,7 +104,7 @@ MaskSearch::MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& w
       odds_(images_, workers),
       inside_(images_.alpha.size()),
       on_floor_(images_.alpha.size()),
-      closed_(images_.alpha.size()) {
+      in_false_hole_(images_.alpha.size()) {
   for (const Camera& c : input.cameras) cameras_.push_back(Reduced(c, static_cast<float>(factor_)));
   hull_.emplace(cameras_, ImageSize{images_.width, images_.height}, middle, workers);
   for (std::size_t v = 0; v < views(); ++v)
@@ -136,7 +139,7 @@ void MaskSearch::Round(double time) {
     const std::vector<float> hull = hull_->Silhouette(v);
     for (std::size_t p = 0; p < odds.size(); ++p)
       odds[p] += kOutsideHull * (1 - hull[p]) + inside_hull * hull[p];
-    KeepClosed(Of(v, closed_), &odds);
+    RaiseOdds(Of(v, in_false_hole_), &odds);
     std::ranges::copy(fields_[v].Relax(odds, kRelaxing), Of(v, &inside_).begin());
   });
   hull_->Vote(inside_, kFirstTolerance + time * (kLastTolerance - kFirstTolerance), workers_);
@@ -160,8 +163,8 @@ void MaskSearch::RelearnFloor(const std::vector<std::vector<Hole>>& holes) {
   floor_->Relearn(inside_, in_hole, workers_);
 }
 
-// A hole shows the floor as other views see it there, or what lies beyond; else it is a part of the
-// object that has the background's colours. Whether there was such a part.
+// A true hole shows the floor as other views see it, or what lies beyond; a false one, a part of
+// the object in the background's colours. Returns whether there was a false one.
 bool MaskSearch::CloseFalseHoles() {
   if (!floor_->found()) return false;
   const std::vector<std::vector<Hole>> holes = FindHoles();
@@ -169,11 +172,11 @@ bool MaskSearch::CloseFalseHoles() {
   bool any = false;
   for (std::size_t v = 0; v < views(); ++v) {
     if (holes[v].empty()) continue;
-    const std::vector<float> agreement = floor_->Agreement(v, kAgrees);
+    const std::vector<float> agreement = floor_->Agreement(v, kBeyondFloor);
     for (const Hole& hole : holes[v]) {
       if (MeanOf(agreement, hole.core) >= kShowsFloor) continue;
       any = true;
-      for (const std::size_t p : hole.pixels) Of(v, &closed_)[p] = Of(v, &inside_)[p] = 1;
+      for (const std::size_t p : hole.pixels) Of(v, &in_false_hole_)[p] = Of(v, &inside_)[p] = 1;
     }
   }
   if (any) hull_->Vote(inside_, kLastTolerance, workers_);
@@ -191,13 +194,14 @@ Status MaskSearch::Run(const Watch& watch) {
     TILEGRAD_TRY(watch.At({"finding masks", static_cast<std::uint64_t>(round), kRounds + 1, ""}));
     Round(static_cast<double>(round) / (kRounds - 1));
   }
-  return Settle(watch);
+  return RunHoleRounds(watch);
 }
 
-// Rounds with false holes closed. What they cover then hides others, so that all are sought again.
-Status MaskSearch::Settle(const Watch& watch) {
+// Closed holes change the hull and the floor's colours, which reveal more, so each round looks
+// again.
+Status MaskSearch::RunHoleRounds(const Watch& watch) {
   bool any = false;
-  for (int round = 0; round < kLateRounds; ++round) {
+  for (int round = 0; round < kHoleRounds; ++round) {
     TILEGRAD_TRY(watch.At({"finding masks", kRounds, kRounds + 1, ""}));
     any = CloseFalseHoles() || any;
     if (!any) break;
@@ -219,7 +223,7 @@ std::vector<float> MaskSearch::Enlarged(std::span<const float> values) const {
 
 std::vector<float> MaskSearch::FullMask(std::size_t view) const {
   std::vector<float> odds = odds_.Of(full_, view, Enlarged(Of(view, on_floor_)));
-  KeepClosed(Enlarged(Of(view, closed_)), &odds);
+  RaiseOdds(Enlarged(Of(view, in_false_hole_)), &odds);
   const std::vector<float> before = Enlarged(Of(view, inside_));
   for (std::size_t p = 0; p < odds.size(); ++p) odds[p] += kKept * (2 * before[p] - 1);
   const std::size_t pixels = full_.pixels();

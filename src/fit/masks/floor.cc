@@ -5,6 +5,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <iterator>
+
+#include "fit/masks/holes.h"
 
 namespace tilegrad::train {
 namespace {
@@ -14,7 +17,6 @@ constexpr int kHeights = 48, kBetween = 4;         // heights that are tried; th
 constexpr float kSame = 0.05f;           // standard deviation of one place's colour over views
 constexpr float kLeastViews = 0.4f;      // share of the views whose images must have a place
 constexpr std::size_t kLeastBeside = 2;  // views that see a place beside the object
-constexpr float kHiding = 0.5f;          // of a pixel that shows the object
 constexpr float kNoSupport = 0.25f, kFullSupport = 0.5f;  // of a colour that is believed
 
 float Likeness(glm::vec3 a, glm::vec3 b) {
@@ -39,24 +41,6 @@ bool StandsOut(std::span<const float> scores, std::ptrdiff_t best) {
   if (best < kAside || best + kAside >= std::ssize(scores)) return false;
   const auto at = [&](std::ptrdiff_t i) { return scores[static_cast<std::size_t>(i)]; };
   return at(best) > kHigher * std::max(at(best - kAside), at(best + kAside));
-}
-
-// 1 where something is inside, and next to it, where smoothed colours are partly its own.
-std::vector<std::uint8_t> Widened(std::span<const float> inside, ImageSize size) {
-  std::vector<std::uint8_t> out(inside.size());
-  const std::size_t plane =
-      static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
-  for (std::size_t i = 0; i < inside.size(); ++i) {
-    if (inside[i] < kHiding) continue;
-    const std::size_t view = i / plane;
-    const int x = static_cast<int>(i % plane) % size.width,
-              y = static_cast<int>(i % plane) / size.width;
-    for (int v = std::max(0, y - 1); v <= std::min(size.height - 1, y + 1); ++v) {
-      for (int u = std::max(0, x - 1); u <= std::min(size.width - 1, x + 1); ++u)
-        out[view * plane + static_cast<std::size_t>(v * size.width + u)] = 1;
-    }
-  }
-  return out;
 }
 
 std::ptrdiff_t Highest(const std::vector<float>& scores) {
@@ -197,7 +181,13 @@ Floor::Texel Floor::SeenBeside(glm::vec3 point, const std::vector<std::uint8_t>&
 
 void Floor::Relearn(std::span<const float> inside, std::span<const float> holes,
                     const Workers& workers) {
-  std::vector<std::uint8_t> hidden = Widened(inside, {images_.width, images_.height});
+  // Next to the object, smoothed colours are partly its own.
+  std::vector<std::uint8_t> hidden;
+  for (std::size_t v = 0; v < cameras_.size(); ++v) {
+    const auto of_view = inside.subspan(v * images_.pixels(), images_.pixels());
+    std::ranges::copy(Dilated(of_view, {images_.width, images_.height}, 1),
+                      std::back_inserter(hidden));
+  }
   std::vector<std::uint8_t> hidden_or_hole = hidden;
   for (std::size_t p = 0; p < hidden.size(); ++p) hidden_or_hole[p] |= holes[p] > 0;
   workers.For(kTexelSide, [&](std::size_t y, std::size_t) {

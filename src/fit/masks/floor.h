@@ -29,9 +29,9 @@ class Floor {
   Floor(const TargetImages& images, std::span<const Camera> cameras, const Region& region,
         const Workers& workers);
 
-  // Learns its colours anew, from views that see it beside the object: where they are not `inside`
-  // [N,H,W] in [0, 1]; of a place that fewer than two such see, from those that see it through
-  // `holes`, too: [N,H,W], 1 there.
+  // Learns the floor's colours again, from pixels that are neither `inside` [N,H,W] in [0, 1] nor
+  // in `holes` [N,H,W], which is 1 there. A place that fewer than two views see so takes holes,
+  // too.
   void Relearn(std::span<const float> inside, std::span<const float> holes, const Workers& workers);
 
   // Whether one height stands out; else nothing is known of a floor.

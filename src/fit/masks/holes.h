@@ -3,12 +3,17 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "scene/camera.h"
 
 namespace tilegrad::train {
+
+// The dilation of a mask [H,W] in [0, 1], half or more being inside, by a square that reaches so
+// many pixels to each side: 1 inside, 0 outside.
+std::vector<std::uint8_t> Dilated(std::span<const float> mask, ImageSize size, int reach);
 
 struct Hole {
   std::vector<std::size_t> core;    // pixels so far inside that no blur mixes them with the rim
