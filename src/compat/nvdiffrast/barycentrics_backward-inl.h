@@ -170,34 +170,6 @@ class FaceSums {
   hn::Vec<PairTag> sum_[kPairs];
 };
 
-// The faces at a vector of pixels, and the first pixel whose face does not exist, as FaceOf and
-// IsFaceId have it.
-class FaceLanes {
- public:
-  explicit FaceLanes(std::size_t count) : most_(static_cast<float>(count)) {}
-
-  // `first`: the index of the first pixel.
-  HWY_INLINE hn::Vec<NarrowIntTag> Find(const float* rast, std::size_t first) {
-    const NarrowTag d;
-    const NarrowIntTag di;
-    const auto id = NarrowQuads(rast).c[3];
-    const auto number = hn::ConvertTo(di, id);
-    const auto in_range = hn::And(hn::Ge(id, hn::Zero(d)), hn::Le(id, hn::Set(d, most_)));
-    const auto exists = hn::And(hn::Eq(hn::ConvertTo(d, number), id), in_range);
-    if (HWY_UNLIKELY(!hn::AllTrue(d, exists))) {
-      const auto at = static_cast<std::size_t>(hn::FindFirstTrue(d, hn::Not(exists)));
-      bad_ = HWY_MIN(bad_, first + at);
-    }
-    const auto known = hn::IfThenElseZero(hn::RebindMask(di, exists), number);
-    return hn::Sub(known, hn::Set(di, 1));
-  }
-  std::size_t bad() const { return bad_; }
-
- private:
-  float most_;
-  std::size_t bad_ = kNoPixel;
-};
-
 // The pixels of a band.
 class BandPull {
  public:
@@ -205,14 +177,19 @@ class BandPull {
                       const RasterizeCotangents<float>& cotangents)
       : input_(input), centres_(centres), cotangents_(cotangents), size_(SizeOf(input.grid)) {}
 
-  // Puts the faces of pixels of a row, from column x on, in place.
-  HWY_INLINE void Stage(std::size_t image, int row, std::size_t x, FaceLanes* numbers) {
+  // Puts the faces of pixels of a row, from column x on, in place. *bad: as of FaceIds.
+  HWY_INLINE void Stage(std::size_t image, int row, std::size_t x, std::size_t* bad) {
+    const NarrowTag d;
+    const NarrowIntTag whole;
+    const auto faces = static_cast<float>(input_.faces.size() / 3);
     const std::size_t lanes = hn::Lanes(WideTag());
     count_ = HWY_MIN(CornerStage::kPixels, input_.grid.row() - x);
     first_ = input_.grid.first(image, row) + x;
     for (std::size_t i = 0; i < count_; i += lanes) {
-      const auto face = numbers->Find(At(cotangents_.rast, i, &rast_), first_ + i);
-      if (hn::AllFalse(NarrowIntTag(), HaveFaces(face))) {
+      const FaceIds ids(d, NarrowQuads(At(cotangents_.rast, i, &rast_)).c[3], faces);
+      ids.Find(d, first_ + i, bad);
+      const auto face = hn::Sub(ids.number, hn::Set(whole, 1));
+      if (hn::AllFalse(whole, HaveFaces(face))) {
         stage_.PutNone(i);
       } else {
         stage_.Put(input_, image, i, face);
@@ -260,17 +237,17 @@ class BandPull {
 std::size_t PullBand(const RasterizeInput<float>& input, const PixelCentres& centres,
                      const RasterizeCotangents<float>& cotangents, const Band& band,
                      BandSums::Adder* adder) {
-  FaceLanes numbers(input.faces.size() / 3);
+  std::size_t bad = kNoPixel;
   FaceSums sums(input, band.image, adder);
   BandPull pull(input, centres, cotangents);
   for (int row = band.row_begin; row < band.row_end; ++row) {
     for (std::size_t x = 0; x < input.grid.row(); x += CornerStage::kPixels) {
-      pull.Stage(band.image, row, x, &numbers);
+      pull.Stage(band.image, row, x, &bad);
       pull.Add(row, x, &sums);
     }
   }
   sums.Flush();
-  return numbers.bad();
+  return bad;
 }
 
 }  // namespace HWY_NAMESPACE

@@ -15,6 +15,7 @@
 
 #include "compat/nvdiffrast/face_steps.h"
 #include "compat/nvdiffrast/face_steps_ref.h"
+#include "compat/nvdiffrast/quads-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::compat::nvdiffrast {
@@ -29,17 +30,13 @@ std::size_t ReadRow(std::span<const float> rast, std::size_t faces, FaceRow* out
   const IdTag d;
   const IdIntTag di;
   const std::size_t width = rast.size() / 4, lanes = hn::Lanes(d);
-  const auto most = hn::Set(d, static_cast<float>(faces));
   std::size_t bad = kNoPixel, x = 0;
   for (; x + lanes <= width; x += lanes) {
     hn::Vec<IdTag> u, v, depth, id;
     hn::LoadInterleaved4(d, rast.data() + 4 * x, u, v, depth, id);
-    const IdInt number = hn::ConvertTo(di, id);
-    const auto in_range = hn::And(hn::Ge(id, hn::Zero(d)), hn::Le(id, most));
-    const auto exists = hn::And(hn::Eq(hn::ConvertTo(d, number), id), in_range);
-    hn::Store(hn::IfThenElseZero(hn::RebindMask(di, exists), number), di, &out->ids[x]);
-    if (HWY_LIKELY(hn::AllTrue(d, exists))) continue;
-    bad = HWY_MIN(bad, x + static_cast<std::size_t>(hn::FindFirstTrue(d, hn::Not(exists))));
+    const FaceIds ids(d, id, static_cast<float>(faces));
+    hn::Store(ids.number, di, &out->ids[x]);
+    ids.Find(d, x, &bad);
   }
   const std::size_t bad_after = ReadFaceRowRef(rast, faces, out, x);
   return HWY_MIN(bad, bad_after);

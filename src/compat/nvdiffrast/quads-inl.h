@@ -59,6 +59,28 @@ HWY_INLINE void WriteZeros(float* to, float* end) {
   for (; to < end; ++to) *to = 0;
 }
 
+// Channel 3 of a vector of pixels of rast, as IsFaceId has it.
+template <class D>
+struct FaceIds {
+  hn::Vec<hn::RebindToSigned<D>> number;  // 0 where there is no such face
+  hn::Mask<D> exists;
+
+  HWY_INLINE FaceIds(D d, hn::Vec<D> id, float faces) {
+    const hn::RebindToSigned<D> di;
+    const auto integer = hn::ConvertTo(di, id);
+    const auto in_range = hn::And(hn::Ge(id, hn::Zero(d)), hn::Le(id, hn::Set(d, faces)));
+    exists = hn::And(hn::Eq(hn::ConvertTo(d, integer), id), in_range);
+    number = hn::IfThenElseZero(hn::RebindMask(di, exists), integer);
+  }
+  // *bad <- the least of *bad and the index of the first pixel whose face does not exist, `first`
+  // being that of lane 0.
+  HWY_INLINE void Find(D d, std::size_t first, std::size_t* bad) const {
+    if (HWY_LIKELY(hn::AllTrue(d, exists))) return;
+    const auto lane = static_cast<std::size_t>(hn::FindFirstTrue(d, hn::Not(exists)));
+    *bad = HWY_MIN(*bad, first + lane);
+  }
+};
+
 // The lanes from number `first` on that are below `count`.
 HWY_INLINE QuadMask LanesBelow(std::size_t first, std::size_t count) {
   return hn::FirstN(QuadTag(), HWY_MIN(count - first, std::size_t{4}));

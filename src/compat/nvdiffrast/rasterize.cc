@@ -249,11 +249,6 @@ void MakeClipScreen(const VertexRows<T>& positions, FaceList faces, const FaceRa
   writer.Unpack();
 }
 
-template void MakeClipScreen(const VertexRows<float>&, FaceList, const FaceRange&, std::size_t,
-                             const PixelGrid&, ClipScreen*);
-template void MakeClipScreen(const VertexRows<double>&, FaceList, const FaceRange&, std::size_t,
-                             const PixelGrid&, ClipScreen*);
-
 void WritePixel(const Barycentrics<double>& b, std::int32_t face, double* rast, double* rast_db) {
   rast[0] = std::clamp(b.u, 0.0, 1.0);
   rast[1] = std::clamp(b.v, 0.0, 1.0 - rast[0]);
