@@ -122,7 +122,7 @@ TEST(BatchNormKernel, HandValues) {
   EXPECT_EQ(y, (std::vector<double>{0, 0, 1, 4}));
 }
 
-TEST(Reduce, SumOfSquaresIsExactToDouble) {
+TEST(Reduce, SumOfSquaresHasTheAccuracyOfDouble) {
   Rng rng(10);
   for (std::size_t n : {0, 1, 5, 13, 200003}) {
     const auto x = RandomFloats(rng, n);
