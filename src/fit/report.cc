@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "fit/run.h"
+#include "train/losses/regularizers.h"
 #include "train/report/html.h"
 #include "train/run/log.h"
 
@@ -153,11 +154,13 @@ std::string Settings(const FitJob& job) {
 }  // namespace
 
 TermLabels FitLabels() {
-  return {{"color", "Colour loss (mean difference)"}, {"silhouette", "Silhouette loss"},
-          {"laplacian", "Laplacian of the movement"}, {"smoothness", "Angles between faces"},
-          {"edge_length", "Unequal edges"},           {"area", "Surface area"},
-          {"delta", "Softness of outlines (NDC²)"},   {"factor", "Downsampling of the images"},
-          {"images_per_second", "Images per second"}};
+  TermLabels out = RegularizerLabels();
+  out.merge(TermLabels{{"color", "Colour loss (mean difference)"},
+                       {"silhouette", "Silhouette loss"},
+                       {"delta", "Softness of outlines (NDC²)"},
+                       {"factor", "Downsampling of the images"},
+                       {"images_per_second", "Images per second"}});
+  return out;
 }
 
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,

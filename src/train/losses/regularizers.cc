@@ -6,29 +6,49 @@
 #include "train/losses/smoothness.h"
 
 namespace tilegrad::train {
+namespace {
 
-ConfigFields FieldsOf(RegularizerWeights* w, const std::string& table) {
-  return {
-      {table + "smoothness", &w->smoothness, 0, kNoLimit,
-       "weight of the normal difference of neighbouring faces"},
-      {table + "laplacian", &w->laplacian, 0, kNoLimit,
-       "weight of the Laplacian of the displacement"},
-      {table + "edge_length", &w->edge_length, 0, kNoLimit, "weight of unequal edges"},
-      {table + "area", &w->area, 0, kNoLimit, "weight of the surface area"},
-  };
+struct Regularizer {
+  const char *name, *label, *help;
+  double RegularizerWeights::*weight;
+  nn::Var (*loss)(const DeformedMeshes&);
+};
+
+// In the order of keys, terms and sums.
+constexpr Regularizer kRegularizers[] = {
+    {"smoothness", "Smoothness (normals of neighbouring faces)",
+     "weight of the normal difference of neighbouring faces", &RegularizerWeights::smoothness,
+     [](const DeformedMeshes& m) { return SmoothnessLoss(m.positions, m.faces, m.topology); }},
+    {"laplacian", "Laplacian of the movement", "weight of the Laplacian of the displacement",
+     &RegularizerWeights::laplacian,
+     [](const DeformedMeshes& m) { return LaplacianLoss(m.movement, m.topology); }},
+    {"edge_length", "Unequal edges", "weight of unequal edges", &RegularizerWeights::edge_length,
+     [](const DeformedMeshes& m) { return EdgeLengthLoss(m.positions, m.topology); }},
+    {"area", "Surface area", "weight of the surface area", &RegularizerWeights::area,
+     [](const DeformedMeshes& m) { return AreaLoss(m.positions, m.faces) / m.unit_area; }},
+};
+
+}  // namespace
+
+ConfigFields FieldsOf(RegularizerWeights* weights, const std::string& table) {
+  ConfigFields out;
+  for (const Regularizer& r : kRegularizers)
+    out.push_back({table + r.name, &(weights->*r.weight), 0, kNoLimit, r.help});
+  return out;
 }
 
-void AddRegularizers(const RegularizerWeights& w, const DeformedMeshes& m, LossSum* sum) {
-  const auto add = [&](const char* name, const char* label, double weight, const auto& loss) {
-    if (weight > 0) sum->Add(name, label, weight, loss());
-  };
-  add("smoothness", "Smoothness (normals of neighbouring faces)", w.smoothness,
-      [&] { return SmoothnessLoss(m.positions, m.faces, m.topology); });
-  add("laplacian", "Laplacian of the movement", w.laplacian,
-      [&] { return LaplacianLoss(m.movement, m.topology); });
-  add("edge_length", "Unequal edges", w.edge_length,
-      [&] { return EdgeLengthLoss(m.positions, m.topology); });
-  add("area", "Surface area", w.area, [&] { return AreaLoss(m.positions, m.faces) / m.unit_area; });
+TermLabels RegularizerLabels() {
+  TermLabels out;
+  for (const Regularizer& r : kRegularizers) out.emplace(r.name, r.label);
+  return out;
+}
+
+void AddRegularizers(const RegularizerWeights& weights, const DeformedMeshes& meshes,
+                     LossSum* sum) {
+  for (const Regularizer& r : kRegularizers) {
+    const double weight = weights.*r.weight;
+    if (weight > 0) sum->Add(r.name, r.label, weight, r.loss(meshes));
+  }
 }
 
 }  // namespace tilegrad::train

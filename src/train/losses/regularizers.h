@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mesh regularisers of training and fits: the weight, key and term of each.
+// The mesh regularisers of training and fits: the weight, key, label and term of each.
 #pragma once
 
 #include <span>
@@ -8,6 +8,7 @@
 #include "scene/topology.h"
 #include "train/losses/loss_sum.h"
 #include "train/run/config_fields.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 
@@ -16,6 +17,9 @@ struct RegularizerWeights {  // >= 0
 };
 // Keys begin with `table`.
 ConfigFields FieldsOf(RegularizerWeights* weights, const std::string& table);
+
+// Of their terms in the log.
+TermLabels RegularizerLabels();
 
 // Meshes that share faces, at `positions` after a `movement`: [B, V, 3] both.
 struct DeformedMeshes {
