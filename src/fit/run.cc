@@ -113,22 +113,25 @@ RunPlan PlanOf(const FitJob& job) {
   return plan;
 }
 
-const std::set<std::string> kFormerLines = {"stop_gain = 0", "remeshes = 0", "color_region = 1",
-                                            "silhouette_loss = 2"};
+// Lines of a fit's settings that do not count: numbers that are 0, which stands for what fits did
+// before they had such a setting, and what is always so since they have it no longer.
+bool SaysNothing(const std::string& line) {
+  static const std::set<std::string> always = {"color_region = 1", "silhouette_loss = 2"};
+  return line.ends_with(" = 0") || always.contains(line);
+}
 
 class FitWork : public RunWork {
  public:
   FitWork(const FitJob& job, const FitStart& start, nn::Context& context, Fitter& fitter)
       : job_(job), config_(start.config), context_(context), fitter_(fitter), clock_(config_) {}
 
-  // All lines count, but those of earlier versions that say what is always so now; they wrote them
-  // in another order. Of what is read, a checksum counts.
+  // In no order, which differed in earlier versions. Of what is read, a checksum counts.
   Result<std::string> ResultSettings(const std::string& settings,
                                      const std::string& /*place*/) const override {
     std::istringstream text(settings);
     std::set<std::string> lines;
     for (std::string line; std::getline(text, line);) {
-      if (kFormerLines.contains(line)) continue;
+      if (SaysNothing(line)) continue;
       const bool input = line.starts_with(kInput);
       lines.insert(input ? "checksum of images, cameras and mesh" + line.substr(5) : line);
     }

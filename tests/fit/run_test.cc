@@ -145,17 +145,19 @@ TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
 }
 
-// As earlier versions wrote them.
-TEST_F(Fit, SettingsInAnotherOrderAreTheSame) {
+// As an earlier version wrote them, which had no edge_length.
+TEST_F(Fit, SettingsInAnotherOrderAndWithoutALaterKeyAreTheSame) {
   FitJob job = Job("run");
   ASSERT_TRUE(Run(job).ok());
   const Workers workers(1);
   nn::Context context(workers);
   Checkpoint newest = LoadNewestCheckpoint(context, job.out)->checkpoint;
   std::istringstream lines(newest.info.config);
+  ExpectIn(newest.info.config, "\nedge_length = 0\n");
   newest.info.config.clear();
-  for (std::string line; std::getline(lines, line);)
-    newest.info.config = line + "\n" + newest.info.config;
+  for (std::string line; std::getline(lines, line);) {
+    if (line != "edge_length = 0") newest.info.config = line + "\n" + newest.info.config;
+  }
   ASSERT_TRUE(SaveCheckpoint(job.out, newest.info, std::move(newest.tensors)).ok());
   job.existing = ExistingRun::kContinue;
   const auto continued = Ok(Run(job));
