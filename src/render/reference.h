@@ -314,7 +314,7 @@ void ShadePixelBackward(const RefScene<T>& s, const RenderOptions& options,
   read(d_frame.depth, d_depth);
   const ShadePixel<T> p = ShadePixelOf(s, options, at);
   ShadePixel<T> d_p;
-  d_p.color = {};
+  ForEachPixelPart(d_p, [](Varying, std::span<T> part) { std::ranges::fill(part, T(0)); });
   d_p.uv = d_uv;
   PixelShaderRef<T>(s.scene->shading, s.uniforms, s.pyramids)
       .Backward(p, d_color, d_normal, &d_p, &d->uniforms);
