@@ -44,7 +44,8 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
   Scene scene = made.scene();
   scene.camera = ScaledCamera(view.camera, static_cast<float>(samples_));
   const Lighting lighting = IsLit(appearance) ? LightingOf(light_) : Lighting::kNone;
-  scene.shading = {.lighting = lighting, .two_sided = true, .clamp = true};
+  scene.shading.lighting = lighting;
+  scene.shading.clamp = true;
   Light light;
   light.direction = DirectionToWorld(view.light.direction, view.camera);
   const std::array<float, 9> sh = HarmonicsToWorld(view.light.sh, view.camera);
