@@ -36,13 +36,16 @@ double WorkOf(const Strand& strand);
 double WorkOf(const LoopRecord& loop);
 
 // Records the loops of the Workers made with it. Single-threaded; measures CPU time of the thread,
-// so other programs do not count. Costs one clock reading per loop and task.
+// so other programs do not count. Reads the clock once per loop and task, and subtracts that cost.
 class LoopTrace {
  public:
+  LoopTrace();
   // Discards earlier records and starts the clock.
   void Begin();
   // What ran since Begin. Not after a task has thrown.
   Strand End() const;
+  // What a reading of the clock costs, as measured by the constructor.
+  double reading_seconds() const { return reading_seconds_; }
 
  private:
   friend class Workers;
@@ -63,7 +66,7 @@ class LoopTrace {
   void NoteTraffic(double bytes) { traffic_ = bytes; }
 
   std::vector<Event> events_;
-  double begin_ = 0, traffic_ = 0;
+  double begin_ = 0, traffic_ = 0, reading_seconds_ = 0;
 };
 
 }  // namespace tilegrad
