@@ -39,6 +39,7 @@ double WorkOf(const LoopRecord& loop) {
 
 void LoopTrace::Begin() {
   events_.clear();
+  loops_.clear();
   traffic_ = 0;
   begin_ = ThreadSeconds();
 }
@@ -53,11 +54,12 @@ void LoopTrace::Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> t
   RunTasks({n, site, bytes, helpers}, task);
 }
 
-void LoopTrace::RunTasks(const Event& loop, FunctionRef<void(std::size_t, std::size_t)> task) {
-  events_.push_back(loop);
+void LoopTrace::RunTasks(const Begun& loop, FunctionRef<void(std::size_t, std::size_t)> task) {
+  loops_.push_back(loop);
+  events_.push_back({true});
   for (std::size_t i = 0; i < loop.tasks; ++i) {
     task(i, 0);
-    events_.push_back({});
+    events_.push_back({false});
   }
 }
 
@@ -65,12 +67,16 @@ void LoopTrace::RunTasks(const Event& loop, FunctionRef<void(std::size_t, std::s
 class LoopTrace::Reader {
  public:
   Reader(const LoopTrace& trace, double end)
-      : events_(trace.events_), reading_(trace.reading_seconds_), last_(trace.begin_), end_(end) {}
+      : events_(trace.events_),
+        loops_(trace.loops_),
+        reading_(trace.reading_seconds_),
+        last_(trace.begin_),
+        end_(end) {}
 
   // Reads up to the end of the task, or of the recording.
   Strand ReadStrand() {
     Strand strand;
-    while (next_ < events_.size() && events_[next_].tasks > 0) {
+    while (next_ < events_.size() && events_[next_].begins) {
       strand.stretches.push_back(Lap(events_[next_].at));
       strand.loops.push_back(ReadLoop());
     }
@@ -80,7 +86,8 @@ class LoopTrace::Reader {
 
  private:
   LoopRecord ReadLoop() {
-    const Event& begin = events_[next_++];
+    ++next_;  // its begin
+    const Begun& begin = loops_[next_loop_++];
     LoopRecord loop{begin.site, begin.bytes, {}, begin.helpers, begin.grouped};
     for (std::size_t i = 0; i < begin.tasks; ++i) {
       loop.tasks.push_back(ReadStrand());
@@ -92,8 +99,9 @@ class LoopTrace::Reader {
   double Lap(double now) { return std::max(0.0, now - std::exchange(last_, now) - reading_); }
 
   const std::vector<Event>& events_;
+  const std::vector<Begun>& loops_;
   const double reading_;
-  std::size_t next_ = 0;
+  std::size_t next_ = 0, next_loop_ = 0;
   double last_, end_;
 };
 

@@ -51,21 +51,25 @@ class LoopTrace {
   friend class Workers;
   friend class SideLoop;
   friend class WorkerGroups;
-  struct Event {            // a loop begins, or a task of the innermost open loop ends
-    std::size_t tasks = 0;  // of the loop that begins
-    LoopSite site{};
+  struct Begun {
+    std::size_t tasks;
+    LoopSite site;
     double bytes = 0;
     std::size_t helpers = 0;
     bool grouped = false;
+  };
+  struct Event {  // a loop begins, or a task of the innermost open loop ends
+    bool begins;
     double at = ThreadSeconds();
   };
   class Reader;
   void Run(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task, LoopSite site,
            std::size_t helpers = 0);
-  void RunTasks(const Event& loop, FunctionRef<void(std::size_t, std::size_t)> task);
+  void RunTasks(const Begun& loop, FunctionRef<void(std::size_t, std::size_t)> task);
   void NoteTraffic(double bytes) { traffic_ = bytes; }
 
   std::vector<Event> events_;
+  std::vector<Begun> loops_;  // those that begin, in order
   double begin_ = 0, traffic_ = 0, reading_seconds_ = 0;
 };
 

@@ -224,34 +224,43 @@ void GradientSums::Lane::EndPortion(std::span<const nn::Gradient> gradients) {
   PartIsReady(all_.layout_.tail());
 }
 
-void GradientSums::AddLanes() {
-  if (lanes_.size() == 1) return;
+template <class Body>
+void GradientSums::ForNumbers(const Body& body) const {
   const std::size_t bytes = layout_.total() * sizeof(float);
   context_.workers().NoteTraffic(static_cast<double>((additions_.size() + own_.size()) * bytes));
-  const auto add = [this](std::size_t begin, std::size_t end, std::size_t) {
-    for (const Addition& addition : additions_) {
-      float* const to = SumOf(addition.left);
-      const float* const from = SumOf(addition.right);
-      for (std::size_t i = begin; i < end; ++i) to[i] += from[i];
-    }
-  };
-  context_.workers().ForRanges(layout_.total(), kAddedGrain, add);
-  if (!exchange_) return;
-  BeginExchange();
-  for (std::size_t b = 0; b < layout_.buckets(); ++b) exchange_->Start(b);
+  context_.workers().ForRanges(layout_.total(), kAddedGrain,
+                               [&](std::size_t begin, std::size_t end, std::size_t) {
+                                 body(Range{begin, end});
+                               });
+}
+
+void GradientSums::AddLanes(const Range& numbers) const {
+  for (const Addition& addition : additions_) {
+    float* const to = SumOf(addition.left);
+    const float* const from = SumOf(addition.right);
+    for (std::size_t i = numbers.begin; i < numbers.end; ++i) to[i] += from[i];
+  }
 }
 
 bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
-  AddLanes();
   MakeMeans();
-  const auto start = std::chrono::steady_clock::now();
-  if (exchange_ && !exchange_->Wait(meanwhile)) return false;
-  seconds_waited_ = SecondsSince(start);
-  if (share_) {
-    TakeOwn(meanwhile);
-  } else {
-    TakeTotals();
+  if (!exchange_) {
+    ForNumbers([&](const Range& numbers) {
+      AddLanes(numbers);
+      TakeTotals(numbers);
+    });
+    TakeStatistics(SumOf(own_[0]), Scale());
+    return true;
   }
+  if (lanes_.size() > 1) {
+    ForNumbers([&](const Range& numbers) { AddLanes(numbers); });
+    BeginExchange();
+    for (std::size_t b = 0; b < layout_.buckets(); ++b) exchange_->Start(b);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  if (!exchange_->Wait(meanwhile)) return false;
+  seconds_waited_ = SecondsSince(start);
+  TakeOwn(meanwhile);
   return true;
 }
 
@@ -269,6 +278,9 @@ void GradientSums::MakeMeans() {
                           shape_.portions);
     }
   }
+  mean_numbers_.resize(means_.size());
+  for (std::size_t i = 0; i < means_.size(); ++i)
+    mean_numbers_[i] = rows_[i] == 0 ? means_[i].Value().value().data<float>() : nullptr;
   StackProducts();
 }
 
@@ -306,21 +318,15 @@ void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
   });
 }
 
-void GradientSums::TakeTotals() {
-  const float scale = 1 / static_cast<float>(shape_.portions);
-  const float* totals = SumOf(own_[0]);
-  for (std::size_t i = 0; i < means_.size(); ++i) {
+void GradientSums::TakeTotals(const Range& numbers) const {
+  const float* const totals = SumOf(own_[0]);
+  const float scale = Scale();
+  for (std::size_t i = 0; i < mean_numbers_.size(); ++i) {
     const Range range = layout_.parameter(i);
-    if (range.size() == 0) continue;
-    nn::Tensor mean = means_[i].Value().value();
-    float* to = mean.data<float>();
-    context_.workers().ForRanges(range.size(), kGrain,
-                                 [&](std::size_t begin, std::size_t end, std::size_t) {
-                                   for (std::size_t k = begin; k < end; ++k)
-                                     to[k] = totals[range.begin + k] * scale;
-                                 });
+    const std::size_t end = std::min(range.end, numbers.end);
+    for (std::size_t k = std::max(range.begin, numbers.begin); k < end; ++k)
+      mean_numbers_[i][k - range.begin] = totals[k] * scale;
   }
-  TakeStatistics(totals, scale);
 }
 
 void GradientSums::TakeStatistics(const float* totals, float scale) {

@@ -101,9 +101,13 @@ class GradientSums {
   void MakeMeans();
   void StackProducts();
   float* SumOf(std::size_t subtree) const;
-  void AddLanes();
+  float Scale() const { return 1 / static_cast<float>(shape_.portions); }
+  // In parallel, over all numbers that are summed.
+  template <class Body>
+  void ForNumbers(const Body& body) const;
+  void AddLanes(const Range& numbers) const;
   void BeginExchange();
-  void TakeTotals();
+  void TakeTotals(const Range& numbers) const;
   void TakeOwn(const std::function<bool()>& meanwhile);
   void TakeStatistics(const float* totals, float scale);
   void CopyStatistics(float* to) const;
@@ -136,6 +140,7 @@ class GradientSums {
   bool exchanging_ = false;
   AlignedVector<float> total_, before_, after_;  // of all; statistics
   nn::StepVector<nn::Gradient> means_;
+  std::vector<float*> mean_numbers_;  // of means_; null: a product
   double seconds_waited_ = 0;
   std::unique_ptr<Exchange> exchange_;  // with other ranks
   std::unique_ptr<WeightShare> share_;
