@@ -88,6 +88,24 @@ class PortedFits(ExampleTest):
         lines = svg.findall("{http://www.w3.org/2000/svg}polyline")
         self.assertEqual([len(line.get("points").split()) for line in lines], 3 * [32])
 
+    def test_pytorch3d_tutorials(self):
+        tutorials = load("pytorch3d_tutorials")
+        body = tutorials.lobed_body()
+        self.assertEqual((len(body.vertices), len(body.faces)), (2562, 5120))
+        camera = tutorials.fit_camera(body, tutorials.Native)
+        self.assertLess(camera.scores["distance of the camera to the truth"], 0.02)
+        ported = tutorials.fit_camera(body, tutorials.Compat, steps=1)
+        self.assertAlmostEqual(ported.losses[0] / camera.losses[0], 1, delta=0.01)
+        for textured in (False, True):
+            fits = [tutorials.fit_textured_mesh(body, interface, steps, textured)
+                    for interface, steps in ((tutorials.Native, 200), (tutorials.Compat, 2))]
+            self.assertGreater(fits[0].scores["IoU of the silhouettes, %"], 90)
+            self.assertAlmostEqual(fits[1].losses[0] / fits[0].losses[0], 1, delta=0.1)
+        self.assertGreater(fits[0].scores["PSNR, dB"], 17)
+        path = self.folder / "pictures.png"
+        tutorials.save_pictures(str(path), fits[0])
+        self.assertEqual(files.load_image(path).shape, (2 * 128, 6 * 128, 3))
+
     def test_fit_nvdiffrast(self):
         fit_nvdiffrast = load("fit_nvdiffrast")
         fitted = fit_nvdiffrast.fit(sizes=(8, 16), steps=300)
