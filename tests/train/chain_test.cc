@@ -362,10 +362,16 @@ TEST(Chain, WhatIsNotFiniteIsRefusedBeforeAnythingChanges) {
 TEST(Schedules, LearningRateAndSharpness) {
   SingleImageConfig c;
   c.schedule.steps = 100;
-  c.optimizer = {.learning_rate = 1, .final_factor = 0.1, .warmup = 10};
+  c.optimizer = {.learning_rate = 1, .final_factor = 0.1, .warmup = 10, .settle = 0};
   EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 0), 0.1, 1e-9);
   EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 50), 0.55, 1e-12);
-  EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 100), 0.1, 1e-12);
+  EXPECT_NEAR(LearningRateAt(c.optimizer, 100, 99), 0.1, 3e-4);  // 0.45 (1 + cos(0.99 pi)) above
+  c.optimizer.settle = 50;
+  EXPECT_GT(LearningRateAt(c.optimizer, 20000, 19949), 0.1);
+  EXPECT_EQ(LearningRateAt(c.optimizer, 20000, 19950), 0);
+  EXPECT_GT(LearningRateAt(c.optimizer, 199, 197), 0.1);
+  EXPECT_EQ(LearningRateAt(c.optimizer, 199, 198), 0);
+  EXPECT_GT(LearningRateAt(c.optimizer, 99, 98), 0.1);
   c.rivals.softras.sigma = 1e-4;
   c.rivals.softras_late_sigma = 0.3;
   EXPECT_EQ(SoftRasSigmaAt(c.rivals, 0.59), 1e-4);

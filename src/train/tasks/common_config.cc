@@ -71,6 +71,9 @@ ConfigFields FieldsOf(OptimizerConfig* c) {
       {"optimizer.final_factor", &c->final_factor, 0, 1,
        "final fraction of the learning rate (half cosine); 1: constant"},
       {"optimizer.warmup", &c->warmup, 0, kNoLimit, "steps of linear warm-up"},
+      {"optimizer.settle", &c->settle, 0, kNoLimit,
+       "last steps, of rate 0, in which batch norm's running statistics catch up with the weights; "
+       "at most 1 % of the run"},
       {"optimizer.beta1", &c->beta1, 0, 0.999999, "of Adam"},
       {"optimizer.beta2", &c->beta2, 0, 0.99999999, "of Adam"},
       {"optimizer.average", &c->average, 0, 0.999999,
@@ -79,6 +82,7 @@ ConfigFields FieldsOf(OptimizerConfig* c) {
 }
 
 double LearningRateAt(const OptimizerConfig& o, std::int64_t steps, std::int64_t step) {
+  if (step >= steps - std::min(o.settle, steps / 100)) return 0;
   const nn::CosineSchedule cosine{steps, o.final_factor};
   return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
 }

@@ -39,6 +39,9 @@ struct OptimizerConfig {
   // The rate falls to this share by a half cosine over the run; 1: constant.
   double final_factor = 1.0;
   std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
+  // Steps at the end with a rate of 0, at most a hundredth of the run: batch norm's running
+  // statistics, which prediction uses, lag behind weights that move.
+  std::int64_t settle = 50;
   double beta1 = 0.9;
   double beta2 = 0.999;
   double weight_decay = 0;  // AdamW's; a key only of tasks that use it
