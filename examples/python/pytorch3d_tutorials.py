@@ -7,8 +7,9 @@ texture, each fitted to pictures.
     python3 pytorch3d_tutorials.py texture --mesh cow.obj
 
 --interface native draws with tilegrad.torch, compat with PyTorch3D's rasterize_meshes as
-tilegrad.compat.pytorch3d has it, and its shaders' formulas in torch. Sizes, settings, losses and
-optimizers are the tutorials'. Both interfaces' silhouettes agree but for half a pixel at the edge.
+tilegrad.compat.pytorch3d has it, and its shaders' formulas in torch. Sizes, settings and optimizers
+are the tutorials', regularisers similar; colours are not lit. Silhouettes of both interfaces agree
+but for half a pixel at the edge.
 Without --mesh, the object is a lobed body of 5,120 faces.
 """
 
@@ -18,7 +19,7 @@ import argparse
 import itertools
 import math
 import time
-from typing import Any, Callable, NamedTuple, Optional
+from typing import Any, Callable, NamedTuple
 
 import torch
 
@@ -33,7 +34,7 @@ VIEWS, VIEWS_PER_STEP = 20, 2
 
 
 class Object(NamedTuple):
-    """vertices [V,3] within a unit sphere, faces [F,3], colors [V,3]."""
+    """vertices [V,3], faces [F,3] int64, colors [V,3]."""
 
     vertices: torch.Tensor
     faces: torch.Tensor
@@ -90,8 +91,8 @@ class Native:
     """Draws with tilegrad.torch; exp(-d^2 / sigma) beyond an edge."""
 
     def __init__(self, size: int, faces_per_pixel: int) -> None:
+        del faces_per_pixel  # all faces count
         self.size = size
-        self.faces_per_pixel = faces_per_pixel  # all faces count here
 
     def silhouettes(self, mesh: Object, views: Views) -> torch.Tensor:
         return self._render(mesh, views, ("alpha",)).alpha
@@ -221,7 +222,8 @@ def fit_camera(target: Object, interface: type, steps: int = 200) -> Fit:
 
 
 def smoothness(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
-    """As mesh_edge_loss, mesh_normal_consistency and mesh_laplacian_smoothing, which are means."""
+    """mesh_edge_loss, and much like mesh_normal_consistency and mesh_laplacian_smoothing: means of
+    squared differences of normals, and the root of the mean square of the Laplacian."""
     corners = vertices[faces]
     edges = (corners - corners.roll(1, dims=1)).square().sum(dim=-1).mean()
     normal = losses.normal_consistency(vertices, faces) / (1.5 * len(faces))
@@ -284,16 +286,15 @@ def lobed_body() -> Object:
     return Object(vertices * lobes[:, None], faces, 0.5 + 0.4 * torch.sin(8 * vertices))
 
 
-def load_object(path: Optional[str]) -> Object:
-    """A file's mesh, moved and scaled as the tutorials do; colours are its own or those of places."""
-    if path is None:
-        return lobed_body()
+def load_object(path: str, normalized: bool) -> Object:
+    """A file's mesh. normalized: moved and scaled into [-1, 1]^3, as fit_textured_mesh does. Without
+    vertex colours, places are colours."""
     mesh = meshes.load_mesh(path)
     vertices = torch.as_tensor(mesh.positions)
-    vertices = vertices - vertices.mean(dim=0)
-    vertices = vertices / vertices.abs().max()
-    colors = 0.5 + 0.5 * vertices if mesh.colors is None else torch.as_tensor(mesh.colors)
-    return Object(vertices, torch.as_tensor(mesh.faces), colors)
+    centred = vertices - vertices.mean(dim=0)
+    scaled = centred / centred.abs().max()
+    colors = 0.5 + 0.5 * scaled if mesh.colors is None else torch.as_tensor(mesh.colors)[:, :3]
+    return Object(scaled if normalized else vertices, torch.as_tensor(mesh.faces).long(), colors)
 
 
 def save_pictures(path: str, fit: Fit, count: int = 6) -> None:
@@ -312,8 +313,9 @@ def main() -> None:
     parser.add_argument("--pictures", metavar="FILE", help="write images there, .png")
     options = parser.parse_args()
     more = {} if options.steps is None else {"steps": options.steps}
-    target, interface = load_object(options.mesh), INTERFACES[options.interface]
-    fit = TUTORIALS[options.tutorial](target, interface, **more)
+    target = (load_object(options.mesh, normalized=options.tutorial != "camera") if options.mesh
+              else lobed_body())
+    fit = TUTORIALS[options.tutorial](target, INTERFACES[options.interface], **more)
     scores = "; ".join(f"{name}: {value:.3f}" for name, value in fit.scores.items())
     print(f"{fit.milliseconds:.1f} ms a step; {scores}")
     if options.pictures:

@@ -18,7 +18,7 @@ import numpy as np
 
 from file_samples import FolderTest, dataset, run_program
 from support import SOURCE, long_test, torch
-from tilegrad import files
+from tilegrad import files, meshes
 
 
 FOLDER = SOURCE / "examples/python"
@@ -105,6 +105,12 @@ class PortedFits(ExampleTest):
         path = self.folder / "pictures.png"
         tutorials.save_pictures(str(path), fits[0])
         self.assertEqual(files.load_image(path).shape, (2 * 128, 6 * 128, 3))
+        path = self.folder / "body.glb"
+        meshes.Mesh(10 * body.vertices.numpy(), body.faces.int().numpy()).save(path)
+        for interface in tutorials.INTERFACES.values():
+            target = tutorials.load_object(str(path), normalized=True)
+            fit = tutorials.fit_textured_mesh(target, interface, steps=2, textured=True)
+            self.assertGreater(fit.scores["IoU of the silhouettes, %"], 30)
 
     def test_fit_nvdiffrast(self):
         fit_nvdiffrast = load("fit_nvdiffrast")
