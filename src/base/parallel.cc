@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/loop_team.h"
 #include "base/loop_trace.h"
 #include "base/sanitizers.h"
 
@@ -182,11 +183,6 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
 
 }  // namespace
 
-struct Workers::Impl {
-  explicit Impl(int count) : arena(count) {}
-  tbb::task_arena arena;
-};
-
 int AvailableCores() {
   cpu_set_t cores;
   CPU_ZERO(&cores);
@@ -198,17 +194,18 @@ Workers::Workers(int count) : count_(count > 0 ? count : AvailableCores()) {
   const int granted = Threads().Add(count_);
   if (granted < count_) NoteRefusal();
   count_ = granted;
-  if (count_ > 1) impl_ = std::make_unique<Impl>(count_);
+  if (count_ > 1) team_ = LoopTeam::Make(count_);
 }
 
 Workers::Workers(int count, LoopTrace* trace) : count_(count), trace_(trace) {}
 
 Workers::~Workers() {
-  if (impl_ == nullptr) return;
+  if (team_ == nullptr) return;
   if (ThisProcessOwnsTbb()) {
+    team_->Dismiss();
     Threads().Remove(count_);
-  } else {
-    static_cast<void>(impl_.release());
+  } else {  // never destroyed, since it would touch oneTBB
+    static_cast<void>(new std::shared_ptr<LoopTeam>(std::move(team_)));
   }
 }
 
@@ -220,50 +217,36 @@ const char* TakeThreadNotice() {
              : nullptr;
 }
 
-bool Workers::HasArena() const { return impl_ != nullptr && ThisProcessOwnsTbb(); }
+LoopTeam* Workers::Team() const { return ThisProcessOwnsTbb() ? team_.get() : nullptr; }
 
-namespace {
-
-// The loop, on the threads of the caller's arena.
-void ForInArena(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) {
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, n, 1),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        const auto worker = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
-        for (std::size_t i = range.begin(); i != range.end(); ++i) task(i, worker);
-      },
-      tbb::simple_partitioner());
+bool Workers::Offer(std::size_t times, const std::function<void()>& help) const {
+  LoopTeam* const team = Team();
+  if (team != nullptr) team->Offer(times, help);
+  return team != nullptr;
 }
 
-}  // namespace
+void Workers::Dismiss() const {
+  if (LoopTeam* const team = Team(); team != nullptr) team->Dismiss();
+}
 
 void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
                   LoopSite site) const {
   if (trace_ != nullptr) {
     trace_->Run(n, task, site);
-    return;
-  }
-  if (count_ == 1 || n <= 1) {
+  } else if (count_ == 1 || n <= 1) {
     for (std::size_t i = 0; i < n; ++i) task(i, 0);
-    return;
-  }
-  if (!HasArena()) {
+  } else if (LoopTeam* const team = Team(); team != nullptr) {
+    team->For(n, task);
+  } else {
     ForOnOwnThreads(this, &own_loop_, n, task);
-    return;
   }
-  // Isolated: while a thread waits for a loop, above all a nested one, it may only take that loop's
-  // tasks, so a worker's scratch is never entered twice. Inside the arena, because executing in an
-  // arena, even the same one, ends the caller's isolation.
-  impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { ForInArena(n, task); }); });
 }
 
 void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task,
                         LoopSite site) const {
-  if (parts_ == 1 || workers_.trace_ != nullptr) {  // not in the arena
+  if (parts_ == 1 || workers_.trace_ != nullptr ||
+      (waiting_.load(std::memory_order_relaxed) == 0 && workers_.Team() != nullptr)) {
     workers_.For(n, task, site);
-  } else if (n > 1 && waiting_.load(std::memory_order_relaxed) == 0 && workers_.HasArena()) {
-    // Not isolated: only tasks of loops like this one can be taken here, and those never wait.
-    ForInArena(n, task);
   } else {
     for (std::size_t i = 0; i < n; ++i) task(i, worker_);
   }

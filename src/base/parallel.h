@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads are an argument: every computation receives a Workers. Home of oneTBB, with side_loop.h.
+// Threads are an argument: every computation receives a Workers. Home of oneTBB, with loop_team.h.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -13,6 +14,7 @@
 
 namespace tilegrad {
 
+class LoopTeam;
 class LoopTrace;
 class SideLoop;
 class WorkerGroups;
@@ -85,22 +87,21 @@ class Workers {
   };
 
   // For few, long tasks, the last of which would leave workers idle. While tasks are waiting, a
-  // worker runs the loops (Part::For) of its task alone; after that, idle workers join in. A worker
-  // that waits for such a loop to end may run iterations of other tasks' loops. So data passed from
-  // one loop to the next must lie in memory of the task, not in per-worker scratch that such
-  // iterations write.
+  // worker runs the loops (Part::For) of its task alone; after that, idle workers join in.
   void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task,
                 LoopSite site = LoopSite::Here()) const;
 
  private:
   friend class SideLoop;
   friend class WorkerGroups;
-  struct Impl;
-  bool HasArena() const;  // oneTBB's, usable by this process
+  LoopTeam* Team() const;  // null where oneTBB is not used, or not by this process
+  // LoopTeam::Offer; false without a team.
+  bool Offer(std::size_t times, const std::function<void()>& help) const;
+  void Dismiss() const;  // LoopTeam::Dismiss
 
   int count_;
   LoopTrace* trace_ = nullptr;
-  std::unique_ptr<Impl> impl_;  // null if oneTBB is not used
+  std::shared_ptr<LoopTeam> team_;  // null if oneTBB is not used
   mutable std::mutex own_loop_;
 };
 

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/side_loop.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
-#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -72,32 +69,13 @@ struct SideLoop::Helpers {
       : workers(the_workers), count(HelpersOf(workers.count())) {
     for (std::size_t i = count; i-- > 0;)
       state->lanes.push_back(static_cast<std::size_t>(workers.count()) + i);
-    if (workers.HasArena())
-      arena.emplace(static_cast<int>(count), /*reserved_for_masters=*/0,
-                    tbb::task_arena::priority::high);
   }
   ~Helpers() { Join(); }
   Helpers(const Helpers&) = delete;
   Helpers& operator=(const Helpers&) = delete;
 
   void Wake(const std::shared_ptr<State>& state) {
-    if (arena && workers.HasArena()) {
-      for (std::size_t i = 0; i < count; ++i) arena->enqueue([state] { state->Help(); });
-    } else if (count > 0) {
-      StartThread(state);
-    }
-  }
-  void Join() {
-    if (own.joinable()) own.join();
-  }
-
-  const Workers& workers;
-  std::size_t count;
-  std::optional<tbb::task_arena> arena;
-  std::thread own;  // for one loop, if oneTBB is not used
-
- private:
-  void StartThread(const std::shared_ptr<State>& state) {
+    if (count == 0 || workers.Offer(count, [state] { state->Help(); })) return;
     try {
       own = std::thread([state] {
         ReserveThreadData();
@@ -106,6 +84,13 @@ struct SideLoop::Helpers {
     } catch (const std::system_error&) {  // Finish runs all tasks
     }
   }
+  void Join() {
+    if (own.joinable()) own.join();
+  }
+
+  const Workers& workers;
+  std::size_t count;
+  std::thread own;  // for one loop, if oneTBB is not used
 };
 
 SideLoop::SideLoop(const Workers& workers)

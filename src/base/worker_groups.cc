@@ -2,6 +2,7 @@
 #include "base/worker_groups.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "base/loop_trace.h"
 
@@ -22,7 +23,14 @@ WorkerGroups::WorkerGroups(const Workers& workers, std::size_t most) : all_(work
 }
 
 void WorkerGroups::For(FunctionRef<void(std::size_t)> task, LoopSite site) const {
-  const auto run = [&](std::size_t g, std::size_t) { task(g); };
+  std::atomic<std::size_t> waiting = count();
+  // Workers without a task would keep threads from the groups, and so would those of a group that
+  // is done.
+  const auto run = [&](std::size_t g, std::size_t) {
+    if (--waiting == 0) all_.Dismiss();
+    task(g);
+    group(g).Dismiss();
+  };
   if (all_.trace_ != nullptr) {
     all_.trace_->RunTasks({.tasks = count(), .site = site, .grouped = true}, run);
   } else {

@@ -192,7 +192,7 @@ TEST(Structure, ShadeSeesOnlyTheRecordsOfRaster) {
 TEST(Structure, EachForeignLibraryHasOneHome) {
   // Library (first part of the include path) -> the only prefixes of files that may include it.
   const std::vector<std::pair<std::regex, std::vector<std::string>>> homes = {
-      {std::regex("^(tbb|oneapi)/.*"), {"src/base/parallel.cc", "src/base/side_loop.cc"}},
+      {std::regex("^(tbb|oneapi)/.*"), {"src/base/parallel.cc", "src/base/loop_team.cc"}},
       {std::regex("^hwy/.*"),
        {"src/base/", "src/raster/", "src/shade/", "src/nn/", "src/render/", "src/compat/",
         "src/rivals/"}},
