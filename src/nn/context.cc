@@ -97,6 +97,14 @@ Tensor Context::Empty(const Shape& shape, DType dtype) const {
           dtype};
 }
 
+Tensor Context::Zeros(const Shape& shape, DType dtype) const {
+  Tensor zeros = Empty(shape, dtype);
+  ForChunks(&workers(), zeros.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
+    std::memset(zeros.raw() + begin, 0, end - begin);
+  });
+  return zeros;
+}
+
 Tensor Context::Full(const Shape& shape, double value) const {
   Tensor tensor = Empty(shape);
   WithFloatType(dtype_, [&]<class T>(T) {

@@ -58,7 +58,8 @@ class Context {
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
   Tensor Empty(const Shape& shape) const { return Empty(shape, dtype_); }
   Tensor Full(const Shape& shape, double value) const;  // dtype()
-  Tensor Zeros(const Shape& shape) const { return Full(shape, 0.0); }
+  Tensor Zeros(const Shape& shape, DType dtype) const;
+  Tensor Zeros(const Shape& shape) const { return Zeros(shape, dtype_); }
   // Copies shape.elements() numbers from `values`, converted to dtype().
   Tensor From(const Shape& shape, std::span<const float> values) const;
   Tensor From(const Shape& shape, std::span<const double> values) const;

@@ -77,6 +77,7 @@ Var ReluGrad(const Var& y, Var dy);
 
 // sum + term, equal shapes. Overwrites `sum` if that is unshared and nothing is recorded.
 Var Accumulated(Var sum, const Var& term);
+Var Accumulated(Var sum, const AdjointPart& part);  // ops/shape.cc
 
 // ops/reduce.cc: reductions over axes, which are dropped, or kept with extent 1 for broadcasting.
 

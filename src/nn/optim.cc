@@ -18,12 +18,6 @@
 namespace tilegrad::nn {
 namespace {
 
-Tensor ZerosLike(Context& context, const Tensor& tensor) {
-  Tensor zeros = context.Empty(tensor.shape(), tensor.dtype());
-  std::fill_n(zeros.raw(), zeros.bytes(), std::byte{0});
-  return zeros;
-}
-
 Status CheckGradient(const NamedVar& parameter, const Gradient& gradient) {
   const Tensor& p = parameter.value.value();
   if (gradient.valid() && gradient.shape() == p.shape() && gradient.dtype() == p.dtype()) return {};
@@ -51,7 +45,8 @@ Adam::Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions
     : context_(context), options_(options) {
   for (NamedVar& p : parameters) {
     const Tensor& value = p.value.value();
-    slots_.push_back({p, {ZerosLike(context, value), ZerosLike(context, value)}});
+    const auto zeros = [&] { return context.Zeros(value.shape(), value.dtype()); };
+    slots_.push_back({p, {zeros(), zeros()}});
     parameters_.push_back(p.value);
   }
 }

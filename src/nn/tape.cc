@@ -40,7 +40,13 @@ Var Gradient::Value() const {
 
 Var Adjoint::Product(std::size_t input, const Var& a, const Var& b) const {
   if (left_ == nullptr) return Matmul(a, b, {.transpose_a = true});
-  *left_ = {input, Gradient(a, b)};
+  *left_ = {.input = input, .product = Gradient(a, b)};
+  return {};
+}
+
+Var Adjoint::Part(std::size_t input, const AdjointPart& part) const {
+  if (left_ == nullptr) return Pad(part.value, part.axis, part.before, part.after);
+  *left_ = {.input = input, .part = part};
   return {};
 }
 

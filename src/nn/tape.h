@@ -129,15 +129,25 @@ std::vector<Var> External(Context& context, ExternalOp op);
 
 // ---- For authors of operations ----
 
+// An adjoint that is zero but for elements [before, before + extent of value) of an axis, `after`
+// of which follow.
+struct AdjointPart {
+  Var value;
+  int axis = 0;
+  std::int64_t before = 0, after = 0;
+};
+
+// The adjoint of an input: a product, or a part.
 struct UncomputedAdjoint {
   std::size_t input = 0;
-  Gradient product;
+  Gradient product = {};
+  AdjointPart part = {};
 };
 
 // The input of a backward rule: the adjoints of the outputs, and which gradients are needed.
 class Adjoint {
  public:
-  // `left`: where a rule may leave a product, or null.
+  // `left`: where a rule may leave an adjoint uncomputed, or null.
   Adjoint(const Var& y, std::span<Var> d_outputs, std::span<const std::uint8_t> needs,
           UncomputedAdjoint* left)
       : y_(y), d_outputs_(d_outputs), needs_(needs), left_(left) {}
@@ -150,6 +160,8 @@ class Adjoint {
   // The adjoint of `input` is a^T b: returns that or, if it is not needed at once, defers it to its
   // consumer and returns an invalid Var. For one input per operation.
   Var Product(std::size_t input, const Var& a, const Var& b) const;
+  // The same for a part: its consumer adds parts into one sum, where each alone would be padded.
+  Var Part(std::size_t input, const AdjointPart& part) const;
 
  private:
   const Var& y_;

@@ -61,9 +61,7 @@ class Backward {
       const Var& d = it->second.d[static_cast<std::size_t>(input.slot())];
       if (d.valid()) return Gradient(d);
     }
-    Tensor zeros = context_.Empty(input.shape(), input.dtype());
-    std::fill_n(zeros.raw(), zeros.bytes(), std::byte{0});
-    return Gradient(Constant(context_, std::move(zeros)));
+    return Gradient(Constant(context_, context_.Zeros(input.shape(), input.dtype())));
   }
 
  private:
@@ -153,6 +151,7 @@ class Backward {
       }
     }
     if (left.product.valid()) DepositProduct(node.edges[left.input], left.product);
+    if (left.part.value.valid()) DepositPart(node.edges[left.input], left.part);
     if (!options_.create_graph && !options_.keep_graph) Release(node);
   }
 
@@ -186,6 +185,16 @@ class Backward {
       return input.value().raw() == product.a().value().raw() ||
              input.value().raw() == product.b().value().raw();
     });
+  }
+
+  void DepositPart(const Node::Edge& edge, const AdjointPart& part) {
+    Visit& visit = visits_[edge.node.get()];
+    const auto slot = static_cast<std::size_t>(edge.slot);
+    if (slot < visit.d.size() && visit.d[slot].valid()) {
+      visit.d[slot] = Accumulated(std::move(visit.d[slot]), part);
+    } else {
+      Deposit(edge.node.get(), edge.slot, Pad(part.value, part.axis, part.before, part.after));
+    }
   }
 
   void Deposit(Node* node, int slot, const Var& d) {

@@ -83,6 +83,20 @@ TEST_F(Tape, AdjointsThatOthersSeeAreLeftAlone) {
   EXPECT_EQ(Numbers(d), (std::vector<double>{10, 100}));
 }
 
+// Their adjoints are added into one sum, which a value that others see must not be.
+TEST_F(Tape, AdjointsOfSlicesAddUp) {
+  const Var x = Vector({1, 2, 3, 4, 5});
+  const auto use = [](const Var& v) {
+    const Var all = Square(v);
+    return Sum(Slice(all, 0, 0, 2)) + 2.0 * Sum(Slice(all, 0, 1, 4)) + Sum(v) +
+           3.0 * Sum(Slice(v, 0, 4, 5));
+  };
+  const std::vector<double> expected = {3, 13, 13, 17, 4};  // 2 x (1, 3, 2, 2, 0) + (1, .., 1, 4)
+  const std::vector<Var> parameters = {x};
+  EXPECT_EQ(Numbers(Gradients(use(x), parameters)[0].Value()), expected);
+  EXPECT_EQ(Numbers(Grad(use(x), {x}, {.create_graph = true})[0]), expected);
+}
+
 TEST_F(Tape, ErrorsAreNotedAndSpread) {
   const Var a = Vector({1, 2}), b = Vector({1, 2, 3});
   const Var y = Exp(Add(a, b));

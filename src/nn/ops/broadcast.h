@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layout of NumPy-style broadcasting for a kernel.
+// What operations share: the layout of NumPy-style broadcasting for a kernel, and when a result may
+// overwrite an operand.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-#include "nn/tensor.h"
+#include "nn/tape.h"
 
 namespace tilegrad::nn {
 
@@ -20,5 +21,8 @@ struct Broadcast {
   std::array<Extents, 2> strides{};
 };
 Broadcast PlanBroadcast(const Shape& result, const Shape& a, const Shape& b);
+
+// Whether an operation that owns `v` may write its result there.
+inline bool IsExpendable(const Var& v) { return v.value().unique() && !v.context().recording(); }
 
 }  // namespace tilegrad::nn

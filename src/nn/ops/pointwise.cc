@@ -70,9 +70,6 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
   return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
 }
 
-// Whether an operation that owns `v` may write its result there.
-bool IsExpendable(const Var& v) { return v.value().unique() && !v.context().recording(); }
-
 }  // namespace
 
 Var Add(const Var& a, const Var& b) {

@@ -21,34 +21,48 @@ struct StridedBox {
 };
 
 template <class T>
-void CopyRow(const StridedBox& box, const T* from, T* to) {
-  const std::size_t n = box.extents.back();
+struct Copied {
+  void operator()(const T& from, T& to) const { to = from; }
+};
+template <class T>
+struct Added {
+  void operator()(const T& from, T& to) const { to += from; }
+};
+
+// Calls op(from, to) for the elements [begin, end) of a row.
+template <class Op, class T>
+void MoveRow(const StridedBox& box, std::size_t begin, std::size_t end, const T* from, T* to) {
+  const Op op;
   const std::size_t step_from = box.strides_from.back(), step_to = box.strides_to.back();
   if (step_from == 1 && step_to == 1) {
-    std::copy_n(from, n, to);
+    for (std::size_t i = begin; i < end; ++i) op(from[i], to[i]);
     return;
   }
-  for (std::size_t i = 0; i < n; ++i) to[i * step_to] = from[i * step_from];
+  for (std::size_t i = begin; i < end; ++i) op(from[i * step_from], to[i * step_to]);
 }
 
-template <class T>
-void CopyStrided(const StridedBox& box, const T* from, T* to, const Workers& workers) {
+// Calls op(from, to) for all elements. Long rows are cut, so that one is more than one task.
+template <class Op, class T>
+void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& workers) {
   std::size_t rows = 1;
   for (std::size_t i = 0; i + 1 < box.extents.size(); ++i) rows *= box.extents[i];
   constexpr std::size_t kGrain = 16384;  // elements to a task
   const std::size_t length = std::max<std::size_t>(1, box.extents.back());
-  workers.ForRanges(rows, std::max<std::size_t>(1, kGrain / length),
+  const std::size_t pieces = (length + kGrain - 1) / kGrain;
+  const auto move = [&](std::size_t row, std::size_t piece) {
+    std::size_t rest = row, offset_from = 0, offset_to = 0;
+    for (std::size_t i = box.extents.size() - 1; i-- > 0;) {
+      const std::size_t index = rest % box.extents[i];
+      rest /= box.extents[i];
+      offset_from += index * box.strides_from[i];
+      offset_to += index * box.strides_to[i];
+    }
+    MoveRow<Op>(box, piece * kGrain, std::min(box.extents.back(), (piece + 1) * kGrain),
+                from + offset_from, to + offset_to);
+  };
+  workers.ForRanges(rows * pieces, std::max<std::size_t>(1, kGrain / length),
                     [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t row = begin; row < end; ++row) {
-                        std::size_t rest = row, offset_from = 0, offset_to = 0;
-                        for (std::size_t i = box.extents.size() - 1; i-- > 0;) {
-                          const std::size_t index = rest % box.extents[i];
-                          rest /= box.extents[i];
-                          offset_from += index * box.strides_from[i];
-                          offset_to += index * box.strides_to[i];
-                        }
-                        CopyRow(box, from + offset_from, to + offset_to);
-                      }
+                      for (std::size_t i = begin; i < end; ++i) move(i / pieces, i % pieces);
                     });
 }
 
@@ -72,16 +86,11 @@ StridedBox::Axes ExtentsOf(const Shape& shape) {
   return extents;
 }
 
-void Copy(const StridedBox& box, const Var& x, std::size_t from, Tensor& y, std::size_t to) {
+template <template <class> class Op = Copied>
+void Move(const StridedBox& box, const Var& x, std::size_t from, Tensor& y, std::size_t to) {
   WithFloatType(x.dtype(), [&]<class T>(T) {
-    CopyStrided(box, x.value().data<T>() + from, y.data<T>() + to, x.context().workers());
+    MoveStrided<Op<T>>(box, x.value().data<T>() + from, y.data<T>() + to, x.context().workers());
   });
-}
-
-Tensor Zeros(const Var& like, const Shape& shape) {
-  Tensor zeros = like.context().Empty(shape, like.dtype());
-  std::fill_n(zeros.raw(), zeros.bytes(), std::byte{0});
-  return zeros;
 }
 
 bool HasAxis(const Shape& shape, int axis) { return axis >= 0 && axis < shape.rank(); }
@@ -95,18 +104,19 @@ struct AxisView {
   std::size_t outer, extent, inner;
 };
 
-// Copies `count` rows along an axis, from row `begin_x` of x to row `begin_y` of y.
+// Copies (or adds) `count` rows along an axis, from row `begin_x` of x to row `begin_y` of y.
 struct RowMove {
   int axis;
   std::size_t begin_x, begin_y, count;
 };
+template <template <class> class Op = Copied>
 void MoveRows(const RowMove& move, const Var& x, Tensor& y) {
   const AxisView vx(x.shape(), move.axis), vy(y.shape(), move.axis);
   StridedBox box;
   box.extents = {1, 1, 1, vx.outer, move.count * vx.inner};
   box.strides_from = {0, 0, 0, vx.extent * vx.inner, 1};
   box.strides_to = {0, 0, 0, vy.extent * vy.inner, 1};
-  Copy(box, x, move.begin_x * vx.inner, y, move.begin_y * vy.inner);
+  Move<Op>(box, x, move.begin_x * vx.inner, y, move.begin_y * vy.inner);
 }
 
 bool IsPadding(std::int64_t count) { return count >= 0 && count <= Shape::kMostElements; }
@@ -144,7 +154,7 @@ Var BroadcastTo(const Var& x, const Shape& shape) {
   }
   const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
   Tensor y = x.context().Empty(shape, x.dtype());
-  Copy({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
+  Move({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
   return Record({"broadcast"}, std::move(y), {x},
                 [before = x.shape()](const Adjoint& adj) { return Vars{SumTo(adj.dy(), before)}; });
 }
@@ -172,7 +182,7 @@ Var Permute(const Var& x, std::span<const int> axes) {
     box.strides_from[pad + i] = strides[pad + static_cast<std::size_t>(axes[i])];
   }
   Tensor y = x.context().Empty(shape, x.dtype());
-  Copy(box, x, 0, y, 0);
+  Move(box, x, 0, y, 0);
   return Record({"permute"}, std::move(y), {x}, [inverse, rank](const Adjoint& adj) {
     const std::span<const int> back(inverse.data(), static_cast<std::size_t>(rank));
     return Vars{Permute(adj.dy(), back)};
@@ -196,8 +206,16 @@ Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
   MoveRows({axis, first, 0, count}, x, y);
   const std::int64_t after = x.shape()[axis] - end;
   return Record({"slice"}, std::move(y), {x}, [axis, begin, after](const Adjoint& adj) {
-    return Vars{Pad(adj.dy(), axis, begin, after)};
+    return Vars{adj.Part(0, {adj.dy(), axis, begin, after})};
   });
+}
+
+Var Accumulated(Var sum, const AdjointPart& part) {
+  if (!IsExpendable(sum)) return Add(sum, Pad(part.value, part.axis, part.before, part.after));
+  const auto begin = static_cast<std::size_t>(part.before);
+  const auto count = static_cast<std::size_t>(part.value.shape()[part.axis]);
+  MoveRows<Added>({part.axis, 0, begin, count}, part.value, sum.value());
+  return sum;
 }
 
 Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
@@ -209,7 +227,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
   const std::int64_t extent = x.shape()[axis];
   const Shape padded = x.shape().With(axis, before + extent + after);
   if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
-  Tensor y = Zeros(x, padded);
+  Tensor y = x.context().Zeros(padded, x.dtype());
   MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
   return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
     return Vars{Slice(adj.dy(), axis, before, before + extent)};
