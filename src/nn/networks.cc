@@ -29,19 +29,19 @@ class UpsampleMap : public Module {
  public:
   Var Forward(const Var& x, Mode) override {
     if (!Usable("upsample map", {&x})) return Invalid({&x});
-    return Grow(Grow(x, 3), 2);
+    return MapImage(x, Grown(x, 2), Grown(x, 3));
   }
   void Visit(const std::string&, ModuleVisitor&) override {}
 
  private:
-  static Var Grow(const Var& x, int axis) {
+  static AxisMap Grown(const Var& x, int axis) {
     const std::int64_t extent = x.shape()[axis], out = 2 * extent;
     const auto row = [&](std::int64_t i, AxisTerms& terms) {
       const std::int64_t at =
           axis == 3 ? (i - 1 + out) % out : std::clamp(i - 1, std::int64_t{0}, out - 1);
       terms.push_back({at / 2, 1.0});
     };
-    return MapAxis(x, axis, MakeAxisMap(x, {extent, out + 2}, row));
+    return MakeAxisMap(x, {extent, out + 2}, row);
   }
 };
 

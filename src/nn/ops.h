@@ -153,6 +153,8 @@ AxisMap MakeAxisMap(const Var& like, const AxisExtents& extents,
 
 // y[.., i, ..] = sum_t weight[t] x[.., index[t], ..] over the terms t of row i.
 Var MapAxis(const Var& x, int axis, const AxisMap& map);
+// The last two axes of [n, c, h, w], h first.
+Var MapImage(const Var& x, const AxisMap& rows, const AxisMap& columns);
 
 // Padding a b c by two elements on each side:
 enum class PadMode {
@@ -167,8 +169,11 @@ struct Padding {
   std::int64_t top = 0, bottom = 0, left = 0, right = 0;
   static Padding All(std::int64_t n) { return {n, n, n, n}; }
 };
+struct PadModes {
+  PadMode vertical, horizontal;
+};
 // Pads the last two axes of [n, c, h, w].
-Var PadImage(const Var& x, const Padding& padding, PadMode mode);
+Var PadImage(const Var& x, const Padding& padding, const PadModes& modes);
 
 // Image resizing. Pixels are squares and both images fill the same square, as in PyTorch with
 // align_corners = False: output i is centred at (i + 1/2) in / out - 1/2 of the input.

@@ -9,10 +9,15 @@
 
 #if HWY_ONCE
 #include <algorithm>
+#include <vector>
+
+#include "base/inline_vector.h"
+#include "nn/kernels/panels.h"
 
 namespace tilegrad::nn {
 
 HWY_EXPORT(AxisMapRange);
+HWY_EXPORT(ImageMapRange);
 
 namespace {
 
@@ -36,6 +41,78 @@ void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers) {
 void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers) {
   ForRows(problem, workers,
           [&](std::size_t begin, std::size_t end) { AxisMapRef(problem, begin, end); });
+}
+
+namespace {
+
+// Fewer copies are not worth a run of their own.
+constexpr std::size_t kLeastCopies = 8;
+
+std::size_t TermsOf(const SparseRows<float>& columns, std::size_t j) {
+  return static_cast<std::size_t>(columns.begin[j + 1] - columns.begin[j]);
+}
+
+// The end of the columns from j on that copy neighbours, as far as `limit`.
+std::size_t CopiesEnd(const SparseRows<float>& columns, std::size_t j, std::size_t limit) {
+  const std::int32_t source =
+      columns.begin[j] < columns.begin[columns.out] ? columns.index[columns.begin[j]] : 0;
+  std::size_t end = j;
+  for (; end < limit && TermsOf(columns, end) == 1; ++end) {
+    const std::int32_t t = columns.begin[end];
+    if (columns.weight[t] != 1.0f || columns.index[t] != source + static_cast<int>(end - j)) break;
+  }
+  return end;
+}
+
+bool BeginsCopies(const SparseRows<float>& columns, std::size_t j) {
+  return CopiesEnd(columns, j, std::min(columns.out, j + kLeastCopies)) == j + kLeastCopies;
+}
+
+ColumnRun RunFrom(const SparseRows<float>& columns, std::size_t j) {
+  if (BeginsCopies(columns, j)) return {j, CopiesEnd(columns, j, columns.out), 1, true};
+  const std::size_t terms = TermsOf(columns, j);
+  std::size_t end = j + 1;
+  while (end < columns.out && TermsOf(columns, end) == terms && !BeginsCopies(columns, end)) ++end;
+  return {j, end, terms, false};
+}
+
+using ColumnRuns = InlineVector<ColumnRun, 16>;  // padding and resizing need five
+
+ColumnRuns FindRuns(const SparseRows<float>& columns) {
+  ColumnRuns runs;
+  for (std::size_t j = 0; j < columns.out; j = runs.back().end) runs.push_back(RunFrom(columns, j));
+  return runs;
+}
+
+// Calls run(first, last, worker) over all rows of y.
+template <class T, class Run>
+void ForImageRows(const ImageMapProblem<T>& p, const Workers& workers, const Run& run) {
+  const std::size_t width = std::max<std::size_t>(1, p.columns.out);
+  workers.ForRanges(p.outer * p.rows.out, std::max<std::size_t>(1, kGrain / width), run);
+}
+
+}  // namespace
+
+void MapImage(const ImageMapProblem<float>& problem, const KernelContext& context) {
+  const std::size_t pitch = RoundUp(problem.columns.in, kAlignment);
+  float* const combined =
+      context.scratch.Floats(pitch * static_cast<std::size_t>(context.workers.count()));
+  const ColumnRuns runs = FindRuns(problem.columns);
+  ForImageRows(problem, context.workers,
+               [&](std::size_t first, std::size_t last, std::size_t worker) {
+                 HWY_DYNAMIC_DISPATCH(ImageMapRange)
+                 (problem, {runs.data(), runs.size()}, first, last, combined + worker * pitch);
+               });
+}
+
+void MapImage(const ImageMapProblem<double>& problem, const KernelContext& context) {
+  const std::size_t pitch = problem.columns.in;
+  std::vector<double> combined(pitch * static_cast<std::size_t>(context.workers.count()));
+  ForImageRows(problem, context.workers,
+               [&](std::size_t first, std::size_t last, std::size_t worker) {
+                 for (std::size_t row = first; row < last; ++row)
+                   ImageMapRowRef(problem, row, &combined[worker * pitch]);
+               });
 }
 
 }  // namespace tilegrad::nn

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "base/parallel.h"
+#include "nn/kernels/kernel_context.h"
 
 namespace tilegrad::nn {
 
@@ -24,5 +25,27 @@ struct AxisMapProblem {
 
 void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers);
 void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers);  // scalar
+
+// A sparse matrix [out, in]: begin, index and weight as above.
+template <class T>
+struct SparseRows {
+  std::size_t in = 1, out = 1;
+  const std::int32_t* begin = nullptr;
+  const std::int32_t* index = nullptr;
+  const T* weight = nullptr;
+};
+
+// The last two axes at once: y[o] = rows x[o] columns^T. x [outer, rows.in, columns.in], y [outer,
+// rows.out, columns.out]; combines rows first.
+template <class T>
+struct ImageMapProblem {
+  std::size_t outer = 1;
+  SparseRows<T> rows, columns;
+  const T* x = nullptr;
+  T* y = nullptr;
+};
+
+void MapImage(const ImageMapProblem<float>& problem, const KernelContext& context);
+void MapImage(const ImageMapProblem<double>& problem, const KernelContext& context);  // scalar
 
 }  // namespace tilegrad::nn

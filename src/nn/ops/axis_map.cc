@@ -96,10 +96,68 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
 
 namespace {
 
+template <class T>
+SparseRows<T> RowsOf(const AxisMap& map) {
+  return {static_cast<std::size_t>(map.in), static_cast<std::size_t>(map.out),
+          map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(), map.weight.data<T>()};
+}
+
+}  // namespace
+
+Var MapImage(const Var& x, const AxisMap& rows, const AxisMap& columns) {
+  if (!Usable("map image", {&x})) return Invalid({&x});
+  Shape shape = x.shape();
+  if (shape.rank() != 4 || shape[2] != rows.in || shape[3] != columns.in ||
+      rows.weight.dtype() != x.dtype() || columns.weight.dtype() != x.dtype()) {
+    return Fail(x, InvalidArgument("map image: a map from {} x {} of {}", rows.in, columns.in,
+                                   shape.ToString()));
+  }
+  shape[2] = rows.out;
+  shape[3] = columns.out;
+  if (!IsPossibleResult("map image", x, shape)) return Invalid({&x});
+  Context& context = x.context();
+  Tensor y = context.Empty(shape, x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    MapImage(ImageMapProblem<T>{static_cast<std::size_t>(shape[0] * shape[1]), RowsOf<T>(rows),
+                                RowsOf<T>(columns), x.value().data<T>(), y.data<T>()},
+             context.kernels());
+  });
+  return Record({"map image"}, std::move(y), {x}, [rows, columns](const Adjoint& adj) {
+    Context& of = adj.dy().context();
+    return Vars{MapImage(adj.dy(), TransposedOnce(of, rows), TransposedOnce(of, columns))};
+  });
+}
+
+namespace {
+
 // The element of [0, extent) that stands at position i, which may lie outside.
 std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
   if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
   return std::clamp<std::int64_t>(i, 0, extent - 1);
+}
+
+// Padding of one axis.
+struct AxisPadding {
+  std::int64_t extent, before, after;
+  PadMode mode;
+  bool IsPossible() const {
+    const std::int64_t most = std::max(before, after);
+    return extent > 0 && before >= 0 && after >= 0 && most <= AxisMap::kMostExtent &&
+           before + extent + after <= AxisMap::kMostExtent;
+  }
+  AxisMap Map(const Var& like) const {
+    const auto row = [&](std::int64_t i, AxisTerms& terms) {
+      const std::int64_t at = i - before;
+      if (mode == PadMode::kZero && (at < 0 || at >= extent)) return;
+      terms.push_back({SourceOf(at, extent, mode), 1.0});
+    };
+    return MakeAxisMap(like, {extent, before + extent + after}, row);
+  }
+};
+
+Var RefusedPadding(const Var& x, const AxisPadding& padding, int axis) {
+  return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", padding.before,
+                                 padding.after, axis, x.shape().ToString()));
 }
 
 }  // namespace
@@ -108,28 +166,27 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
   if (!Usable("pad", {&x})) return Invalid({&x});
   if (mode == PadMode::kZero) return Pad(x, axis, before, after);
   const std::int64_t extent = axis >= 0 && axis < x.shape().rank() ? x.shape()[axis] : 0;
-  const std::int64_t most = std::max(before, after);
-  if (extent <= 0 || before < 0 || after < 0 || most > AxisMap::kMostExtent ||
-      before + extent + after > AxisMap::kMostExtent) {
-    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", before, after,
-                                   axis, x.shape().ToString()));
-  }
-  if (most == 0) return x;
-  Shape padded = x.shape();
-  padded[axis] += before + after;
-  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
-  const AxisMap map = MakeAxisMap(x, {extent, padded[axis]}, [&](std::int64_t i, AxisTerms& terms) {
-    terms.push_back({SourceOf(i - before, extent, mode), 1.0});
-  });
-  return MapAxis(x, axis, map);
+  const AxisPadding padding{extent, before, after, mode};
+  if (!padding.IsPossible()) return RefusedPadding(x, padding, axis);
+  if (before == 0 && after == 0) return x;
+  if (!IsPossibleResult("pad", x, x.shape().With(axis, before + extent + after)))
+    return Invalid({&x});
+  return MapAxis(x, axis, padding.Map(x));
 }
 
-Var PadImage(const Var& x, const Padding& padding, PadMode mode) {
+Var PadImage(const Var& x, const Padding& padding, const PadModes& modes) {
   if (!Usable("pad image", {&x})) return Invalid({&x});
   if (x.shape().rank() != 4) {
     return Fail(x, InvalidArgument("pad image: {} is not [n, c, h, w]", x.shape().ToString()));
   }
-  return Pad(Pad(x, 2, padding.top, padding.bottom, mode), 3, padding.left, padding.right, mode);
+  const AxisPadding rows{x.shape()[2], padding.top, padding.bottom, modes.vertical};
+  const AxisPadding columns{x.shape()[3], padding.left, padding.right, modes.horizontal};
+  if (!rows.IsPossible()) return RefusedPadding(x, rows, 2);
+  if (!columns.IsPossible()) return RefusedPadding(x, columns, 3);
+  const Shape padded = {x.shape()[0], x.shape()[1], rows.before + rows.extent + rows.after,
+                        columns.before + columns.extent + columns.after};
+  if (!IsPossibleResult("pad image", x, padded)) return Invalid({&x});
+  return MapImage(x, rows.Map(x), columns.Map(x));
 }
 
 namespace {
@@ -143,14 +200,12 @@ void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
   if (share > 0) terms.push_back({below + 1, share});
 }
 
-Var ResizeAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
+AxisMap ResizedAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
   const AxisExtents extents{x.shape()[axis], extent};
-  if (extents.in == extent) return x;
-  const auto row = [&](std::int64_t i, AxisTerms& terms) {
+  return MakeAxisMap(x, extents, [&](std::int64_t i, AxisTerms& terms) {
     if (mode == ResizeMode::kBilinear) return AppendBilinear(extents, i, terms);
     terms.push_back({i * extents.in / extents.out, 1.0});
-  };
-  return MapAxis(x, axis, MakeAxisMap(x, extents, row));
+  });
 }
 
 }  // namespace
@@ -167,7 +222,8 @@ Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
   if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
     return Invalid({&x});
   }
-  return ResizeAxis(ResizeAxis(x, 2, size.height, mode), 3, size.width, mode);
+  if (x.shape()[2] == size.height && x.shape()[3] == size.width) return x;
+  return MapImage(x, ResizedAxis(x, 2, size.height, mode), ResizedAxis(x, 3, size.width, mode));
 }
 
 }  // namespace tilegrad::nn

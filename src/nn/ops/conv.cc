@@ -107,7 +107,8 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
       bias.has_context() ? Usable("conv2d", {&x, &weight, &bias}) : Usable("conv2d", {&x, &weight});
   if (!usable) return Invalid({&x, &weight, &bias});
   if (options.padding_mode != PadMode::kZero && options.padding > 0) {
-    const Var padded = PadImage(x, Padding::All(options.padding), options.padding_mode);
+    const Var padded =
+        PadImage(x, Padding::All(options.padding), {options.padding_mode, options.padding_mode});
     return Conv2d(padded, weight, bias, {.stride = options.stride});
   }
   const auto s = MakeShape({x.shape(), weight.shape()}, options);
@@ -239,7 +240,7 @@ Status Check(const char* op, const Shape& x, const PoolOptions& o) {
                          o.kernel, o.stride, o.padding);
 }
 
-Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
+AxisMap MeansAlong(const Var& x, int axis, const PoolOptions& o) {
   const AxisExtents extents{x.shape()[axis], Windows(x.shape()[axis], o)};
   const auto row = [&](std::int64_t i, AxisTerms& terms) {
     const std::int64_t begin = i * o.stride - o.padding;
@@ -248,7 +249,7 @@ Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
       terms.push_back({at, 1.0 / o.kernel});
     }
   };
-  return MapAxis(x, axis, MakeAxisMap(x, extents, row));
+  return MakeAxisMap(x, extents, row);
 }
 
 }  // namespace
@@ -256,7 +257,7 @@ Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
 Var AvgPool2d(const Var& x, const PoolOptions& options) {
   if (!Usable("average pooling", {&x})) return Invalid({&x});
   if (const Status s = Check("average pooling", x.shape(), options); !s.ok()) return Fail(x, s);
-  return MeanAlong(MeanAlong(x, 2, options), 3, options);
+  return MapImage(x, MeansAlong(x, 2, options), MeansAlong(x, 3, options));
 }
 
 // The elements are picked by index; picking is linear, and its adjoint puts them back.

@@ -23,12 +23,12 @@ nn::Var Twice(const nn::Var& x) {
 // A frame of one pixel. Left and right of half a map is its mirror image, whose next column has the
 // colours of the edge; above and below the poles, what lies at them.
 nn::Var FrameOfHalf(const nn::Var& map) {
-  return nn::PadImage(map, nn::Padding::All(1), nn::PadMode::kReplicate);
+  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kReplicate});
 }
 
 // Left and right edge of a whole map are neighbours.
 nn::Var FrameOfWhole(const nn::Var& map) {
-  return nn::Pad(nn::Pad(map, 3, 1, 1, nn::PadMode::kCircular), 2, 1, 1, nn::PadMode::kReplicate);
+  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kCircular});
 }
 
 // Which column of a map each column of a texture shows. The mirror image at x = 0 of column i is

@@ -194,7 +194,7 @@ nn::Var Take(const nn::Var& maps, const Channels& channels) {
 
 // A frame of one pixel around a map of the sphere: left and right edges are neighbours.
 nn::Var WrapAround(const nn::Var& map) {
-  return nn::Pad(nn::Pad(map, 3, 1, 1, nn::PadMode::kCircular), 2, 1, 1, nn::PadMode::kReplicate);
+  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kCircular});
 }
 
 constexpr double kDarkChannel = 0.03;  // of a channel; anything darker counts as unlit
