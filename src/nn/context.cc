@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "nn/kernels/panels.h"
+
 namespace tilegrad::nn {
 namespace {
 
@@ -16,7 +18,8 @@ Tensor Converted(Tensor tensor, std::span<const From> values, const Workers& wor
   assert(values.size() == tensor.elements());
   WithFloatType(tensor.dtype(), [&]<class T>(T) {
     T* const to = tensor.data<T>();
-    ForChunks(&workers, values.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    const std::size_t grain = GrainFor(values.size(), kGrain, workers);
+    ForChunks(&workers, values.size(), grain, [&](std::size_t begin, std::size_t end) {
       std::copy(values.begin() + static_cast<std::ptrdiff_t>(begin),
                 values.begin() + static_cast<std::ptrdiff_t>(end), to + begin);  // or moves bytes
     });
@@ -99,7 +102,8 @@ Tensor Context::Empty(const Shape& shape, DType dtype) const {
 
 Tensor Context::Zeros(const Shape& shape, DType dtype) const {
   Tensor zeros = Empty(shape, dtype);
-  ForChunks(&workers(), zeros.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
+  const std::size_t grain = GrainFor(zeros.bytes(), kCopiedBytes, workers());
+  ForChunks(&workers(), zeros.bytes(), grain, [&](std::size_t begin, std::size_t end) {
     std::memset(zeros.raw() + begin, 0, end - begin);
   });
   return zeros;
@@ -129,7 +133,8 @@ Tensor Context::Indices(std::span<const std::int32_t> values) const {
 
 Tensor Context::Copy(const Tensor& tensor) const {
   Tensor copy = Empty(tensor.shape(), tensor.dtype());
-  ForChunks(&workers(), tensor.bytes(), kCopiedBytes, [&](std::size_t begin, std::size_t end) {
+  const std::size_t grain = GrainFor(tensor.bytes(), kCopiedBytes, workers());
+  ForChunks(&workers(), tensor.bytes(), grain, [&](std::size_t begin, std::size_t end) {
     std::memcpy(copy.raw() + begin, tensor.raw() + begin, end - begin);
   });
   return copy;

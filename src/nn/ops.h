@@ -174,6 +174,9 @@ struct PadModes {
 };
 // Pads the last two axes of [n, c, h, w].
 Var PadImage(const Var& x, const Padding& padding, const PadModes& modes);
+inline Var PadImage(const Var& x, const Padding& padding, PadMode mode) {
+  return PadImage(x, padding, {mode, mode});
+}
 
 // Image resizing. Pixels are squares and both images fill the same square, as in PyTorch with
 // align_corners = False: output i is centred at (i + 1/2) in / out - 1/2 of the input.

@@ -122,10 +122,10 @@ TEST_F(Help, JsonIsOneObjectAndQuietSaysNothing) {
   const auto files = Json::parse(ExpectDone(render + " --json"))["files"];
   ASSERT_EQ(files.size(), 1u);
   EXPECT_EQ(files[0], In("p.png"));
-  const auto views = Json::parse(
-      ExpectDone("views " + In("a.glb") + " --views 3 --size 16 --out " + In("views") + " --json"));
+  const auto views = Json::parse(ExpectDone("views " + In("a.glb") + " --views 3 --size 16 --out " +
+                                            In("views") + " --json --quiet"));
   EXPECT_EQ(views["views"], 3);
-  // Quiet: from a second on it says on the other stream how far it is.
+  // Quiet: from a second on a command says on the other stream how far it is.
   const auto fit = Json::parse(ExpectDone("fit " + In("views") + " --steps 2 --template-level 1" +
                                           " --out " + In("fit") + " --json --quiet"));
   EXPECT_EQ(fit["steps"], 2);

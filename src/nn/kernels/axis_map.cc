@@ -21,11 +21,15 @@ HWY_EXPORT(ImageMapRange);
 
 namespace {
 
-constexpr std::size_t kGrain = 16384;  // elements of y to a task
+constexpr std::size_t kGrain = 16384;  // terms to a task
 
 template <class T, class Run>
 void ForRows(const AxisMapProblem<T>& p, const Workers& workers, const Run& run) {
-  const std::size_t rows = std::max<std::size_t>(1, kGrain / std::max<std::size_t>(1, p.inner));
+  const auto terms = static_cast<std::size_t>(p.begin[p.out]);
+  const std::size_t row =
+      std::max<std::size_t>(1, p.inner * DivideUp(terms, std::max<std::size_t>(1, p.out)));
+  const std::size_t rows =
+      std::max<std::size_t>(1, GrainFor(p.outer * p.out * row, kGrain, workers) / row);
   workers.ForRanges(p.outer * p.out, rows,
                     [&](std::size_t begin, std::size_t end, std::size_t) { run(begin, end); });
 }
@@ -87,8 +91,9 @@ ColumnRuns FindRuns(const SparseRows<float>& columns) {
 // Calls run(first, last, worker) over all rows of y.
 template <class T, class Run>
 void ForImageRows(const ImageMapProblem<T>& p, const Workers& workers, const Run& run) {
-  const std::size_t width = std::max<std::size_t>(1, p.columns.out);
-  workers.ForRanges(p.outer * p.rows.out, std::max<std::size_t>(1, kGrain / width), run);
+  const std::size_t rows = p.outer * p.rows.out, width = std::max<std::size_t>(1, p.columns.out);
+  const std::size_t elements = GrainFor(rows * width, kGrain, workers);
+  workers.ForRanges(rows, std::max<std::size_t>(1, elements / width), run);
 }
 
 }  // namespace

@@ -1,14 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// Divides a range into nearly equal parts. The division depends on the sizes alone.
+// Divides a range into parts.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 
+#include "base/parallel.h"
+
 namespace tilegrad::nn {
 
 constexpr std::size_t DivideUp(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 constexpr std::size_t RoundUp(std::size_t a, std::size_t b) { return DivideUp(a, b) * b; }
+
+// More workers get smaller tasks where results do not depend on the division.
+constexpr std::size_t kFewWorkers = 4;
+
+// Elements to a task of a loop over n: `most`, or down to an eighth of it where many workers would
+// not get two tasks each.
+inline std::size_t GrainFor(std::size_t n, std::size_t most, const Workers& workers) {
+  const auto count = static_cast<std::size_t>(workers.count());
+  return count <= kFewWorkers ? most : std::clamp(n / (2 * count), DivideUp(most, 8), most);
+}
 
 // [0, total) as the fewest parts of at most `limit`, whose sizes differ by at most one: 64 rows in
 // panels of at most 6 are 9 x 6 + 2 x 5, so that no panel is left nearly empty.

@@ -10,6 +10,8 @@
 #if HWY_ONCE
 #include <algorithm>
 
+#include "nn/kernels/panels.h"
+
 namespace tilegrad::nn {
 
 HWY_EXPORT(SumAlongRows);
@@ -21,8 +23,9 @@ constexpr std::size_t kGrain = 16384;       // elements read by a task, about
 constexpr std::size_t kColumnBlock = 256;   // outputs of one task where columns are summed
 constexpr std::size_t kMaxPartials = 4096;  // of one long sum, merged in order
 
-std::size_t OutputsPerTask(const ReduceLayout& l) {
-  return std::max<std::size_t>(1, kGrain / std::max<std::size_t>(1, l.inputs_each()));
+std::size_t OutputsPerTask(const ReduceLayout& l, const Workers& workers) {
+  const std::size_t inputs = std::max<std::size_t>(1, l.inputs_each());
+  return std::max<std::size_t>(1, GrainFor(l.outputs() * inputs, kGrain, workers) / inputs);
 }
 
 // One long row: partial sums of fixed stretches, then their sum.
@@ -58,23 +61,24 @@ void ReduceSum(const ReduceLayout& layout, const float* x, float* y, const Worke
     return SumOne(x, l.reduced[2], y, workers);
   }
   if (l.reduced[2] != 1 || l.kept[2] == 1) {
-    workers.ForRanges(l.outputs(), OutputsPerTask(l),
+    workers.ForRanges(l.outputs(), OutputsPerTask(l, workers),
                       [&](std::size_t begin, std::size_t end, std::size_t) {
                         HWY_DYNAMIC_DISPATCH(SumAlongRows)(l, x, y, begin, end);
                       });
     return;
   }
-  const std::size_t columns = l.kept[2], blocks = (columns + kColumnBlock - 1) / kColumnBlock;
+  const std::size_t columns = l.kept[2], grain = GrainFor(l.outputs(), kColumnBlock, workers);
+  const std::size_t blocks = (columns + grain - 1) / grain;
   workers.For(l.kept[0] * l.kept[1] * blocks, [&](std::size_t task, std::size_t) {
-    const std::size_t row = task / blocks * columns, block = task % blocks * kColumnBlock;
-    const std::size_t end = row + std::min(columns, block + kColumnBlock);
+    const std::size_t row = task / blocks * columns, block = task % blocks * grain;
+    const std::size_t end = row + std::min(columns, block + grain);
     HWY_DYNAMIC_DISPATCH(SumColumns)(l, x, y, row + block, end);
   });
 }
 
 void ReduceSum(const ReduceLayout& l, const double* x, double* y, const Workers& workers) {
   workers.ForRanges(
-      l.outputs(), OutputsPerTask(l),
+      l.outputs(), OutputsPerTask(l, workers),
       [&](std::size_t begin, std::size_t end, std::size_t) { ReduceSumRef(l, x, y, begin, end); });
 }
 
@@ -83,7 +87,7 @@ namespace {
 template <class T>
 void ForOutputs(const ReduceLayout& l, const T* x, T* y, const ArgExtremum& arg,
                 const Workers& workers) {
-  workers.ForRanges(l.outputs(), OutputsPerTask(l),
+  workers.ForRanges(l.outputs(), OutputsPerTask(l, workers),
                     [&](std::size_t begin, std::size_t end, std::size_t) {
                       for (std::size_t o = begin; o < end; ++o) ReduceExtremumRef(l, x, y, arg, o);
                     });

@@ -107,8 +107,8 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
       bias.has_context() ? Usable("conv2d", {&x, &weight, &bias}) : Usable("conv2d", {&x, &weight});
   if (!usable) return Invalid({&x, &weight, &bias});
   if (options.padding_mode != PadMode::kZero && options.padding > 0) {
-    const Var padded =
-        PadImage(x, Padding::All(options.padding), {options.padding_mode, options.padding_mode});
+    const Padding frame = Padding::All(options.padding);
+    const Var padded = PadImage(x, frame, options.padding_mode);
     return Conv2d(padded, weight, bias, {.stride = options.stride});
   }
   const auto s = MakeShape({x.shape(), weight.shape()}, options);

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "nn/kernels/panels.h"
 #include "nn/ops.h"
 #include "nn/ops/broadcast.h"
 
@@ -46,9 +47,9 @@ template <class Op, class T>
 void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& workers) {
   std::size_t rows = 1;
   for (std::size_t i = 0; i + 1 < box.extents.size(); ++i) rows *= box.extents[i];
-  constexpr std::size_t kGrain = 16384;  // elements to a task
   const std::size_t length = std::max<std::size_t>(1, box.extents.back());
-  const std::size_t pieces = (length + kGrain - 1) / kGrain;
+  const std::size_t grain = GrainFor(rows * length, 16384, workers);  // elements
+  const std::size_t pieces = (length + grain - 1) / grain;
   const auto move = [&](std::size_t row, std::size_t piece) {
     std::size_t rest = row, offset_from = 0, offset_to = 0;
     for (std::size_t i = box.extents.size() - 1; i-- > 0;) {
@@ -57,10 +58,10 @@ void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& wor
       offset_from += index * box.strides_from[i];
       offset_to += index * box.strides_to[i];
     }
-    MoveRow<Op>(box, piece * kGrain, std::min(box.extents.back(), (piece + 1) * kGrain),
+    MoveRow<Op>(box, piece * grain, std::min(box.extents.back(), (piece + 1) * grain),
                 from + offset_from, to + offset_to);
   };
-  workers.ForRanges(rows * pieces, std::max<std::size_t>(1, kGrain / length),
+  workers.ForRanges(rows * pieces, std::max<std::size_t>(1, grain / length),
                     [&](std::size_t begin, std::size_t end, std::size_t) {
                       for (std::size_t i = begin; i < end; ++i) move(i / pieces, i % pieces);
                     });

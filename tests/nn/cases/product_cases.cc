@@ -72,7 +72,7 @@ void AddPadding(CaseList& list) {
         ModeCase{"replicate", PadMode::kReplicate}}) {
     list.Add({std::string("pad image ") + name,
               [how = mode](const Inputs& v) {
-                return Square(PadImage(v[0], {2, 1, 0, 2}, {how, how}));
+                return Square(PadImage(v[0], {2, 1, 0, 2}, how));
               },
               {{shape}},
               48});

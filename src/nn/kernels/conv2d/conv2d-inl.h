@@ -139,7 +139,8 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
 inline std::size_t PiecePixels(std::size_t pixels, std::size_t most, const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
   if (workers == 1) return most;
-  return std::clamp(pixels / (4 * workers), kConvPixels / 4, most);
+  const std::size_t least = kConvPixels / (workers > kFewWorkers ? 16 : 4);
+  return std::clamp(pixels / (4 * workers), least, most);
 }
 
 void Conv2dForwardTarget(const Conv2dShape& s, const float* x, const float* weight,

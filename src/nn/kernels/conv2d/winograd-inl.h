@@ -34,7 +34,6 @@ constexpr std::size_t kOwnValues = std::size_t{1} << 19;
 // But at least this many tiles, since every portion reads all weights again: with 38 and 19 tiles
 // 256 to 512 channels took 1.14 and 1.5 times as long.
 constexpr std::size_t kOwnTiles = 64;
-constexpr std::size_t kFewWorkers = 4;
 
 // The rows of tiles, in groups of `unit`, divided into portions.
 struct PortionCut {
@@ -121,6 +120,7 @@ struct WinogradMemory {
 struct SharedLoops {
   const Workers& workers;
   static constexpr std::size_t owner = 0;
+  std::size_t workers_sharing() const { return static_cast<std::size_t>(workers.count()); }
   template <class Task>
   void For(std::size_t n, const Task& task, LoopSite site = LoopSite::Here()) const {
     workers.For(n, task, site);
@@ -130,6 +130,7 @@ struct SharedLoops {
 struct OwnLoops {
   const Workers::Part& part;
   std::size_t owner;
+  static std::size_t workers_sharing() { return 1; }
   template <class Task>
   void For(std::size_t n, const Task& task, LoopSite site = LoopSite::Here()) const {
     part.For(n, task, site);

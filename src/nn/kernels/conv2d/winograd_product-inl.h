@@ -111,8 +111,10 @@ struct PackedWinogradWeights {
   std::size_t RowCount(std::size_t index) const { return panels.size(index % panels.count()); }
 
   void Fill(const float* weight, float* packed, const Workers& workers) const {
-    workers.For(panels.count(),
-                [&](std::size_t panel, std::size_t) { FillPanel(weight, panel, packed); });
+    const Panels strips(depth.channels(), kStepsAtATime);
+    workers.For(panels.count() * strips.count(), [&](std::size_t index, std::size_t) {
+      FillStrip(weight, index / strips.count(), strips.range(index % strips.count()), packed);
+    });
   }
 
   const WinogradPlan& plan;
@@ -138,24 +140,20 @@ struct PackedWinogradWeights {
 
   // Gathers the taps of some steps, then transforms their phases: a vector load of numbers just
   // stored one by one would wait for the stores.
-  void FillPanel(const float* weight, std::size_t panel, float* packed) const {
+  void FillStrip(const float* weight, std::size_t panel, Panels::Range steps, float* packed) const {
     const std::size_t area = plan.kernel * plan.kernel;
     const bool by_rows = rows.input == (of == WeightsOf::kTranspose);  // else by steps
     const std::size_t row_stride = by_rows ? depth.channels() * area : area;
     const std::size_t k_stride = by_rows ? area : rows.channels() * area;
     const float* first = weight + panels.begin(panel) * row_stride;
     Taps taps[kStepsAtATime] = {};
-    for (std::size_t k = 0; k < depth.channels(); k += kStepsAtATime) {
-      const std::size_t steps = std::min(kStepsAtATime, depth.channels() - k);
-      for (std::size_t i = 0; i < steps; ++i) {
-        TransposeStrip(first + (k + i) * k_stride, row_stride, panels.size(panel), area, taps[i],
-                       kRowLanes);
-      }
-      for (std::size_t a = 0; a < plan.stride; ++a) {
-        for (std::size_t b = 0; b < plan.stride; ++b) {
-          FillPhase({panel, k, steps, a, b}, taps, packed);
-        }
-      }
+    for (std::size_t k = steps.begin; k < steps.end; ++k) {
+      TransposeStrip(first + k * k_stride, row_stride, panels.size(panel), area,
+                     taps[k - steps.begin], kRowLanes);
+    }
+    for (std::size_t a = 0; a < plan.stride; ++a) {
+      for (std::size_t b = 0; b < plan.stride; ++b)
+        FillPhase({panel, steps.begin, steps.end - steps.begin, a, b}, taps, packed);
     }
   }
 
@@ -166,17 +164,15 @@ struct PackedWinogradWeights {
     SlotTargets to;
     ForSlots(ra, rb,
              [&](std::size_t i, std::size_t j) { to.data[i][j] = packed + At(strip, i, j); });
-    // What a store writes past its row, the next step overwrites; after the last step comes the
-    // next phase, which may be written already.
-    const bool ends = strip.k + strip.steps == depth.channels();
-    for (std::size_t k = 0; k + ends < strip.steps; ++k) {
+    // What a store writes past its row, the next step overwrites; after the last step comes another
+    // strip or phase, which may be written already.
+    for (std::size_t k = 0; k + 1 < strip.steps; ++k) {
       ForTaps<TransformWeights>(ra, rb, plan, taps[k] + first, to);
       ForSlots(ra, rb, [&](std::size_t i, std::size_t j) HWY_ATTR {
         to.data[i][j] += count;
         PrefetchLineToWrite(to.data[i][j] + kAhead);
       });
     }
-    if (!ends) return;
     float lanes[4][4][kRowLanes];
     SlotTargets whole;
     ForSlots(ra, rb, [&](std::size_t i, std::size_t j) { whole.data[i][j] = lanes[i][j]; });
@@ -201,11 +197,12 @@ struct PackedWinogradWeights {
   }
 };
 
-constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half of L1
-constexpr std::size_t kSlotRowPanels = 21;     // per work item: 126 rows
-constexpr std::size_t kSlotColumnPanels = 16;  // per work item: 256 tiles
+constexpr std::size_t kSlotDepth = 256;         // steps of k in one pass: half of L1
+constexpr std::size_t kSlotRowPanels = 21;      // per work item: 126 rows
+constexpr std::size_t kSlotColumnPanels = 16;   // per work item: 256 tiles
+constexpr std::size_t kSlotItemsPerWorker = 3;  // with many workers, at least
+constexpr std::size_t kFewSlotPanels = 4;       // columns, or twice as many rows: no smaller items
 
-constexpr int kFewCorrelationWorkers = 4;
 constexpr std::size_t kManySlotRowPanels = 7;  // per work item with more workers: 42 rows
 
 // ---- Forward and input gradient: out[slot] = weights[slot] in[slot] ----
@@ -247,19 +244,44 @@ inline void MultiplyItem(const SlotProduct& p, const SlotItem& item) {
   }
 }
 
+// The work items of a product. Each result is computed alike, whatever the items.
+struct SlotItems {
+  SlotItems(const SlotProduct& product, std::size_t workers) : p(product) {
+    while (workers > kFewWorkers && count() < kSlotItemsPerWorker * workers && Halve()) {
+    }
+  }
+  Panels columns() const { return {p.rows.padded / kTileColumns, column_panels}; }
+  Panels blocks(std::size_t slot) const { return {p.weights.panel_count(slot), row_panels}; }
+  std::size_t most_blocks() const {
+    std::size_t most = 0;
+    for (std::size_t slot = 0; slot < p.weights.plan.slots(); ++slot)
+      most = std::max(most, blocks(slot).count());
+    return most;
+  }
+  std::size_t count() const { return p.weights.plan.slots() * most_blocks() * columns().count(); }
+  // The longer side; false if both are short.
+  bool Halve() {
+    const std::size_t rows = std::min(row_panels, p.weights.panel_count(0));
+    const std::size_t wide = columns().largest();
+    if (std::max(2 * rows, wide) <= kFewSlotPanels) return false;
+    (2 * rows > wide ? row_panels : column_panels) = DivideUp(2 * rows > wide ? rows : wide, 2);
+    return true;
+  }
+
+  const SlotProduct& p;
+  std::size_t row_panels = kSlotRowPanels, column_panels = kSlotColumnPanels;
+};
+
 // loops: as in winograd-inl.h.
 template <class Loops>
 void MultiplySlots(const SlotProduct& p, const Loops& loops) {
-  const WinogradPlan& plan = p.weights.plan;
-  std::size_t most = 0;
-  for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
-    most = std::max(most, DivideUp(p.weights.panel_count(slot), kSlotRowPanels));
-  }
-  const Panels columns(p.rows.padded / kTileColumns, kSlotColumnPanels);
-  loops.For(plan.slots() * most * columns.count(), [&](std::size_t index, std::size_t) {
+  const SlotItems items(p, loops.workers_sharing());
+  const Panels columns = items.columns();
+  const std::size_t most = items.most_blocks();
+  loops.For(items.count(), [&](std::size_t index, std::size_t) {
     const std::size_t slot = index / (most * columns.count());
     const std::size_t block = index / columns.count() % most, column = index % columns.count();
-    const Panels blocks(p.weights.panel_count(slot), kSlotRowPanels);
+    const Panels blocks = items.blocks(slot);
     if (block >= blocks.count()) return;
     MultiplyItem(p, {slot, blocks.begin(block), blocks.begin(block) + blocks.size(block),
                      columns.begin(column), columns.begin(column) + columns.size(column)});
@@ -300,7 +322,7 @@ struct WinogradCorrelation {
   // Work items: some rows of a slot with all panels or, with many workers, fewer rows with one
   // panel.
   void Multiply(const Workers& workers) const {
-    const bool many = workers.count() > kFewCorrelationWorkers;
+    const bool many = static_cast<std::size_t>(workers.count()) > kFewWorkers;
     const std::size_t item_rows = (many ? kManySlotRowPanels : kSlotRowPanels) * kTileRows;
     const std::size_t item_panels = many ? 1 : panels, groups = panels / item_panels;
     std::size_t most = 0;
