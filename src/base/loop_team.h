@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How Workers run loops on the threads of oneTBB. Between loops oneTBB's own workers fall asleep,
-// and join the next loop one after the other, after 30 microseconds each time their number doubles;
-// a training step has a hundred loops and more of that length. The members of a team stay awake for
-// a while instead, and see a loop at once.
+// How Workers run loops on the threads of oneTBB, whose own workers steal a loop's tasks from one
+// another, and fall asleep when they find none: 40 microseconds to wake. A training step has a
+// hundred loops and more that are no longer. The members of a team stay awake for a while instead,
+// and see a loop at once.
 #pragma once
 
 #include <array>

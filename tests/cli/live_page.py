@@ -73,7 +73,8 @@ def check_meanwhile(program, folder, browser):
         assert fit.stderr.readline() == f"live page: {(run / 'live.html').as_uri()}\n"
         deadline = time.monotonic() + 60
         steps = set()
-        while len(steps) < 3:
+        state = {"step": 0}
+        while len(steps) < 3 or state["step"] == 0:
             assert time.monotonic() < deadline and fit.poll() is None, steps
             assert not listening(fit.pid)
             state = state_of(run)
