@@ -16,8 +16,8 @@ namespace {
 
 // How long an idle member stays: longer than what stands between the loops of a training step.
 constexpr double kStaySeconds = 200e-6;
-constexpr int kLooksPerReading = 64;  // of the clock
-constexpr int kLooksBeforeYield = 2000;
+constexpr int kLooksPerReading = 64;     // of the clock
+constexpr int kLooksBeforeYield = 2000;  // 30 to 100 us: then another program may need the core
 // Nested loops at a time, per member; more run on the thread that reaches them.
 constexpr std::size_t kNestedLoops = 2;
 
@@ -111,13 +111,7 @@ void LoopTeam::Run(OpenLoop* loop, std::size_t n, Task task, std::size_t worker)
   loop->open = true;
   Announce();
   TakeTasks(loop, worker);
-  for (int looks = 0; loop->inside != 0; ++looks) {
-    if (crowded_ || looks > kLooksBeforeYield) {
-      std::this_thread::yield();
-    } else {
-      Pause();
-    }
-  }
+  for (int looks = 0; loop->inside != 0; ++looks) Wait(looks);
   if (const std::exception_ptr error = std::exchange(loop->error, nullptr); error != nullptr)
     std::rethrow_exception(error);
 }
@@ -187,16 +181,21 @@ bool LoopTeam::IsIdle(unsigned seen) const {
          dismissed_.load(std::memory_order_relaxed) != seen;
 }
 
+// Until the next look, of which there have been `looks`.
+void LoopTeam::Wait(int looks) const {
+  if (crowded_ || looks > kLooksBeforeYield) {
+    std::this_thread::yield();
+  } else {
+    Pause();
+  }
+}
+
 // False if there is none for some time, or none to be expected.
 bool LoopTeam::AwaitWork(unsigned seen) const {
   const auto begin = std::chrono::steady_clock::now();
   for (int looks = 1; IsIdle(seen); ++looks) {
     if (looks % kLooksPerReading == 0 && SecondsSince(begin) > kStaySeconds) return false;
-    if (crowded_ || looks > kLooksBeforeYield) {
-      std::this_thread::yield();
-    } else {
-      Pause();
-    }
+    Wait(looks);
   }
   return news_ != seen;
 }

@@ -41,13 +41,13 @@ class LoopTeam : public std::enable_shared_from_this<LoopTeam> {
   void Dismiss();
 
  private:
-  static constexpr std::size_t kMostRanges = 16;
-  // A loop while its tasks are being taken. Its place is reused, but never freed: members may look
-  // at it at any time.
+  static constexpr std::size_t kMostRanges = 16;  // of a loop, so that its end is soon found
   struct alignas(64) Range {
     std::atomic<std::size_t> next{0};
     std::size_t end = 0;
   };
+  // A loop while its tasks are being taken. Its place is reused, but never freed: members may look
+  // at it at any time.
   struct alignas(64) OpenLoop {
     std::atomic<bool> taken{false};  // by a caller; not used for the outermost loop
     std::atomic<bool> open{false};   // may be entered
@@ -71,6 +71,7 @@ class LoopTeam : public std::enable_shared_from_this<LoopTeam> {
   bool TakeOffer();
   bool JoinLoops(std::size_t worker);
   bool IsIdle(unsigned seen) const;
+  void Wait(int looks) const;
   bool AwaitWork(unsigned seen) const;
   void TakeTasks(OpenLoop* loop, std::size_t worker) const;
   bool Join(OpenLoop* loop, std::size_t worker) const;

@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -73,7 +72,7 @@ TEST(LoopTeam, RunsAnotherLoopAfterOneThatThrows) {
   }
 }
 
-// A member that has been idle for long, or was dismissed, must be called again.
+// A member that has been idle for long must be called again.
 TEST(LoopTeam, CallsMembersThatHaveGone) {
   const Workers workers(2);
   for (int round = 0; round < 20; ++round) {

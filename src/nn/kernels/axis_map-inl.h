@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of axis_map.h: lanes run over the axes after the mapped one. For the last axis, which
-// has none after it, sums a row's few terms one by one.
+// Vector body of axis_map.h: lanes run over the axes after the mapped one. The last axis, which has
+// none after it, is a loop for each run of columns.
 #if defined(TILEGRAD_NN_AXIS_MAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_AXIS_MAP_INL_H_
 #undef TILEGRAD_NN_AXIS_MAP_INL_H_
@@ -19,46 +19,28 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// One row of y if inner > 1.
-HWY_INLINE void MapLongRow(const AxisMapProblem<float>& p, std::size_t row) {
+// Row i of `map`, applied to the rows of x [in, width].
+HWY_INLINE void CombineRows(const SparseRows<float>& map, std::size_t i, std::size_t width,
+                            const float* x, float* y) {
   const DF d;
-  const std::size_t i = row % p.out, lanes = hn::Lanes(d);
-  const float* x = p.x + row / p.out * p.in * p.inner;
-  for (std::size_t k = 0; k < p.inner; k += lanes) {
-    const std::size_t count = HWY_MIN(lanes, p.inner - k);
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t k = 0; k < width; k += lanes) {
+    const std::size_t count = HWY_MIN(lanes, width - k);
     VF sum = hn::Zero(d);
-    for (std::int32_t t = p.begin[i]; t < p.begin[i + 1]; ++t) {
-      const float* from = x + static_cast<std::size_t>(p.index[t]) * p.inner + k;
-      sum = hn::MulAdd(hn::Set(d, p.weight[t]), LoadSome(d, from, count), sum);
+    for (std::int32_t t = map.begin[i]; t < map.begin[i + 1]; ++t) {
+      const float* from = x + static_cast<std::size_t>(map.index[t]) * width + k;
+      sum = hn::MulAdd(hn::Set(d, map.weight[t]), LoadSome(d, from, count), sum);
     }
-    StoreSome(sum, d, p.y + row * p.inner + k, count);
+    StoreSome(sum, d, y + k, count);
   }
 }
 
-// Rows of y if inner is 1 and each has one term, as in a nearest resize: copies numbers.
-HWY_INLINE void MapPoints(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
-  while (first < last) {
-    const std::size_t i = first % p.out, count = HWY_MIN(p.out - i, last - first);
-    const float* x = p.x + first / p.out * p.in;
-    float* y = p.y + first;
-    for (std::size_t k = 0; k < count; ++k) y[k] = 0.0f + p.weight[i + k] * x[p.index[i + k]];
-    first += count;
-  }
-}
-
-// Whether each row has one term.
-HWY_INLINE bool OneTermEach(const AxisMapProblem<float>& p) {
-  for (std::size_t i = 0; i <= p.out; ++i) {
-    if (p.begin[i] != static_cast<std::int32_t>(i)) return false;
-  }
-  return true;
-}
-
-// Rows [first, last) of y.
+// Rows [first, last) of the outer * out rows of y.
 void AxisMapRange(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
-  if (p.inner == 1 && OneTermEach(p)) return MapPoints(p, first, last);
-  if (p.inner == 1) return AxisMapRef(p, first, last);
-  for (std::size_t row = first; row < last; ++row) MapLongRow(p, row);
+  for (std::size_t row = first; row < last; ++row) {
+    CombineRows(p.map, row % p.map.out, p.inner, p.x + row / p.map.out * p.map.in * p.inner,
+                p.y + row * p.inner);
+  }
 }
 
 // The row of x that row i of y copies; null if it combines several, or scales one.
@@ -66,21 +48,6 @@ HWY_INLINE const float* CopiedRow(const ImageMapProblem<float>& p, std::size_t i
   const std::int32_t t = p.rows.begin[i];
   if (p.rows.begin[i + 1] != t + 1 || p.rows.weight[t] != 1.0f) return nullptr;
   return x + static_cast<std::size_t>(p.rows.index[t]) * p.columns.in;
-}
-
-HWY_INLINE void CombineRows(const ImageMapProblem<float>& p, std::size_t i, const float* x,
-                            float* combined) {
-  const DF d;
-  const std::size_t lanes = hn::Lanes(d), width = p.columns.in;
-  for (std::size_t k = 0; k < width; k += lanes) {
-    const std::size_t count = HWY_MIN(lanes, width - k);
-    VF sum = hn::Zero(d);
-    for (std::int32_t t = p.rows.begin[i]; t < p.rows.begin[i + 1]; ++t) {
-      const float* from = x + static_cast<std::size_t>(p.rows.index[t]) * width + k;
-      sum = hn::MulAdd(hn::Set(d, p.rows.weight[t]), LoadSome(d, from, count), sum);
-    }
-    StoreSome(sum, d, combined + k, count);
-  }
 }
 
 // Columns [run.begin, run.end) of y.
@@ -107,6 +74,14 @@ HWY_INLINE void MapRun(const SparseRows<float>& columns, const ColumnRun& run,
   }
 }
 
+// x [.., in] -> y [.., out]: rows [first, last) of both.
+void LastAxisRange(const AxisMapProblem<float>& p, std::span<const ColumnRun> runs,
+                   std::size_t first, std::size_t last) {
+  for (std::size_t o = first; o < last; ++o) {
+    for (const ColumnRun& run : runs) MapRun(p.map, run, p.x + o * p.map.in, p.y + o * p.map.out);
+  }
+}
+
 // Rows [first, last) of y; `combined`: scratch of columns.in numbers.
 void ImageMapRange(const ImageMapProblem<float>& p, std::span<const ColumnRun> runs,
                    std::size_t first, std::size_t last, float* combined) {
@@ -115,7 +90,7 @@ void ImageMapRange(const ImageMapProblem<float>& p, std::span<const ColumnRun> r
     const float* const plane = p.x + row / p.rows.out * p.rows.in * p.columns.in;
     const float* from = CopiedRow(p, i, plane);
     if (from == nullptr) {
-      CombineRows(p, i, plane, combined);
+      CombineRows(p.rows, i, p.columns.in, plane, combined);
       from = combined;
     }
     float* const to = p.y + row * p.columns.out;

@@ -18,36 +18,25 @@ namespace tilegrad::nn {
 
 HWY_EXPORT(AxisMapRange);
 HWY_EXPORT(ImageMapRange);
+HWY_EXPORT(LastAxisRange);
 
 namespace {
 
 constexpr std::size_t kGrain = 16384;  // terms to a task
 
+// Of all rows, which have so many terms together.
+std::size_t RowsPerTask(std::size_t rows, std::size_t terms, const Workers& workers) {
+  const std::size_t row = std::max<std::size_t>(1, DivideUp(terms, std::max<std::size_t>(1, rows)));
+  return std::max<std::size_t>(1, GrainFor(terms, kGrain, workers) / row);
+}
+
 template <class T, class Run>
 void ForRows(const AxisMapProblem<T>& p, const Workers& workers, const Run& run) {
-  const auto terms = static_cast<std::size_t>(p.begin[p.out]);
-  const std::size_t row =
-      std::max<std::size_t>(1, p.inner * DivideUp(terms, std::max<std::size_t>(1, p.out)));
-  const std::size_t rows =
-      std::max<std::size_t>(1, GrainFor(p.outer * p.out * row, kGrain, workers) / row);
-  workers.ForRanges(p.outer * p.out, rows,
+  const std::size_t rows = p.outer * p.map.out;
+  const auto terms = p.outer * p.inner * static_cast<std::size_t>(p.map.begin[p.map.out]);
+  workers.ForRanges(rows, RowsPerTask(rows, terms, workers),
                     [&](std::size_t begin, std::size_t end, std::size_t) { run(begin, end); });
 }
-
-}  // namespace
-
-void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers) {
-  ForRows(problem, workers, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(AxisMapRange)(problem, begin, end);
-  });
-}
-
-void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers) {
-  ForRows(problem, workers,
-          [&](std::size_t begin, std::size_t end) { AxisMapRef(problem, begin, end); });
-}
-
-namespace {
 
 // Fewer copies are not worth a run of their own.
 constexpr std::size_t kLeastCopies = 8;
@@ -58,12 +47,11 @@ std::size_t TermsOf(const SparseRows<float>& columns, std::size_t j) {
 
 // The end of the columns from j on that copy neighbours, as far as `limit`.
 std::size_t CopiesEnd(const SparseRows<float>& columns, std::size_t j, std::size_t limit) {
-  const std::int32_t source =
-      columns.begin[j] < columns.begin[columns.out] ? columns.index[columns.begin[j]] : 0;
+  const std::int32_t* const first = columns.index + columns.begin[j];
   std::size_t end = j;
   for (; end < limit && TermsOf(columns, end) == 1; ++end) {
     const std::int32_t t = columns.begin[end];
-    if (columns.weight[t] != 1.0f || columns.index[t] != source + static_cast<int>(end - j)) break;
+    if (columns.weight[t] != 1.0f || columns.index[t] != *first + static_cast<int>(end - j)) break;
   }
   return end;
 }
@@ -91,12 +79,32 @@ ColumnRuns FindRuns(const SparseRows<float>& columns) {
 // Calls run(first, last, worker) over all rows of y.
 template <class T, class Run>
 void ForImageRows(const ImageMapProblem<T>& p, const Workers& workers, const Run& run) {
-  const std::size_t rows = p.outer * p.rows.out, width = std::max<std::size_t>(1, p.columns.out);
-  const std::size_t elements = GrainFor(rows * width, kGrain, workers);
-  workers.ForRanges(rows, std::max<std::size_t>(1, elements / width), run);
+  const std::size_t rows = p.outer * p.rows.out;
+  workers.ForRanges(rows, RowsPerTask(rows, rows * p.columns.out, workers), run);
 }
 
 }  // namespace
+
+void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers) {
+  if (problem.inner > 1) {
+    ForRows(problem, workers, [&](std::size_t begin, std::size_t end) {
+      HWY_DYNAMIC_DISPATCH(AxisMapRange)(problem, begin, end);
+    });
+    return;
+  }
+  const ColumnRuns runs = FindRuns(problem.map);
+  workers.ForRanges(problem.outer,
+                    RowsPerTask(problem.outer, problem.outer * problem.map.out, workers),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      HWY_DYNAMIC_DISPATCH(LastAxisRange)
+                      (problem, {runs.data(), runs.size()}, begin, end);
+                    });
+}
+
+void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers) {
+  ForRows(problem, workers,
+          [&](std::size_t begin, std::size_t end) { AxisMapRef(problem, begin, end); });
+}
 
 void MapImage(const ImageMapProblem<float>& problem, const KernelContext& context) {
   const std::size_t pitch = RoundUp(problem.columns.in, kAlignment);

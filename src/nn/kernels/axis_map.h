@@ -11,29 +11,27 @@
 
 namespace tilegrad::nn {
 
-//   y[o, i, k] = sum_t weight[t] x[o, index[t], k],   begin[i] <= t < begin[i + 1]
-// x [outer, in, inner], y [outer, out, inner]; sums run in the order of t.
+// A sparse matrix [out, in]: row i has the terms t with begin[i] <= t < begin[i + 1].
 template <class T>
-struct AxisMapProblem {
-  std::size_t outer = 1, in = 1, out = 1, inner = 1;
+struct SparseRows {
+  std::size_t in = 1, out = 1;
   const std::int32_t* begin = nullptr;  // [out + 1], not decreasing
   const std::int32_t* index = nullptr;  // [begin[out]], each in [0, in)
   const T* weight = nullptr;            // [begin[out]]
+};
+
+//   y[o, i, k] = sum_t weight[t] x[o, index[t], k]
+// x [outer, in, inner], y [outer, out, inner]; sums run in the order of t.
+template <class T>
+struct AxisMapProblem {
+  std::size_t outer = 1, inner = 1;
+  SparseRows<T> map;
   const T* x = nullptr;
   T* y = nullptr;
 };
 
 void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers);
 void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers);  // scalar
-
-// A sparse matrix [out, in]: begin, index and weight as above.
-template <class T>
-struct SparseRows {
-  std::size_t in = 1, out = 1;
-  const std::int32_t* begin = nullptr;
-  const std::int32_t* index = nullptr;
-  const T* weight = nullptr;
-};
 
 // The last two axes at once: y[o] = rows x[o] columns^T. x [outer, rows.in, columns.in], y [outer,
 // rows.out, columns.out]; combines rows first.

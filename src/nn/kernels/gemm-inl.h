@@ -201,13 +201,12 @@ struct GemmItems {
 };
 
 constexpr std::size_t kLeastRows = 128;  // of an item, or packing B would dominate
-constexpr std::size_t kFewItemWorkers = 4;
 
 // The fewest columns of an item. Each item streams all rows of A: if these are few and B is read
 // row by row, as many columns as a block has, provided every worker gets some. Many workers take
 // narrow items rather than none: a layer of 384 outputs has three wide ones.
 inline std::size_t LeastColumns(const GemmProblem<float>& p, std::size_t workers) {
-  const std::size_t least = (workers > kFewItemWorkers ? 1 : 4) * kTileColumns;
+  const std::size_t least = (workers > kFewWorkers ? 1 : 4) * kTileColumns;
   if (p.transpose_b || p.m > kLeastRows) return least;
   return std::max(least, std::min(kBlockPanels * kTileColumns, p.n / workers));
 }

@@ -49,6 +49,12 @@ const AxisMap& TransposedOnce(Context& context, const AxisMap& map) {
   return *map.transposed;
 }
 
+template <class T>
+SparseRows<T> RowsOf(const AxisMap& map) {
+  return {static_cast<std::size_t>(map.in), static_cast<std::size_t>(map.out),
+          map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(), map.weight.data<T>()};
+}
+
 }  // namespace
 
 AxisMap MakeAxisMap(const Var& like, const AxisExtents& extents,
@@ -83,26 +89,15 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
   Tensor y = x.context().Empty(shape, x.dtype());
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
   WithFloatType(x.dtype(), [&]<class T>(T) {
-    MapAxis(AxisMapProblem<T>{size(shape.Product(0, axis)), size(map.in), size(map.out),
-                              size(shape.Product(axis + 1, shape.rank())),
-                              map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(),
-                              map.weight.data<T>(), x.value().data<T>(), y.data<T>()},
-            x.context().workers());
+    MapAxis(
+        AxisMapProblem<T>{size(shape.Product(0, axis)), size(shape.Product(axis + 1, shape.rank())),
+                          RowsOf<T>(map), x.value().data<T>(), y.data<T>()},
+        x.context().workers());
   });
   return Record({"map axis"}, std::move(y), {x}, [axis, map](const Adjoint& adj) {
     return Vars{MapAxis(adj.dy(), axis, TransposedOnce(adj.dy().context(), map))};
   });
 }
-
-namespace {
-
-template <class T>
-SparseRows<T> RowsOf(const AxisMap& map) {
-  return {static_cast<std::size_t>(map.in), static_cast<std::size_t>(map.out),
-          map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(), map.weight.data<T>()};
-}
-
-}  // namespace
 
 Var MapImage(const Var& x, const AxisMap& rows, const AxisMap& columns) {
   if (!Usable("map image", {&x})) return Invalid({&x});

@@ -23,7 +23,7 @@ nn::Var Twice(const nn::Var& x) {
 // A frame of one pixel. Left and right of half a map is its mirror image, whose next column has the
 // colours of the edge; above and below the poles, what lies at them.
 nn::Var FrameOfHalf(const nn::Var& map) {
-  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kReplicate});
+  return nn::PadImage(map, nn::Padding::All(1), nn::PadMode::kReplicate);
 }
 
 // Left and right edge of a whole map are neighbours.

@@ -9,12 +9,17 @@
 namespace tilegrad::nn::axis_map_test {
 
 template <class T>
-std::vector<T> Reference(AxisMapProblem<float> like, const std::vector<T>& x,
+SparseRows<T> Weighted(const SparseRows<float>& like, const std::vector<T>& weight) {
+  return {like.in, like.out, like.begin, like.index, weight.data()};
+}
+
+template <class T>
+std::vector<T> Reference(const AxisMapProblem<float>& like, const std::vector<T>& x,
                          const std::vector<T>& weight) {
-  std::vector<T> y(like.outer * like.out * like.inner);
-  AxisMapRef(AxisMapProblem<T>{like.outer, like.in, like.out, like.inner, like.begin, like.index,
-                               weight.data(), x.data(), y.data()},
-             0, like.outer * like.out);
+  std::vector<T> y(like.outer * like.map.out * like.inner);
+  AxisMapRef(
+      AxisMapProblem<T>{like.outer, like.inner, Weighted(like.map, weight), x.data(), y.data()}, 0,
+      like.outer * like.map.out);
   return y;
 }
 
@@ -27,7 +32,7 @@ TEST(AxisMap, EqualsReference) {
     const auto x = RandomFloats(rng, outer * 5 * inner), weight = RandomFloats(rng, index.size());
     std::vector<float> y(outer * 4 * inner);
     const AxisMapProblem<float> problem{
-        outer, 5, 4, inner, begin.data(), index.data(), weight.data(), x.data(), y.data()};
+        outer, inner, {5, 4, begin.data(), index.data(), weight.data()}, x.data(), y.data()};
     const auto want = Reference(problem, AsDoubles(x), AsDoubles(weight));
     const auto magnitude = Reference(problem, Magnitudes(x), Magnitudes(weight));
     for (const std::string target : EveryTarget()) {
@@ -51,7 +56,7 @@ TEST(AxisMap, OneTermEachAlongTheLastAxis) {
   const auto x = RandomFloats(rng, outer * 2), weight = RandomFloats(rng, 3);
   std::vector<float> y(outer * 3);
   const AxisMapProblem<float> problem{
-      outer, 2, 3, 1, begin.data(), index.data(), weight.data(), x.data(), y.data()};
+      outer, 1, {2, 3, begin.data(), index.data(), weight.data()}, x.data(), y.data()};
   const std::vector<float> want = Reference(problem, x, weight);
   for (const std::string target : EveryTarget()) {
     for (const int workers : {1, 7}) {
@@ -66,11 +71,8 @@ template <class T>
 std::vector<T> ImageReference(const ImageMapProblem<float>& like, const std::vector<T>& x,
                               const std::vector<T>& rows, const std::vector<T>& columns) {
   std::vector<T> y(like.outer * like.rows.out * like.columns.out), combined(like.columns.in);
-  const auto matrix = [](const SparseRows<float>& of, const std::vector<T>& weight) {
-    return SparseRows<T>{of.in, of.out, of.begin, of.index, weight.data()};
-  };
-  const ImageMapProblem<T> problem{like.outer, matrix(like.rows, rows),
-                                   matrix(like.columns, columns), x.data(), y.data()};
+  const ImageMapProblem<T> problem{like.outer, Weighted(like.rows, rows),
+                                   Weighted(like.columns, columns), x.data(), y.data()};
   for (std::size_t row = 0; row < like.outer * like.rows.out; ++row)
     ImageMapRowRef(problem, row, combined.data());
   return y;
