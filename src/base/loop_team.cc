@@ -83,11 +83,15 @@ void LoopTeam::For(std::size_t n, Task task) {
   }
   const std::lock_guard lock(outermost_);
   const Entering entering(this, 0);
-  Run(&loops_.front(), n, task, 0);
+  if (n > 1) {
+    Run(&loops_.front(), n, task, 0);
+  } else if (n == 1) {
+    task(0, 0);
+  }
 }
 
 void LoopTeam::RunNested(std::size_t n, Task task, std::size_t worker) {
-  for (std::size_t i = 1; i < loops_.size(); ++i) {
+  for (std::size_t i = 1; i < loops_.size() && n > 1; ++i) {
     OpenLoop& loop = loops_[i];
     if (loop.taken.load(std::memory_order_relaxed) || loop.taken.exchange(true)) continue;
     struct Leaving {

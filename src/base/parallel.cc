@@ -233,7 +233,7 @@ void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> tas
                   LoopSite site) const {
   if (trace_ != nullptr) {
     trace_->Run(n, task, site);
-  } else if (count_ == 1 || n <= 1) {
+  } else if (count_ == 1) {
     for (std::size_t i = 0; i < n; ++i) task(i, 0);
   } else if (LoopTeam* const team = Team(); team != nullptr) {
     team->For(n, task);

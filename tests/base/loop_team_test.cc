@@ -37,13 +37,33 @@ TEST(LoopTeam, NestedLoopsGiveTheSameForAnyNumberOfWorkers) {
   }
 }
 
+// The worker's scratch is in use by its task, so a loop of one index within must not get another's.
+TEST(LoopTeam, LoopsOfOneIndexKeepTheWorkerTheyAreOn) {
+  for (const int count : {2, 3, 16}) {
+    const Workers workers(count);
+    std::atomic<int> there = 0, other = 0;
+    workers.ForParts(2, [&](std::size_t, const Workers::Part& part) {
+      ++there;
+      const auto end = std::chrono::steady_clock::now() + 10s;
+      while (there < 2 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+      const auto compare = [&](std::size_t, std::size_t worker) {
+        if (worker != part.worker()) ++other;
+      };
+      part.For(1, compare);
+      workers.For(1, compare);
+    });
+    EXPECT_EQ(there, 2);
+    EXPECT_EQ(other, 0) << count << " workers";
+  }
+}
+
 TEST(LoopTeam, LoopsOfSeveralCallersRunOneAfterTheOther) {
   const Workers workers(3);
   std::vector<std::atomic<int>> busy(3);
   std::atomic<int> overlaps = 0, tasks = 0;
   const auto call = [&] {
     for (int round = 0; round < 50; ++round) {
-      workers.For(7, [&](std::size_t, std::size_t worker) {
+      workers.For(round % 2 == 0 ? 7 : 1, [&](std::size_t, std::size_t worker) {
         if (busy[worker]++ != 0) ++overlaps;
         ++tasks;
         --busy[worker];
@@ -54,7 +74,7 @@ TEST(LoopTeam, LoopsOfSeveralCallersRunOneAfterTheOther) {
   call();
   first.join();
   second.join();
-  EXPECT_EQ(tasks, 3 * 50 * 7);
+  EXPECT_EQ(tasks, 3 * 25 * (7 + 1));
   EXPECT_EQ(overlaps, 0);
 }
 
