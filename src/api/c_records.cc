@@ -29,9 +29,6 @@ std::size_t SurfacesOf(const Scene& scene) {
 constexpr auto kCopy = [](const char*, std::span<const float> from, std::span<float> to) {
   std::copy(from.begin(), from.end(), to.begin());
 };
-constexpr auto kAdd = [](const char*, std::span<const float> from, std::span<float> to) {
-  for (std::size_t i = 0; i < from.size(); ++i) to[i] += from[i];
-};
 
 template <class To, class From>
 To CopyCamera(const From& from) {
@@ -206,12 +203,12 @@ void CGradients::Clear(const tilegrad_scene_gradients& to, const Scene& scene) {
 }
 
 void CGradients::AddTo(const tilegrad_scene_gradients& to) const {
-  if (to.camera != nullptr) ForEachCameraPart(kAdd, camera, *to.camera);
+  if (to.camera != nullptr) ForEachCameraPart(kAddPart, camera, *to.camera);
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    ForEachSurfacePart(kAdd, surfaces[i], to.surfaces[i]);
+    ForEachSurfacePart(kAddPart, surfaces[i], to.surfaces[i]);
   }
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    ForEachLightPart(kAdd, lights[i], to.lights[i]);
+    ForEachLightPart(kAddPart, lights[i], to.lights[i]);
   }
 }
 

@@ -193,14 +193,13 @@ struct OwnedCotangents {
   }
   template <class U>
   OwnedCotangents<U> Cast() const {
-    const auto cast = [](const std::vector<T>& v) { return std::vector<U>(v.begin(), v.end()); };
     OwnedCotangents<U> out;
-    out.color = cast(color);
-    out.alpha = cast(alpha);
-    out.normals = cast(normals);
-    out.uv = cast(uv);
-    out.depth = cast(depth);
-    out.attributes = cast(attributes);
+    ForEachImage(
+        0,
+        [](const char*, int, const std::vector<T>& from, std::vector<U>& to) {
+          to.assign(from.begin(), from.end());
+        },
+        *this, out);
     return out;
   }
   FrameGradientsT<T> View() const { return {color, alpha, attributes, normals, uv, depth}; }

@@ -29,10 +29,6 @@ Status OverflowOf(std::size_t scene, const std::string& name, std::span<const T>
       .Within(SceneName(scene) + ": the gradient overflows");
 }
 
-constexpr auto kAddPart = [](const char*, auto from, auto to) {
-  for (std::size_t i = 0; i < to.size(); ++i) to[i] += from[i];
-};
-
 }  // namespace
 
 template <class T>

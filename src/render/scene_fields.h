@@ -118,6 +118,11 @@ void ForEachLightPart(const Visit& visit, Lights&... light) {
   visit("intensity", std::span(&light.intensity, 1)...);
 }
 
+// For such parts of two records: adds the first to the second.
+inline constexpr auto kAddPart = [](const char*, auto from, auto to) {
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] += from[i];
+};
+
 // Calls visit(parts of a record as above) for all records of the gradients.
 template <class T, class Visit>
 void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {

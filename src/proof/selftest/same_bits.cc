@@ -54,14 +54,10 @@ std::vector<float> BitsOf(const Images& frame, std::size_t n, std::size_t count,
 
 OwnedCotangents<float> Repeated(const OwnedCotangents<float>& one, std::size_t count) {
   OwnedCotangents<float> out;
-  const auto repeat = [&](const std::vector<float>& from, std::vector<float>* to) {
-    for (std::size_t n = 0; n < count; ++n) to->insert(to->end(), from.begin(), from.end());
+  const auto repeat = [&](const char*, int, const auto& from, auto& to) {
+    for (std::size_t n = 0; n < count; ++n) to.insert(to.end(), from.begin(), from.end());
   };
-  repeat(one.color, &out.color);
-  repeat(one.alpha, &out.alpha);
-  repeat(one.depth, &out.depth);
-  repeat(one.normals, &out.normals);
-  repeat(one.uv, &out.uv);
+  ForEachImage(0, repeat, one, out);
   return out;
 }
 

@@ -21,49 +21,43 @@ class AllFacesAlpha final : public AlphaStage {
 
   AlphaNeeds needs() const override { return {.soft_tree = true, .transmittance = true}; }
   const char* name() const override { return "equation 6"; }
-  void Begin(const RenderOptions& options, std::size_t images) override;
-  void Prepare(std::size_t n, const ImageScratch& image) override;
-  double Forward(const AlphaBin& bin, const AlphaImages& out) override;
-  void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) override;
-  raster::SoftWork work() const override;
+  void Begin(const RenderOptions& options, std::size_t images) override {
+    options_ = &options;
+    if (plans_.size() < images) plans_.resize(images);
+    for (raster::SoftMaskScratch& scratch : scratch_) scratch.work = {};
+  }
+
+  void Prepare(std::size_t n, const ImageScratch& image) override {
+    plans_[n] = raster::PlanSoftMask({options_->width, options_->height, options_->delta,
+                                      options_->max_alpha_error, image.soft.faces});
+  }
+
+  double Forward(const AlphaBin& bin, const AlphaImages& out) override {
+    return raster::SoftMaskForward(bin.image.soft, plans_[bin.task.image],
+                                   {bin.task.rect, out.face_ids}, {out.alpha, out.transmittance},
+                                   &scratch_[bin.worker]);
+  }
+
+  void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) override {
+    raster::SoftMaskBackward(
+        bin.image.soft, plans_[bin.task.image], {bin.task.rect, adjoint.face_ids},
+        {adjoint.alpha, adjoint.transmittance, adjoint.d_alpha}, out, &scratch_[bin.worker]);
+  }
+
+  raster::SoftWork work() const override {
+    raster::SoftWork sum;
+    for (const raster::SoftMaskScratch& scratch : scratch_) {
+      sum.pairs += scratch.work.pairs;
+      sum.powers += scratch.work.powers;
+    }
+    return sum;
+  }
 
  private:
   const RenderOptions* options_ = nullptr;
   std::vector<raster::SoftMaskPlan> plans_;       // of images
   std::vector<raster::SoftMaskScratch> scratch_;  // of workers
 };
-
-void AllFacesAlpha::Begin(const RenderOptions& options, std::size_t images) {
-  options_ = &options;
-  if (plans_.size() < images) plans_.resize(images);
-  for (raster::SoftMaskScratch& scratch : scratch_) scratch.work = {};
-}
-
-void AllFacesAlpha::Prepare(std::size_t n, const ImageScratch& image) {
-  plans_[n] = raster::PlanSoftMask({options_->width, options_->height, options_->delta,
-                                    options_->max_alpha_error, image.soft.faces});
-}
-
-double AllFacesAlpha::Forward(const AlphaBin& bin, const AlphaImages& out) {
-  return raster::SoftMaskForward(bin.image.soft, plans_[bin.task.image],
-                                 {bin.task.rect, out.face_ids}, {out.alpha, out.transmittance},
-                                 &scratch_[bin.worker]);
-}
-
-void AllFacesAlpha::Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) {
-  raster::SoftMaskBackward(
-      bin.image.soft, plans_[bin.task.image], {bin.task.rect, adjoint.face_ids},
-      {adjoint.alpha, adjoint.transmittance, adjoint.d_alpha}, out, &scratch_[bin.worker]);
-}
-
-raster::SoftWork AllFacesAlpha::work() const {
-  raster::SoftWork sum;
-  for (const raster::SoftMaskScratch& scratch : scratch_) {
-    sum.pairs += scratch.work.pairs;
-    sum.powers += scratch.work.powers;
-  }
-  return sum;
-}
 
 }  // namespace
 
@@ -96,27 +90,67 @@ struct VertexSums {
   }
 };
 
-// Adds b to a, entry by entry.
-void AddCamera(const Camera& b, Camera* a) {
-  for (int i = 0; i < 9; ++i) a->rotation[i] += b.rotation[i];
-  for (int i = 0; i < 3; ++i) a->translation[i] += b.translation[i];
-  a->fx += b.fx;
-  a->fy += b.fy;
-  a->cx += b.cx;
-  a->cy += b.cy;
-}
-
 // Sums its own gradients, tile by tile of the image.
 class PaperAlpha final : public AlphaStage {
  public:
   AlphaNeeds needs() const override { return {.bounded = false, .own_sums = true}; }
   const char* name() const override { return "the paper's truncated rule"; }
-  void Begin(const RenderOptions& options, std::size_t images) override;
-  void Prepare(std::size_t n, const ImageScratch& image) override;
-  double Forward(const AlphaBin& bin, const AlphaImages& out) override;
-  void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) override;
-  void AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& image,
-                  PipelineGradients* d_scene) const override;
+  void Begin(const RenderOptions& options, std::size_t images) override {
+    options_ = &options;
+    if (images_.size() < images) images_.resize(images);
+    const std::size_t bins = raster::BinGrid(options.width, options.height).cells();
+    for (std::size_t n = 0; n < images; ++n) images_[n].bins.resize(bins);
+  }
+
+  void Prepare(std::size_t n, const ImageScratch& image) override {
+    Image* const out = &images_[n];
+    out->ids.clear();
+    out->faces.clear();
+    for (std::size_t f = 0; f < image.mesh.faces(); ++f) {
+      if ((image.mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
+      out->ids.push_back(static_cast<std::int32_t>(f));
+      out->faces.push_back(NdcFaceOf(image.mesh, f));
+    }
+  }
+
+  double Forward(const AlphaBin& bin, const AlphaImages& out) override {
+    PaperForward<float>(images_[bin.task.image].faces, PaperRuleOf(*options_),
+                        RegionOf(bin, out.face_ids), out.alpha.data());
+    return 0;
+  }
+
+  void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients*) override {
+    Image* const image = &images_[bin.task.image];
+    image->bins[bin.task.bin] =
+        PaperBackward<float>(image->faces, PaperRuleOf(*options_), RegionOf(bin, adjoint.face_ids),
+                             adjoint.d_alpha.data());
+  }
+
+  void AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& scratch,
+                  PipelineGradients* d_scene) const override {
+    const Image& image = images_[n];
+    const raster::ScreenMesh& mesh = scratch.mesh;
+    const raster::SquareGrid tiles = raster::TileGrid(mesh.width, mesh.height);
+    const raster::SquareGrid bins = raster::BinGrid(mesh.width, mesh.height);
+    VertexSums sums(mesh.vertices());
+    std::vector<std::size_t> next(bins.cells());  // tile of each bin
+    for (std::size_t tile = 0; tile < tiles.cells(); ++tile) {
+      const raster::PixelRect rect = tiles.rect(tile);
+      const std::size_t bin = bins.cell(rect.x0, rect.y0);
+      sums.Add(mesh, image.ids, image.bins[bin][next[bin]++]);
+    }
+    std::vector<float> d_z(mesh.vertices()), d_clip_t(mesh.clipped.size());
+    std::vector<float> d_positions(scene.mesh->positions.size());
+    std::vector<raster::CameraPoint<float>> points(scene.mesh->positions.size() / 3, {0, 0, 0});
+    Camera d_camera = raster::ZeroCamera<float>();
+    raster::ProjectRefBackward<float>(FaceSourceOf(*scene.mesh, *options_), mesh,
+                                      {sums.x, sums.y, d_z, d_clip_t}, points, d_positions,
+                                      &d_camera);
+    for (std::size_t i = 0; i < d_scene->positions.size(); ++i) {
+      d_scene->positions[i] += d_positions[i];
+    }
+    if (d_scene->camera) ForEachCameraPart(kAddPart, d_camera, d_scene->d_camera);
+  }
 
  private:
   // The faces that take part, in order, and the gradients of those near the tiles of a bin.
@@ -126,73 +160,13 @@ class PaperAlpha final : public AlphaStage {
     std::vector<std::vector<NearFacesT<float>>> bins;
   };
 
-  PaperRegion RegionOf(const AlphaBin& bin, std::span<const std::int32_t> face_ids) const;
+  PaperRegion RegionOf(const AlphaBin& bin, std::span<const std::int32_t> face_ids) const {
+    return {bin.task.rect, options_->width, options_->height, face_ids.data()};
+  }
 
   const RenderOptions* options_ = nullptr;
   std::vector<Image> images_;
 };
-
-void PaperAlpha::Begin(const RenderOptions& options, std::size_t images) {
-  options_ = &options;
-  if (images_.size() < images) images_.resize(images);
-  const std::size_t bins = raster::BinGrid(options.width, options.height).cells();
-  for (std::size_t n = 0; n < images; ++n) images_[n].bins.resize(bins);
-}
-
-void PaperAlpha::Prepare(std::size_t n, const ImageScratch& image) {
-  Image* const out = &images_[n];
-  out->ids.clear();
-  out->faces.clear();
-  for (std::size_t f = 0; f < image.mesh.faces(); ++f) {
-    if ((image.mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
-    out->ids.push_back(static_cast<std::int32_t>(f));
-    out->faces.push_back(NdcFaceOf(image.mesh, f));
-  }
-}
-
-PaperRegion PaperAlpha::RegionOf(const AlphaBin& bin,
-                                 std::span<const std::int32_t> face_ids) const {
-  return {bin.task.rect, options_->width, options_->height, face_ids.data()};
-}
-
-double PaperAlpha::Forward(const AlphaBin& bin, const AlphaImages& out) {
-  PaperForward<float>(images_[bin.task.image].faces, PaperRuleOf(*options_),
-                      RegionOf(bin, out.face_ids), out.alpha.data());
-  return 0;
-}
-
-void PaperAlpha::Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients*) {
-  Image* const image = &images_[bin.task.image];
-  image->bins[bin.task.bin] =
-      PaperBackward<float>(image->faces, PaperRuleOf(*options_), RegionOf(bin, adjoint.face_ids),
-                           adjoint.d_alpha.data());
-}
-
-void PaperAlpha::AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& scratch,
-                            PipelineGradients* d_scene) const {
-  const Image& image = images_[n];
-  const raster::ScreenMesh& mesh = scratch.mesh;
-  const raster::SquareGrid tiles = raster::TileGrid(mesh.width, mesh.height);
-  const raster::SquareGrid bins = raster::BinGrid(mesh.width, mesh.height);
-  VertexSums sums(mesh.vertices());
-  std::vector<std::size_t> next(bins.cells());  // tile of each bin
-  for (std::size_t tile = 0; tile < tiles.cells(); ++tile) {
-    const raster::PixelRect rect = tiles.rect(tile);
-    const std::size_t bin = bins.cell(rect.x0, rect.y0);
-    sums.Add(mesh, image.ids, image.bins[bin][next[bin]++]);
-  }
-  std::vector<float> d_z(mesh.vertices()), d_clip_t(mesh.clipped.size());
-  std::vector<float> d_positions(scene.mesh->positions.size());
-  std::vector<raster::CameraPoint<float>> points(scene.mesh->positions.size() / 3, {0, 0, 0});
-  Camera d_camera = raster::ZeroCamera<float>();
-  raster::ProjectRefBackward<float>(FaceSourceOf(*scene.mesh, *options_), mesh,
-                                    {sums.x, sums.y, d_z, d_clip_t}, points, d_positions,
-                                    &d_camera);
-  for (std::size_t i = 0; i < d_scene->positions.size(); ++i) {
-    d_scene->positions[i] += d_positions[i];
-  }
-  if (d_scene->camera) AddCamera(d_camera, &d_scene->d_camera);
-}
 
 }  // namespace
 

@@ -58,25 +58,175 @@ struct Pipeline::Impl {
     for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
   }
 
-  void Render(const ForwardCall& call);
-  bool Backward(const BackwardCall& call);
+  void Render(const ForwardCall& call) {
+    const std::size_t count = call.scenes.size();
+    const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
+    Begin(call.scenes, call.options, call.request.alpha);
+    bin_errors.assign(count * bins.cells(), 0.0);
+    if (bins.cells() == 1) {
+      workers->For(count, [&](std::size_t n, std::size_t worker) {
+        RenderWholeImage(call, n, &worker_scratch[worker]);
+      });
+    } else {
+      workers->ForParts(
+          count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
+    }
+    double* const bound = &call.frame->alpha_error_bound;
+    for (const double error : bin_errors) *bound = std::max(*bound, error);
+    if (alpha != nullptr && !alpha->needs().bounded)
+      *bound = std::numeric_limits<double>::infinity();
+  }
+
+  bool Backward(const BackwardCall& call) {
+    Begin(call.scenes, call.input.options, call.request.alpha);
+    const std::size_t count = call.scenes.size();
+    if (call.grid.cells() == 1 && call.bands == 1) {
+      workers->For(count, [&](std::size_t n, std::size_t worker) {
+        BackwardWholeImage(call, n, &worker_scratch[worker]);
+      });
+    } else {
+      if (band_gradients.size() < count * call.bands) band_gradients.resize(count * call.bands);
+      if (bin_gradients.size() < count * call.bins) bin_gradients.resize(count * call.bins);
+      workers->ForParts(
+          count, [&](std::size_t n, const Workers::Part& part) { BackwardImage(call, n, part); });
+    }
+    return sound;
+  }
 
   void Prepare(const PipelineScene& scene, const RenderOptions& options,
-               const PrepareRequest& request, std::size_t n, WorkerScratch* worker);
-  void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
-  void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
-  void RenderOneBin(const ForwardCall& call, const BinTask& bin, WorkerScratch* worker);
+               const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
+    StageClock clock;
+    PrepareImage({n, scene, topologies.of(n)}, options, request, *workers, &images[n],
+                 &worker->stats);
+    clock.Lap(&worker->times.prepare);
+  }
 
-  void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
-  void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  // The list of drawn faces, the largest array of all, is the worker's, not the image's.
+  void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker) {
+    ImageScratch& image = images[n];
+    std::swap(image.drawn_faces, worker->drawn_faces);
+    std::swap(image.drawn_buffers, worker->drawn_buffers);
+    Prepare(call.scenes[n], call.options, call.request, n, worker);
+    RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
+    image.prepared.drawn_bins = false;
+    std::swap(image.drawn_faces, worker->drawn_faces);
+    std::swap(image.drawn_buffers, worker->drawn_buffers);
+  }
+
+  void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part) {
+    Prepare(call.scenes[n], call.options, call.request, n, &worker_scratch[part.worker()]);
+    const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
+    part.For(bins.cells(), [&](std::size_t bin, std::size_t worker) {
+      RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
+    });
+  }
+
+  void RenderOneBin(const ForwardCall& call, const BinTask& bin, WorkerScratch* worker) {
+    const std::size_t bins = bin_errors.size() / call.scenes.size();
+    bin_errors[bin.image * bins + bin.bin] =
+        RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.attributes.image,
+                   call.attributes.stage, call.request.alpha},
+                  bin, worker, call.frame);
+  }
+
+  void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker) {
+    ImageScratch& image = images[n];
+    const PipelineScene& scene = call.scenes[n];
+    Prepare(scene, call.input.options, call.request, n, worker);
+    PrepareRecomputed(scene, &image);
+    BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
+    if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
+    const ImageGradients gradients{{&worker->band_gradients, 1},
+                                   {&worker->bin_gradients, call.summed_bins()},
+                                   call.request_of(n, image.mesh)};
+    PipelineGradients* d_scene = &call.d_scenes[n];
+    AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
+    StageClock clock;
+    if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
+    Require(
+        MergeGeometry(scene, call.input.options, image, gradients, *d_vertices, worker, d_scene));
+    Require(MergeAttributes(image, gradients, worker, d_scene));
+    MergeOwnSums(call, n);
+    clock.Lap(&worker->times.merge);
+  }
+
+  // Bands and bins together.
+  void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+    WorkerScratch* const own = &worker_scratch[part.worker()];
+    Prepare(call.scenes[n], call.input.options, call.request, n, own);
+    PrepareRecomputed(call.scenes[n], &images[n]);
+    BandGradients* const bands = &band_gradients[n * call.bands];
+    BinGradients* const bins = bin_gradients.data() + n * call.bins;
+    part.For(call.bands + call.bins, [&](std::size_t i, std::size_t worker) {
+      if (i < call.bands) {
+        BackwardBand(call, {n, i}, &worker_scratch[worker], &bands[i]);
+      } else {
+        const std::size_t bin = i - call.bands;
+        BackwardBin(call, n, bin, &worker_scratch[worker], &bins[bin]);
+      }
+    });
+    if (sound) Merge(call, n, part);
+  }
+
+  // Three independent sums that can run in parallel, for batches of one: the longest first.
   void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
-                PipelineGradients* d_scene);
-  void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
-  void MergeOwnSums(const BackwardCall& call, std::size_t n);
+                PipelineGradients* d_scene) {
+    ImageScratch& image = images[n];
+    const bool geometry = gradients.request.geometry;
+    part.For(3, [&](std::size_t i, std::size_t w) {
+      StageClock clock;
+      if (i == 0 && geometry && !gradients.bins.empty()) {
+        SumGeometry(image, {{}, gradients.bins, gradients.request}, &image.d_bin_vertices);
+      } else if (i == 1 && geometry) {
+        SumGeometry(image, {gradients.bands, {}, gradients.request}, &image.d_band_vertices);
+      } else if (i == 2) {
+        Require(MergeAttributes(image, gradients, &worker_scratch[w], d_scene));
+      }
+      clock.Lap(&worker_scratch[w].times.merge);
+    });
+  }
+
+  void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+    ImageScratch& image = images[n];
+    WorkerScratch* const worker = &worker_scratch[part.worker()];
+    PipelineGradients* const d_scene = &call.d_scenes[n];
+    const ImageGradients gradients{
+        std::span(band_gradients).subspan(n * call.bands, call.bands),
+        std::span(bin_gradients).subspan(n * call.bins, call.summed_bins()),
+        call.request_of(n, image.mesh)};
+    SumParts(gradients, n, part, d_scene);
+    StageClock clock;
+    if (gradients.request.geometry && !gradients.bins.empty()) {
+      std::transform(image.d_band_vertices.begin(), image.d_band_vertices.end(),
+                     image.d_bin_vertices.begin(), image.d_band_vertices.begin(), std::plus());
+    }
+    Require(MergeGeometry(call.scenes[n], call.input.options, image, gradients,
+                          image.d_band_vertices, worker, d_scene));
+    MergeOwnSums(call, n);
+    clock.Lap(&worker->times.merge);
+  }
+
+  // For a rule that does not pass its sums to MergeGeometry.
+  void MergeOwnSums(const BackwardCall& call, std::size_t n) {
+    if (call.bins == call.summed_bins() || !call.wants_geometry(n)) return;
+    alpha->AddToScene(call.scenes[n], n, images[n], &call.d_scenes[n]);
+    Require(IsFiniteGeometry(call.d_scenes[n]));
+  }
+
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
-                    BandGradients* out);
+                    BandGradients* out) {
+    const ImageScratch& image = images[task.image];
+    Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
+                               worker, out));
+  }
+
   void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
-                   BinGradients* out);
+                   BinGradients* out) {
+    if (!call.wants_geometry(n)) return;
+    StageClock clock;
+    RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, worker, out);
+    clock.Lap(&worker->times.alpha);
+  }
 
   void Begin(std::span<const PipelineScene> scenes, const RenderOptions& options,
              AlphaStage* rule) {
@@ -109,179 +259,6 @@ struct Pipeline::Impl {
   std::vector<BandGradients> band_gradients;  // [image][band]
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
-
-void Pipeline::Impl::Prepare(const PipelineScene& scene, const RenderOptions& options,
-                             const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
-  StageClock clock;
-  PrepareImage({n, scene, topologies.of(n)}, options, request, *workers, &images[n],
-               &worker->stats);
-  clock.Lap(&worker->times.prepare);
-}
-
-void Pipeline::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
-                                  WorkerScratch* worker) {
-  const std::size_t bins = bin_errors.size() / call.scenes.size();
-  bin_errors[bin.image * bins + bin.bin] =
-      RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.attributes.image,
-                 call.attributes.stage, call.request.alpha},
-                bin, worker, call.frame);
-}
-
-// The list of drawn faces, the largest array of all, is the worker's, not the image's.
-void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
-                                      WorkerScratch* worker) {
-  ImageScratch& image = images[n];
-  std::swap(image.drawn_faces, worker->drawn_faces);
-  std::swap(image.drawn_buffers, worker->drawn_buffers);
-  Prepare(call.scenes[n], call.options, call.request, n, worker);
-  RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
-  image.prepared.drawn_bins = false;
-  std::swap(image.drawn_faces, worker->drawn_faces);
-  std::swap(image.drawn_buffers, worker->drawn_buffers);
-}
-
-void Pipeline::Impl::RenderImage(const ForwardCall& call, std::size_t n,
-                                 const Workers::Part& part) {
-  Prepare(call.scenes[n], call.options, call.request, n, &worker_scratch[part.worker()]);
-  const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  part.For(bins.cells(), [&](std::size_t bin, std::size_t worker) {
-    RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
-  });
-}
-
-void Pipeline::Impl::Render(const ForwardCall& call) {
-  const std::size_t count = call.scenes.size();
-  const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  Begin(call.scenes, call.options, call.request.alpha);
-  bin_errors.assign(count * bins.cells(), 0.0);
-  if (bins.cells() == 1) {
-    workers->For(count, [&](std::size_t n, std::size_t worker) {
-      RenderWholeImage(call, n, &worker_scratch[worker]);
-    });
-  } else {
-    workers->ForParts(
-        count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
-  }
-  double* const bound = &call.frame->alpha_error_bound;
-  for (const double error : bin_errors) *bound = std::max(*bound, error);
-  if (alpha != nullptr && !alpha->needs().bounded) *bound = std::numeric_limits<double>::infinity();
-}
-
-void Pipeline::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
-                                  WorkerScratch* worker, BandGradients* out) {
-  const ImageScratch& image = images[task.image];
-  Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
-                             worker, out));
-}
-
-void Pipeline::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
-                                 WorkerScratch* worker, BinGradients* out) {
-  if (!call.wants_geometry(n)) return;
-  StageClock clock;
-  RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, worker, out);
-  clock.Lap(&worker->times.alpha);
-}
-
-void Pipeline::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
-                                        WorkerScratch* worker) {
-  ImageScratch& image = images[n];
-  const PipelineScene& scene = call.scenes[n];
-  Prepare(scene, call.input.options, call.request, n, worker);
-  PrepareRecomputed(scene, &image);
-  BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
-  if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
-  const ImageGradients gradients{{&worker->band_gradients, 1},
-                                 {&worker->bin_gradients, call.summed_bins()},
-                                 call.request_of(n, image.mesh)};
-  PipelineGradients* d_scene = &call.d_scenes[n];
-  AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
-  StageClock clock;
-  if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
-  Require(MergeGeometry(scene, call.input.options, image, gradients, *d_vertices, worker, d_scene));
-  Require(MergeAttributes(image, gradients, worker, d_scene));
-  MergeOwnSums(call, n);
-  clock.Lap(&worker->times.merge);
-}
-
-// Bands and bins together.
-void Pipeline::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
-                                   const Workers::Part& part) {
-  WorkerScratch* const own = &worker_scratch[part.worker()];
-  Prepare(call.scenes[n], call.input.options, call.request, n, own);
-  PrepareRecomputed(call.scenes[n], &images[n]);
-  BandGradients* const bands = &band_gradients[n * call.bands];
-  BinGradients* const bins = bin_gradients.data() + n * call.bins;
-  part.For(call.bands + call.bins, [&](std::size_t i, std::size_t worker) {
-    if (i < call.bands) {
-      BackwardBand(call, {n, i}, &worker_scratch[worker], &bands[i]);
-    } else {
-      const std::size_t bin = i - call.bands;
-      BackwardBin(call, n, bin, &worker_scratch[worker], &bins[bin]);
-    }
-  });
-  if (sound) Merge(call, n, part);
-}
-
-// Three independent sums that can run in parallel, for batches of one: the longest first.
-void Pipeline::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
-                              const Workers::Part& part, PipelineGradients* d_scene) {
-  ImageScratch& image = images[n];
-  const bool geometry = gradients.request.geometry;
-  part.For(3, [&](std::size_t i, std::size_t w) {
-    StageClock clock;
-    if (i == 0 && geometry && !gradients.bins.empty()) {
-      SumGeometry(image, {{}, gradients.bins, gradients.request}, &image.d_bin_vertices);
-    } else if (i == 1 && geometry) {
-      SumGeometry(image, {gradients.bands, {}, gradients.request}, &image.d_band_vertices);
-    } else if (i == 2) {
-      Require(MergeAttributes(image, gradients, &worker_scratch[w], d_scene));
-    }
-    clock.Lap(&worker_scratch[w].times.merge);
-  });
-}
-
-void Pipeline::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
-  ImageScratch& image = images[n];
-  WorkerScratch* const worker = &worker_scratch[part.worker()];
-  PipelineGradients* const d_scene = &call.d_scenes[n];
-  const ImageGradients gradients{
-      std::span(band_gradients).subspan(n * call.bands, call.bands),
-      std::span(bin_gradients).subspan(n * call.bins, call.summed_bins()),
-      call.request_of(n, image.mesh)};
-  SumParts(gradients, n, part, d_scene);
-  StageClock clock;
-  if (gradients.request.geometry && !gradients.bins.empty()) {
-    std::transform(image.d_band_vertices.begin(), image.d_band_vertices.end(),
-                   image.d_bin_vertices.begin(), image.d_band_vertices.begin(), std::plus());
-  }
-  Require(MergeGeometry(call.scenes[n], call.input.options, image, gradients, image.d_band_vertices,
-                        worker, d_scene));
-  MergeOwnSums(call, n);
-  clock.Lap(&worker->times.merge);
-}
-
-// For a rule that does not pass its sums to MergeGeometry.
-void Pipeline::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
-  if (call.bins == call.summed_bins() || !call.wants_geometry(n)) return;
-  alpha->AddToScene(call.scenes[n], n, images[n], &call.d_scenes[n]);
-  Require(IsFiniteGeometry(call.d_scenes[n]));
-}
-
-bool Pipeline::Impl::Backward(const BackwardCall& call) {
-  Begin(call.scenes, call.input.options, call.request.alpha);
-  const std::size_t count = call.scenes.size();
-  if (call.grid.cells() == 1 && call.bands == 1) {
-    workers->For(count, [&](std::size_t n, std::size_t worker) {
-      BackwardWholeImage(call, n, &worker_scratch[worker]);
-    });
-  } else {
-    if (band_gradients.size() < count * call.bands) band_gradients.resize(count * call.bands);
-    if (bin_gradients.size() < count * call.bins) bin_gradients.resize(count * call.bins);
-    workers->ForParts(
-        count, [&](std::size_t n, const Workers::Part& part) { BackwardImage(call, n, part); });
-  }
-  return sound;
-}
 
 Pipeline::Pipeline(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
 Pipeline::~Pipeline() = default;

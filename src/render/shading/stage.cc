@@ -43,16 +43,21 @@ void FindSegments(const raster::FaceRows& rows, int columns,
   });
 }
 
-// Calls visit(run) for the runs formed by segments.
+// Calls visit(run, worker) for the runs of a strip's foreground, and counts their pixels.
 template <class Visit>
-void ForEachRun(std::span<const PixelSegment> segments, const Visit& visit) {
+void ForRunsOf(const PixelStrip& strip, const StageScene& scene, StageWorker* worker,
+               const Visit& visit) {
+  FindSegments(strip.rows, strip.columns, strip.mesh->source_face, scene.scene->face_surfaces,
+               &worker->segments);
+  const std::span<const PixelSegment> segments = worker->segments;
   for (std::size_t i = 0; i < segments.size();) {
     std::size_t end = i, count = 0;
     while (end < segments.size() && segments[end].surface == segments[i].surface &&
            count + static_cast<std::size_t>(segments[end].count) <= shade::kRunPixels) {
       count += static_cast<std::size_t>(segments[end++].count);
     }
-    visit(PixelRun{segments.subspan(i, end - i), count});
+    worker->work.pixels += static_cast<std::int64_t>(count);
+    visit(PixelRun{segments.subspan(i, end - i), count}, worker);
     i = end;
   }
 }
@@ -79,15 +84,13 @@ std::size_t PaddedEnd(std::size_t count) {
   return (count + shade::kRunPad - 1) / shade::kRunPad * shade::kRunPad;
 }
 
-// Repeats the last of `count` values to the end of its vector.
-void PadRun(std::size_t count, RunPlane* p) {
-  std::fill(p->at + count, p->at + PaddedEnd(count), p->at[count - 1]);
+// Fills the last vector of `count` values.
+void PadRun(std::size_t count, float value, RunPlane* p) {
+  std::fill(p->at + count, p->at + PaddedEnd(count), value);
 }
 
-// The same with zeros, as cotangents require.
-void PadRunWithZeros(std::size_t count, RunPlane* p) {
-  std::fill(p->at + count, p->at + PaddedEnd(count), 0.0f);
-}
+// The same with the last of the values.
+void PadRun(std::size_t count, RunPlane* p) { PadRun(count, p->at[count - 1], p); }
 
 void GatherPixels(const PixelRun& run, const float* plane, const StripRows& rows, float* to) {
   for (const PixelSegment& s : run.segments) {
@@ -107,7 +110,7 @@ void GatherRun(const PixelRun& run, const float* plane, const StripRows& rows, R
 void GatherCotangents(const PixelRun& run, const float* plane, const StripRows& rows,
                       RunPlane* to) {
   GatherPixels(run, plane, rows, to->at);
-  PadRunWithZeros(run.count, to);
+  PadRun(run.count, 0.0f, to);
 }
 
 void ScatterRun(const PixelRun& run, const RunPlane& from, const StripRows& rows, float* plane) {
@@ -291,13 +294,8 @@ void ShadeStage::Forward(const PixelStrip& strip) {
   clear(frame_->uv);
   clear(frame_->attributes);
   if (!strip.any_face) return;
-  StageWorker* const worker = workers_[strip.worker].get();
-  FindSegments(strip.rows, strip.columns, strip.mesh->source_face,
-               scenes_[strip.image].scene->face_surfaces, &worker->segments);
-  ForEachRun(worker->segments, [&](const PixelRun& run) {
-    worker->work.pixels += static_cast<std::int64_t>(run.count);
-    ForwardRun(strip, run, worker);
-  });
+  ForRunsOf(strip, scenes_[strip.image], workers_[strip.worker].get(),
+            [&](const PixelRun& run, StageWorker* worker) { ForwardRun(strip, run, worker); });
 }
 
 bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t first,
@@ -425,13 +423,10 @@ void ShadeStage::BackwardRun(const PixelStrip& strip, const PixelRun& run,
 }
 
 void ShadeStage::Backward(const PixelStrip& strip, const raster::PlanarView<float>& d_varyings) {
-  StageWorker* const worker = workers_[strip.worker].get();
-  FindSegments(strip.rows, strip.columns, strip.mesh->source_face,
-               scenes_[strip.image].scene->face_surfaces, &worker->segments);
-  ForEachRun(worker->segments, [&](const PixelRun& run) {
-    worker->work.pixels += static_cast<std::int64_t>(run.count);
-    BackwardRun(strip, run, d_varyings, worker);
-  });
+  ForRunsOf(strip, scenes_[strip.image], workers_[strip.worker].get(),
+            [&](const PixelRun& run, StageWorker* worker) {
+              BackwardRun(strip, run, d_varyings, worker);
+            });
 }
 
 }  // namespace tilegrad
