@@ -19,9 +19,6 @@
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::python {
-
-void BindArrayFiles(py::module_& m);
-
 namespace {
 
 constexpr io::NpyType kTypes[] = {io::NpyType::kBool, io::NpyType::kU8,  io::NpyType::kI8,
@@ -217,8 +214,6 @@ void BindArrayFiles(py::module_& m) {
 }
 
 // Files of cameras, and the cameras of glTF files.
-
-void BindCameraFiles(py::module_& m);
 
 namespace {
 

@@ -17,9 +17,6 @@
 #include "scene/camera_conventions.h"
 
 namespace tilegrad::python {
-
-void BindCamera(py::module_& m);
-
 namespace {
 
 // [count, K] doubles.

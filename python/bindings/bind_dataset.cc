@@ -10,9 +10,6 @@
 #include "train/data/dataset_files.h"
 
 namespace tilegrad::python {
-
-void BindDataset(py::module_& m);
-
 namespace {
 
 using train::Dataset;

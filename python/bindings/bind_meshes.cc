@@ -9,9 +9,6 @@
 #include "render/picture/mesh_scene.h"
 
 namespace tilegrad::python {
-
-void BindMeshes(py::module_& m);
-
 namespace {
 
 py::dict CameraToDict(const io::MeshFileCamera& from) {
@@ -113,7 +110,6 @@ py::dict SceneOfMesh(const py::dict& dict, bool linear, const std::string& norma
   out["textures"] = TextureList(scene.textures);
   out["surfaces"] = SurfaceList(scene.surfaces);
   out["normal_kind"] = kNormalKinds[static_cast<std::size_t>(scene.shading.normals)];
-  out["single_sided"] = made.single_sided();
   return out;
 }
 

@@ -10,9 +10,6 @@
 #include "bindings/renderer_object.h"
 
 namespace tilegrad::python {
-
-void BindRenderer(py::module_& m);
-
 namespace {
 
 // The numbers and shape of an image, by its name; the only place that knows the shape.

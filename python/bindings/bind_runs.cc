@@ -25,9 +25,6 @@
 #include "train/trainer.h"
 
 namespace tilegrad::python {
-
-void BindRuns(py::module_& m);
-
 namespace {
 
 Camera CameraOf(const CameraRow& row) { return CameraCast<float>(CameraOfNumbers(row)); }
@@ -220,8 +217,6 @@ void BindRuns(py::module_& m) {
 }
 
 // A trained network that predicts meshes from images.
-
-void BindPredictor(py::module_& m);
 
 namespace {
 

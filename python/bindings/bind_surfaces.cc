@@ -12,9 +12,6 @@
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::python {
-
-void BindSurfaces(py::module_& m);
-
 namespace {
 
 using train::FaceTree;
@@ -177,8 +174,6 @@ void BindSurfaces(py::module_& m) {
 
 // The losses of training and fitting (train/losses), each as its value and its gradient: float32 or
 // float64.
-
-void BindLosses(py::module_& m);
 
 namespace {
 

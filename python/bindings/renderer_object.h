@@ -6,47 +6,12 @@
 
 #include <memory>
 #include <mutex>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "bindings/scene_record.h"
 
 namespace tilegrad::python {
-
-// Arrays of Python that a backward pass writes to, as the records of the public interface.
-template <class T>
-class GradientRecord {
- public:
-  // `arrays` maps the names of SceneArrays' fields, and textures (a list, with None where not
-  // wanted), to arrays of the same shapes, or with an additional leading axis for a gradient of
-  // each image. Missing names are not wanted. ValueError or TypeError for an array of another shape
-  // or dtype, or one that is read-only.
-  GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays, GradientMode mode);
-  GradientRecord(GradientRecord&&) noexcept = default;
-
-  const std::vector<SceneGradientsT<T>>& gradients() const { return gradients_; }
-  // Copies what is not a plain array in C++ from the records to the arrays.
-  void Store() const;
-
- private:
-  Field<T> Take(const char* name, const py::object& array, const std::vector<py::ssize_t>& shape);
-  Field<T> Take(const char* name, const std::vector<py::ssize_t>& shape);
-  void SetStreams(const SceneRecord<T>& scene);
-  void SetTextures(const SceneRecord<T>& scene);
-  void SetRecords(const SceneRecord<T>& scene);
-
-  const py::object* Find(std::string_view name) const;  // null: not wanted
-
-  GradientMode mode_;
-  std::vector<std::pair<std::string_view, py::object>> arrays_;
-  std::vector<SceneGradientsT<T>> gradients_;
-  std::vector<std::span<T>> textures_;
-  Field<T> camera_, surface_, light_;
-  std::vector<CameraT<T>> cameras_;
-  std::vector<SurfaceT<T>> surfaces_;
-  std::vector<LightT<T>> lights_;
-};
 
 // Unused frames for the next render, so that the memory of images is not returned to the system and
 // requested again, page by page. Used with the GIL held.

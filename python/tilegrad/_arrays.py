@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts the caller's arrays to NumPy arrays: shares memory where possible; otherwise copies an
 array once and counts the copy. Errors name the function, the argument, and what was expected and
-got. All such checks of the Python package are here.
+got. All such checks of the Python package are here,
+and those of numbers, names, paths and threads.
 
 Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
 the CPU) or `__array__`, numbers, and nested sequences of numbers. Masked arrays only if nothing in
@@ -11,17 +12,26 @@ them is masked.
 from __future__ import annotations
 
 import operator
+import os
 import threading
+import warnings
+import weakref
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 
 Axis = Union[int, str]  # a length, or the name of one: "V"
 Sizes = dict  # name of a length -> length, from the arrays so far
+Path = Union[str, bytes, "os.PathLike[Any]"]
 
 NUMBERS = (list, tuple, int, float)  # not yet arrays: making one is not a copy
 _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
 MOST_PIXELS = 16384  # of an image in each axis: kMaxImageSize of src/raster/conventions.h
+_MOST_THREADS = 1024
+# The second is of earlier versions.
+_THREAD_VARIABLES = ("TILEGRAD_THREADS", "TILEGRAD_NUM_THREADS")
+# By id of an array: a weak reference to it, and its copy.
+_index_copies: dict[int, tuple[Any, Any]] = {}
 _counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
 _lock = threading.Lock()
 
@@ -294,3 +304,98 @@ def _count_copy(copy: np.ndarray) -> None:
     with _lock:
         _counts["copies"] += 1
         _counts["bytes_copied"] += copy.nbytes
+
+
+def as_indices(function: str, argument: str, value: Any, shape: Sequence[Axis],
+               sizes: Optional[Sizes] = None) -> np.ndarray:
+    """As `as_array` of int32, for indices, which rarely change and often have another integer type.
+    An array that must be copied is copied once; the copy is reused while the array keeps its
+    values."""
+    if isinstance(value, NUMBERS):
+        return as_array(function, argument, value, np.int32, shape, sizes)
+    array = value if type(value) is np.ndarray else foreign(function, argument, value)
+    owner, copy = _index_copies.get(id(value), (None, None))
+    if owner is not None and owner() is value and np.array_equal(copy, array):
+        count_array()
+    else:
+        copy = contiguous(function, argument, array, np.int32)
+        if copy is not array:
+            _keep_copy(value, copy)
+    check_shape(function, argument, copy.shape, shape, sizes)
+    return copy
+
+
+def _keep_copy(value: Any, copy: np.ndarray) -> None:
+    """As long as `value` lives."""
+    key = id(value)
+
+    def forget(reference: Any) -> None:
+        if _index_copies.get(key, (None, None))[0] is reference:
+            del _index_copies[key]
+
+    copy.flags.writeable = False  # others may share it
+    try:
+        _index_copies[key] = (weakref.ref(value, forget), copy)
+    except TypeError:  # without a weak reference
+        pass
+
+
+def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
+    """TypeError if `value` is of bytes where 0 to 1 is expected: the result would silently be 255
+    times too bright."""
+    array = value if type(value) is np.ndarray else foreign(function, argument, value)
+    if array.dtype == np.uint8:
+        raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
+                        f"divide by 255")
+
+
+def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
+    """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is expected: most
+    of those that are not black exceed 1. Highlights may. Checks about 4096 numbers."""
+    sample = np.ravel(array)[::max(1, array.size // 4096)]
+    colored = sample[sample > 0]
+    if colored.size == 0 or not 2 < colored.max() <= 255 or np.mean(colored > 1) <= 0.5:
+        return
+    warnings.warn(f"{function}: {argument} has numbers up to {colored.max():g}, expected 0 "
+                  f"to 1: divide by 255 if they are bytes", RuntimeWarning, stacklevel=5)
+
+
+def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
+              sizes: Sizes) -> np.ndarray:
+    """As `as_batched`; refuses bytes, and warns of numbers that look like them."""
+    refuse_bytes(function, argument, value, dtype)
+    array = as_batched(function, argument, value, dtype, shape, sizes)
+    warn_of_bytes(function, argument, array)
+    return array
+
+
+def thread_count(function: str, threads: int) -> int:
+    """`threads`, checked; 0 becomes the value of TILEGRAD_THREADS, or stays 0 (one thread for each
+    core that the process may use) if that is not set."""
+    threads = as_number(function, "threads", threads, int)
+    if not 0 <= threads <= _MOST_THREADS:
+        raise ValueError(f"{function}: threads is {threads}, must be in 0..{_MOST_THREADS}")
+    variable = next((name for name in _THREAD_VARIABLES if os.environ.get(name)), None)
+    if threads or variable is None:
+        return threads
+    text = os.environ[variable]
+    if not text.isdecimal() or not 1 <= int(text) <= _MOST_THREADS:
+        raise ValueError(f"{function}: {variable}={text!r} in the environment, must be a number "
+                         f"in 1..{_MOST_THREADS}")
+    return int(text)
+
+
+def name_of(path: Path) -> str:
+    """The name of a file or folder, as C++ takes it. ValueError: not a possible file name."""
+    name = os.fsdecode(path)
+    try:
+        if b"\0" not in os.fsencode(name):
+            return name
+    except UnicodeEncodeError:  # an unpaired surrogate
+        pass
+    raise ValueError(f"{name!r} cannot be the name of a file")
+
+
+def ending_of(path: Path) -> str:
+    """The ending of a file name, in lower case: ".png"; "" if it has none."""
+    return os.path.splitext(os.fsdecode(path))[1].lower()

@@ -9,10 +9,10 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _indices
+from tilegrad import _arrays, _core
+from tilegrad._arrays import name_of
 from tilegrad._camera_arguments import checked_size, is_half, known_size, Rows, Size, size_of
 from tilegrad._packed import Packed, Part
-from tilegrad._paths import name_of
 
 _D = _core.CAMERA
 Parts = dict[str, np.ndarray]
@@ -301,7 +301,7 @@ def points_of(function: str, mesh: Any) -> np.ndarray:
     points, faces = _parts(mesh)
     points = _arrays.as_array(function, "mesh", points, np.float64, ("V", 3))
     if faces is not None:
-        faces = _indices.as_indices(function, "faces", faces, ("F", 3))
+        faces = _arrays.as_indices(function, "faces", faces, ("F", 3))
         _arrays.check_indices(function, "faces", faces, len(points))
         points = points[np.unique(faces)]
     if not len(points):

@@ -9,10 +9,10 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _numbers, _tools
+from tilegrad import _arrays, _core, _tools
+from tilegrad._arrays import ending_of, name_of, Path
 from tilegrad._camera import Camera
 from tilegrad._lit import lit
-from tilegrad._paths import Path, ending_of, name_of
 from tilegrad._scene import Scene, Surface, Texture, changed
 
 _COLOR_SPACES = ("srgb", "linear")
@@ -241,7 +241,7 @@ class Mesh:
             return None
         channels = 3 if np.shape(value)[-1:] == (3,) else 4
         colors = _arrays.as_array(function, name, value, np.float32, (*shape, channels), sizes)
-        _numbers.warn_of_bytes(function, name, colors)
+        _arrays.warn_of_bytes(function, name, colors)
         if channels == 4:
             return colors
         return np.concatenate([colors, np.ones((*colors.shape[:-1], 1), np.float32)], axis=-1)

@@ -8,12 +8,12 @@ from typing import Any, Callable, Iterator, Optional, Sequence, Union
 import numpy as np
 
 from tilegrad import _arrays, _core
+from tilegrad._arrays import thread_count
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size, common_size, filled_size
 from tilegrad._packed import Packed
 from tilegrad._picture import Pictured
 from tilegrad._scene import DIFFERENTIABLE, Light, Scene, Surface
-from tilegrad._threads import thread_count
 
 _Reader = Callable[[str, str, Any], Any]
 

@@ -7,7 +7,7 @@ from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _indices, _numbers
+from tilegrad import _arrays, _core
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed, Part, stacked
 
@@ -164,7 +164,7 @@ class Scene:
         sizes: dict[str, int] = {}
         corners = self._corners(per_corner)
         fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
-                  "faces": _indices.as_indices("Scene", "faces", faces, ("F", 3), sizes),
+                  "faces": _arrays.as_indices("Scene", "faces", faces, ("F", 3), sizes),
                   "camera": self._camera(camera, sizes)}
         for name in _SHAPES:
             value = self._arguments[name]
@@ -176,7 +176,7 @@ class Scene:
                 shape = _CORNER_SHAPES[name] if name in corners else _SHAPES[name]
                 fields[name] = self._take(name, value, shape, sizes)
         if face_surfaces is not None:
-            fields["face_surfaces"] = _indices.as_indices("Scene", "face_surfaces", face_surfaces,
+            fields["face_surfaces"] = _arrays.as_indices("Scene", "face_surfaces", face_surfaces,
                                                           ("F",), sizes)
         if lights is not None:
             fields["lights"] = self._lights(lights, sizes)
@@ -196,7 +196,7 @@ class Scene:
 
     def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
         colors = name.startswith(("colors", "textures"))
-        take = _numbers.as_colors if colors else _arrays.as_batched
+        take = _arrays.as_colors if colors else _arrays.as_batched
         return take("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:

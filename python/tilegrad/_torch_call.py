@@ -11,11 +11,11 @@ import numpy as np
 import torch
 
 from tilegrad import _arrays
+from tilegrad._arrays import thread_count
 from tilegrad._dense import check_dense
 from tilegrad._packed import Packed
 from tilegrad._renderer import RECORDS, Frame, Gradients, Renderer
 from tilegrad._scene import Scene, Surface, Texture
-from tilegrad._threads import thread_count
 
 _INDICES = ("faces", "face_surfaces")  # a Scene takes their tensors as they are
 

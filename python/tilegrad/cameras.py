@@ -10,9 +10,9 @@ from typing import Any, Iterable, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
+from tilegrad._arrays import ending_of, name_of, Path
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size
-from tilegrad._paths import Path, ending_of, name_of
 
 _CENTRES = ("integer", "half")
 _FORMATS = ("opencv", "nerf", "colmap")

@@ -17,9 +17,8 @@ from typing import Any, Iterator, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
+from tilegrad._arrays import name_of, Path, thread_count
 from tilegrad._camera import Camera
-from tilegrad._paths import Path, name_of
-from tilegrad._threads import thread_count
 from tilegrad._mesh import Mesh, mesh_of_dict
 
 Item = dict[str, Any]

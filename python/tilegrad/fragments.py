@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 import numpy as np
 
 from tilegrad import _arrays, _core
+from tilegrad._arrays import thread_count
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size, common_size, filled_size
 from tilegrad._renderer import Frame
 from tilegrad._scene import Scene
-from tilegrad._threads import thread_count
 
 
 class Fragments(NamedTuple):

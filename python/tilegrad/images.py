@@ -9,8 +9,8 @@ from typing import Any, Optional
 
 import numpy as np
 
-from tilegrad import _arrays, _numbers, _tools
-from tilegrad._paths import Path, ending_of, name_of
+from tilegrad import _arrays, _tools
+from tilegrad._arrays import ending_of, name_of, Path
 
 _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}  # of EXR
 
@@ -104,7 +104,7 @@ def as_bytes(function: str, argument: str, image: Any, planar: bool = False) -> 
     if pixels.dtype.kind == "f":
         if not np.isfinite(pixels).all():
             raise ValueError(f"{function}: {argument} has numbers that are not finite")
-        _numbers.warn_of_bytes(function, argument, pixels)
+        _arrays.warn_of_bytes(function, argument, pixels)
         pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     if pixels.dtype != np.uint8:
         raise TypeError(f"{function}: {argument} has dtype {pixels.dtype}, expected uint8, bool or "

@@ -15,8 +15,8 @@ from typing import Any, Callable, NamedTuple, Optional
 
 import numpy as np
 
-from tilegrad import _arrays, _indices, _tools
-from tilegrad._threads import thread_count
+from tilegrad import _arrays, _tools
+from tilegrad._arrays import thread_count
 
 
 class Loss(NamedTuple):
@@ -105,7 +105,7 @@ def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
 def _of_mesh(name: str, positions: Any, faces: Any) -> Any:
     if _numpy(faces).dtype.kind not in "iu":
         raise TypeError(f"{name}: faces has dtype {_numpy(faces).dtype}, expected whole numbers")
-    triangles = _indices.as_indices(name, "faces", faces, ("F", 3))
+    triangles = _arrays.as_indices(name, "faces", faces, ("F", 3))
     compute = getattr(_tools, name)
     if _torch_of(positions):
         return _on_tape(lambda p: compute(p, triangles), positions)

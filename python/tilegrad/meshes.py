@@ -13,8 +13,8 @@ from typing import Any, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
+from tilegrad._arrays import name_of, Path
 from tilegrad._mesh import Material, Mesh, mesh_of_dict, MeshCamera, MeshTables, MeshTexture
-from tilegrad._paths import name_of, Path
 
 __all__ = ["Material", "Mesh", "MeshCamera", "MeshTables", "MeshTexture", "as_mesh", "load_mesh",
            "mesh_endings", "mesh_of_dict", "save_mesh"]

@@ -14,8 +14,7 @@ from typing import Any, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
-from tilegrad._paths import Path, name_of
-from tilegrad._threads import thread_count
+from tilegrad._arrays import name_of, Path, thread_count
 from tilegrad.images import as_bytes
 from tilegrad._mesh import Mesh, mesh_of_dict
 

@@ -14,11 +14,10 @@ from typing import Any, Callable, Mapping, Optional, Sequence
 import numpy as np
 
 from tilegrad import _arrays, _tools
+from tilegrad._arrays import name_of, Path, thread_count
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size
-from tilegrad._paths import Path, name_of
 from tilegrad._progress import Progress, watched_line
-from tilegrad._threads import thread_count
 from tilegrad.meshes import Mesh, as_mesh, load_mesh
 
 

@@ -10,7 +10,7 @@ from typing import Any, Mapping, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
-from tilegrad._paths import Path, ending_of, name_of
+from tilegrad._arrays import ending_of, name_of, Path
 
 
 class Weights(dict[str, np.ndarray]):

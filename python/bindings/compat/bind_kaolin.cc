@@ -11,9 +11,6 @@
 #include "compat/pytorch3d_raster.h"
 
 namespace tilegrad::python {
-
-void BindKaolin(py::module_& m);
-
 namespace {
 
 namespace kaolin = compat::kaolin;
@@ -186,8 +183,6 @@ void BindKaolin(py::module_& m) {
 }
 
 // What tilegrad.fragments needs of the engine.
-
-void BindPytorch3d(py::module_& m);
 
 namespace {
 

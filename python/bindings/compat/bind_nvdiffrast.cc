@@ -14,7 +14,6 @@
 
 namespace tilegrad::python {
 
-void BindNvdiffrast(py::module_& m);
 void BindNvdiffrastTexture(py::module_& m);
 
 namespace {

@@ -10,9 +10,6 @@
 #include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::python {
-
-void BindNvdiffrastTexture(py::module_& m);
-
 namespace {
 
 namespace nvdiffrast = compat::nvdiffrast;

@@ -8,9 +8,8 @@ from typing import Any, Optional, Sequence
 import numpy as np
 import torch
 
-from tilegrad._arrays import Axis, Sizes, check_shape
+from tilegrad._arrays import as_indices, Axis, check_shape, Sizes, thread_count
 from tilegrad._dense import check_dense
-from tilegrad._threads import thread_count
 
 _FLOATS = (torch.float32, torch.float64)
 
@@ -71,3 +70,29 @@ def threads() -> int:
     """As many as TILEGRAD_THREADS says; where it is not set as torch uses, which is one in a
     worker of a DataLoader."""
     return thread_count("tilegrad.compat", 0) or torch.get_num_threads()
+
+
+# What operations of nvdiffrast share.
+
+def triangles(function: str, tri: Any) -> np.ndarray:
+    """`tri` as an array [F, 3] of int32; ValueError if it is another shape or out of range."""
+    check_tensor(function, "tri", tri, ("F", 3))
+    return as_indices(function, "tri", tri, ("F", 3))
+
+
+def vertex_rows(function: str, argument: str, value: Any, channels: Any, sizes: Sizes,
+                like: Optional[torch.Tensor] = None) -> None:
+    """`value` is [N, V, channels], or [V, channels] for all images; N is looked up in `sizes`."""
+    shared = isinstance(value, torch.Tensor) and value.dim() == 2
+    shape = ("V", channels) if shared else ("N", "V", channels)
+    check_floats(function, argument, value, shape, sizes, like)
+
+
+def optional_numpy(tensor: Optional[torch.Tensor]) -> Optional[np.ndarray]:
+    """The memory of a tensor that may be absent."""
+    return None if tensor is None else to_numpy(tensor)
+
+
+def optional_tensor(array: Optional[np.ndarray]) -> Optional[torch.Tensor]:
+    """A tensor over an array that may be absent."""
+    return None if array is None else torch.from_numpy(array)

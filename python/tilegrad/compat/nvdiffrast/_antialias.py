@@ -12,7 +12,6 @@ from tilegrad import _core
 from tilegrad._arrays import Sizes
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
-from tilegrad.compat.nvdiffrast import _inputs
 
 
 class TopologyHash:
@@ -42,7 +41,7 @@ class _Antialias(torch.autograd.Function):
     def backward(ctx, d_out):
         color, rast, pos = ctx.saved_tensors
         wanted = [ctx.needs_input_grad[0], ctx.needs_input_grad[2]]
-        d_color, d_pos = map(_inputs.optional_tensor, _core.nvdiffrast_antialias_backward(
+        d_color, d_pos = map(_tensors.optional_tensor, _core.nvdiffrast_antialias_backward(
             _tensors.to_numpy(color), _tensors.to_numpy(rast), _tensors.to_numpy(pos),
             ctx.call.tri, ctx.call.rings, _tensors.to_numpy(d_out), wanted, _tensors.threads()))
         if d_pos is not None and ctx.call.pos_gradient_boost != 1.0:
@@ -68,8 +67,8 @@ def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: t
     sizes: Sizes = {}
     _tensors.check_floats("antialias", "color", color, ("N", "H", "W", "C"), sizes)
     _tensors.check_floats("antialias", "rast", rast, ("N", "H", "W", 4), sizes, color)
-    _inputs.vertex_rows("antialias", "pos", pos, 4, sizes, color)
-    triangles = _inputs.triangles("antialias", tri)
+    _tensors.vertex_rows("antialias", "pos", pos, 4, sizes, color)
+    triangles = _tensors.triangles("antialias", tri)
     if topology_hash is None:
         topology_hash = TopologyHash(triangles)
     if not isinstance(topology_hash, TopologyHash):
@@ -81,4 +80,4 @@ def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: t
 
 def antialias_construct_topology_hash(tri: torch.Tensor) -> TopologyHash:
     """For `antialias`: of a tri [F, 3] that stays the same, made once."""
-    return TopologyHash(_inputs.triangles("antialias_construct_topology_hash", tri))
+    return TopologyHash(_tensors.triangles("antialias_construct_topology_hash", tri))

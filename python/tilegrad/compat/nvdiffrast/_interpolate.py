@@ -12,7 +12,6 @@ from tilegrad import _core
 from tilegrad._arrays import Sizes
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
-from tilegrad.compat.nvdiffrast import _inputs
 
 
 class _Call(NamedTuple):
@@ -21,7 +20,7 @@ class _Call(NamedTuple):
 
     def record(self, rast: torch.Tensor, rast_db: Optional[torch.Tensor]) -> _core.InterpolateCall:
         return _core.InterpolateCall(
-            tri=self.tri, rast=_tensors.to_numpy(rast), rast_db=_inputs.optional_numpy(rast_db),
+            tri=self.tri, rast=_tensors.to_numpy(rast), rast_db=_tensors.optional_numpy(rast_db),
             diff_attrs=self.diff_attrs, threads=_tensors.threads())
 
 
@@ -41,7 +40,7 @@ class _Interpolate(torch.autograd.Function):
         gradients = _core.nvdiffrast_interpolate_backward(
             _tensors.to_numpy(attr), ctx.call.record(rast, rast_db), _tensors.to_numpy(d_out),
             _tensors.to_numpy(d_out_da), list(ctx.needs_input_grad[:3]))
-        return (*map(_inputs.optional_tensor, gradients), None)
+        return (*map(_tensors.optional_tensor, gradients), None)
 
 
 @full_precision
@@ -63,7 +62,7 @@ def interpolate(attr: torch.Tensor, rast: torch.Tensor, tri: torch.Tensor,
     sizes: Sizes = {}
     _tensors.check_floats("interpolate", "rast", rast, ("N", "H", "W", 4), sizes)
     everywhere = isinstance(attr, torch.Tensor) and attr.dim() == 3 and attr.shape[0] == 1
-    _inputs.vertex_rows("interpolate", "attr", attr, "A", {} if everywhere else sizes, rast)
+    _tensors.vertex_rows("interpolate", "attr", attr, "A", {} if everywhere else sizes, rast)
     if attr.shape[-1] == 0:
         raise ValueError("interpolate: attr has no attributes, its last axis is 0")
     numbers = _diff_attrs(diff_attrs, rast_db, attr.shape[-1])
@@ -71,7 +70,7 @@ def interpolate(attr: torch.Tensor, rast: torch.Tensor, tri: torch.Tensor,
         _tensors.check_floats("interpolate", "rast_db", rast_db, ("N", "H", "W", 4), sizes, rast)
     return _Interpolate.apply(attr[0] if everywhere else attr, rast,
                               rast_db if len(numbers) else None,
-                              _Call(_inputs.triangles("interpolate", tri), numbers))
+                              _Call(_tensors.triangles("interpolate", tri), numbers))
 
 
 def _diff_attrs(diff_attrs: Any, rast_db: Any, attributes: int) -> np.ndarray:

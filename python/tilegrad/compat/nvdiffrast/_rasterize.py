@@ -14,7 +14,6 @@ from tilegrad import _core
 from tilegrad._arrays import as_array, MOST_PIXELS, Sizes
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
-from tilegrad.compat.nvdiffrast import _inputs
 
 _WARNING = 1  # nvdiffrast's levels: 0 information, 1 warning, 2 error, 3 fatal
 _log_level = _WARNING
@@ -108,7 +107,7 @@ class _Rasterize(torch.autograd.Function):
             return None, None, None
         d_pos = _core.nvdiffrast_rasterize_backward(
             _tensors.to_numpy(pos), ctx.call.tri, _tensors.to_numpy(rast),
-            _inputs.optional_numpy(d_rast), _inputs.optional_numpy(d_rast_db), _tensors.threads())
+            _tensors.optional_numpy(d_rast), _tensors.optional_numpy(d_rast_db), _tensors.threads())
         return torch.from_numpy(d_pos), None, None
 
 
@@ -173,7 +172,7 @@ def _checked(function: str, glctx: Any, pos: Any, tri: Any, resolution: Any, ran
         raise TypeError(f"{function}: glctx is {type(glctx).__name__}, expected "
                         f"RasterizeCpuContext")
     sizes: Sizes = {}
-    _inputs.vertex_rows(function, "pos", pos, 4, sizes)
+    _tensors.vertex_rows(function, "pos", pos, 4, sizes)
     if pos.dim() == 2:
         if ranges is None:
             raise ValueError(f"{function}: pos is (V, 4), which needs ranges (N, 2); without them "
@@ -184,7 +183,7 @@ def _checked(function: str, glctx: Any, pos: Any, tri: Any, resolution: Any, ran
     else:
         ranges = None  # ignored in instanced mode, as nvdiffrast does
     height, width = _resolution(function, resolution)
-    return _Call(glctx, _inputs.triangles(function, tri), ranges, (height, width), bool(grad_db))
+    return _Call(glctx, _tensors.triangles(function, tri), ranges, (height, width), bool(grad_db))
 
 
 def _resolution(function: str, resolution: Any) -> tuple[int, int]:

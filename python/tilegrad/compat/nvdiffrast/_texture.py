@@ -11,7 +11,6 @@ from tilegrad import _core
 from tilegrad._arrays import Sizes, check_choice
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
-from tilegrad.compat.nvdiffrast import _inputs
 
 _FILTERS = ("auto", *_core.TEXTURE_FILTERS)
 _BOUNDARIES = _core.TEXTURE_BOUNDARIES
@@ -35,8 +34,8 @@ class _Call(NamedTuple):
     def record(self, uv: torch.Tensor, uv_da: Optional[torch.Tensor],
                bias: Optional[torch.Tensor]) -> _core.TextureCall:
         return _core.TextureCall(
-            uv=_tensors.to_numpy(uv), uv_da=_inputs.optional_numpy(uv_da),
-            mip_level_bias=_inputs.optional_numpy(bias), filter=self.filter,
+            uv=_tensors.to_numpy(uv), uv_da=_tensors.optional_numpy(uv_da),
+            mip_level_bias=_tensors.optional_numpy(bias), filter=self.filter,
             boundary=self.boundary, threads=_tensors.threads())
 
 
@@ -61,8 +60,8 @@ class _Texture(torch.autograd.Function):
         elif ctx.call.own_levels:
             base = _core.nvdiffrast_mip_backward(d_levels, _tensors.threads())
             d_levels = [base] + [None] * (len(levels) - 1)
-        return (None, *map(_inputs.optional_tensor, d_others),
-                *map(_inputs.optional_tensor, d_levels))
+        return (None, *map(_tensors.optional_tensor, d_others),
+                *map(_tensors.optional_tensor, d_levels))
 
 
 @full_precision
