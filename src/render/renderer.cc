@@ -61,41 +61,31 @@ struct RendererT<T>::Impl {
   explicit Impl(const Workers& shared) : workers(&shared) {}
 
   Status Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
-                const Outputs& outputs, typename FrameT<T>::Impl* frame);
+                const Outputs& outputs, typename FrameT<T>::Impl* frame) {
+    frame->options = options;
+    frame->Keep(scenes);
+    return scratch->engine.Render(frame->scenes, frame->options, outputs, &frame->images);
+  }
   Status Backward(const typename FrameT<T>::Impl& frame, const FrameGradientsT<T>& d_frame,
-                  std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode);
+                  std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode) {
+    auto& [engine, targets] = *scratch;
+    const bool add = mode == GradientMode::kAdd;
+    TILEGRAD_TRY(targets.Begin(frame.scenes, d_scenes));
+    if (add) targets.Save();
+    Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, &targets);
+    if (!status.ok()) {
+      if (add) targets.Restore();
+      return status;
+    }
+    if (add && !targets.AddSaved()) return InvalidArgument("a sum of gradients overflows");
+    targets.JoinRecords(add);
+    return {};
+  }
 
   std::optional<Workers> own_workers;
   const Workers* workers;
   std::optional<RendererScratch<T>> scratch;  // from Start on
 };
-
-template <class T>
-Status RendererT<T>::Impl::Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
-                                  const Outputs& outputs, typename FrameT<T>::Impl* frame) {
-  frame->options = options;
-  frame->Keep(scenes);
-  return scratch->engine.Render(frame->scenes, frame->options, outputs, &frame->images);
-}
-
-template <class T>
-Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
-                                    const FrameGradientsT<T>& d_frame,
-                                    std::span<const SceneGradientsT<T>> d_scenes,
-                                    GradientMode mode) {
-  auto& [engine, targets] = *scratch;
-  const bool add = mode == GradientMode::kAdd;
-  TILEGRAD_TRY(targets.Begin(frame.scenes, d_scenes));
-  if (add) targets.Save();
-  Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, &targets);
-  if (!status.ok()) {
-    if (add) targets.Restore();
-    return status;
-  }
-  if (add && !targets.AddSaved()) return InvalidArgument("a sum of gradients overflows");
-  targets.JoinRecords(add);
-  return {};
-}
 
 template <class T>
 FrameT<T>::FrameT() noexcept = default;
