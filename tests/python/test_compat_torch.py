@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for every operation of tilegrad.losses and tilegrad.compat on torch's tape: a second
+"""What holds for every operation of tilegrad on torch's tape: a second
 derivative is an error, never 0, in autocast results are those of float32, and bits depend on no
 thread."""
 
@@ -16,10 +16,12 @@ from test_fragments import random_faces as faces_before_the_camera
 from test_kaolin import quiet, random_faces
 from test_nvdiffrast import random, wavy_grid
 from test_processes import in_child
+from test_torch import rendered, tensors
 from tilegrad import losses
 
 if torch:
     import tilegrad.compat.nvdiffrast.torch as dr
+    import tilegrad.torch
     from tilegrad.compat import kaolin, pytorch3d
 
 
@@ -42,7 +44,10 @@ def operations():
     rast = dr.rasterize(context, pos, tri, (9, 8))[0]
     uv = torch.rand(1, 9, 8, 2)
     mesh = kaolin.render.mesh
+    view = tilegrad.Camera.orbit(30, 20, 3, width=9, height=8)
     return {
+        "render": (lambda p: tilegrad.torch.render(p, faces, view, width=9, height=8,
+                                                   delta=1e-2).alpha, sphere),
         "edge_length": (lambda p: losses.edge_length(p, faces), sphere),
         "laplacian": (lambda p: losses.laplacian(p, faces), sphere),
         "normal_consistency": (lambda p: losses.normal_consistency(p, faces), sphere),
@@ -93,9 +98,15 @@ class Determinism(unittest.TestCase):
         sum(image.sum() for image in images).backward()
         return ids, *images, corners.grad
 
+    def render(self):
+        given = tensors(np.float32)
+        positions = given["positions"].requires_grad_()
+        image = rendered(given, width=70, height=90).color
+        return image, torch.autograd.grad(image.sum(), positions)[0]
+
     def bits(self):
         return b"".join(tensor.detach().numpy().tobytes() for work in (
-            self.nvdiffrast, self.kaolin, self.pytorch3d) for tensor in work())
+            self.render, self.nvdiffrast, self.kaolin, self.pytorch3d) for tensor in work())
 
     def test_any_number_of_threads(self):
         for count in (1, 2, 7):
@@ -103,7 +114,7 @@ class Determinism(unittest.TestCase):
             self.assertTrue(self.bits() == self.expected, count)
 
     def test_python_threads_and_a_fork(self):
-        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
             for got in [pool.submit(self.bits) for _ in range(4)]:
                 self.assertTrue(got.result() == self.expected)
 
@@ -122,14 +133,23 @@ class Operations(unittest.TestCase):
         for name, (function, start) in operations().items():
             torch.manual_seed(3)
 
-            def total(value, function=function):
+            def linear(value, function=function):
                 return function(value).sum()
 
-            for ask in (lambda: functional.hessian(total, start),
-                        lambda: functional.jvp(total, start, torch.ones_like(start))):
-                with self.subTest(name), self.assertRaisesRegex(RuntimeError,
-                                                                "first derivatives only"):
-                    ask()
+            def square(value, function=function):
+                return function(value).square().sum()
+
+            ones = torch.ones_like(start)
+            for loss in (linear, square):
+                leaf = start.clone().requires_grad_()
+                gradient, = torch.autograd.grad(loss(leaf), leaf, create_graph=True)
+                for ask in (lambda loss=loss: functional.hessian(loss, start),
+                            lambda loss=loss: functional.jvp(loss, start, ones),
+                            lambda loss=loss: functional.hvp(loss, start, ones),
+                            lambda loss=loss: functional.vhp(loss, start, ones),
+                            (gradient.norm() - 1).square().backward):
+                    with self.subTest(name):
+                        self.assertRaisesRegex(RuntimeError, "first derivatives only", ask)
 
     def test_first_derivatives_are_the_same_with_a_graph(self):
         for name, (function, start) in operations().items():
@@ -139,7 +159,11 @@ class Operations(unittest.TestCase):
                 leaf = start.clone().requires_grad_()
                 gradients += torch.autograd.grad(function(leaf).sum(), leaf,
                                                  create_graph=create_graph)
-            self.assertTrue(torch.equal(*gradients), name)
+            torch.manual_seed(3)
+            gradients.append(torch.autograd.functional.jacobian(lambda x, f=function: f(x).sum(),
+                                                                start))
+            for other in gradients[1:]:
+                self.assertTrue(torch.equal(gradients[0], other), name)
 
     def test_autocast(self):
         """What comes as float32 gives the same bits, and what comes as bfloat16 those of its

@@ -5,7 +5,6 @@ import copy
 import math
 import pickle
 import unittest
-from concurrent.futures import ThreadPoolExecutor
 from unittest import mock
 
 import numpy as np
@@ -142,8 +141,9 @@ class Gradients(unittest.TestCase):
             self.assertLess(float(error), 1e-3, name)
 
 
-@needs_torch
-class Graphs(unittest.TestCase):
+class PatchTest(unittest.TestCase):
+    """A test with a patch, whose positions have a gradient."""
+
     def setUp(self):
         self.given = tensors(np.float32)
         self.positions = self.given["positions"].requires_grad_()
@@ -151,6 +151,9 @@ class Graphs(unittest.TestCase):
     def gradient(self, loss):
         return torch.autograd.grad(loss, self.positions)[0]
 
+
+@needs_torch
+class Graphs(PatchTest):
     def test_images_are_those_of_the_renderer(self):
         given = arguments(np.float32)
         frame = tilegrad.Renderer(1).render(tilegrad.Scene(**given), **SIZE,
@@ -240,33 +243,6 @@ class Graphs(unittest.TestCase):
         got = torch.autograd.grad(images.color.permute(3, 0, 1, 2).sum(), strided)[0]
         self.assertTrue(torch.equal(got, expected))
 
-    def test_one_derivative_only(self):
-        """Whoever asks for a second one is told so; also where the loss is linear in the image,
-        whose gradient then depends on the scene alone."""
-        functional = torch.autograd.functional
-        start, ones = self.positions.detach(), torch.ones(16, 3)
-
-        def loss(positions, linear=True):
-            alpha = rendered({**self.given, "positions": positions}).alpha
-            return alpha.mean() if linear else alpha.square().mean()
-
-        for linear in (True, False):
-            def call(positions, linear=linear):
-                return loss(positions, linear)
-
-            for ask in (lambda: functional.jvp(call, start, ones),
-                        lambda: functional.hvp(call, start, ones),
-                        lambda: functional.vhp(call, start, ones),
-                        lambda: functional.hessian(call, start)):
-                self.assertRaisesRegex(RuntimeError, "first derivatives only", ask)
-            gradient = torch.autograd.grad(call(self.positions), self.positions,
-                                           create_graph=True)[0]
-            self.assertTrue(torch.equal(gradient, self.gradient(call(self.positions))))
-            with self.assertRaisesRegex(RuntimeError, "first derivatives only"):
-                (gradient.norm() - 1).square().backward()
-        self.assertTrue(torch.equal(functional.jacobian(loss, start),
-                                    self.gradient(loss(self.positions))))
-
     def test_meshes_of_files(self):
         """With textures, and without: scene_arguments has None for what a mesh lacks."""
         from file_samples import textured_mesh
@@ -296,37 +272,6 @@ class Modules(unittest.TestCase):
         self.assertEqual(renderer(**given, width=20).alpha.shape, (1, 8, 20))
         self.assertIn("width=9", repr(renderer))
         self.assertEqual(list(renderer.state_dict()), [])
-
-    def test_python_threads(self):
-        """Renders and backwards of four threads at once are those of one."""
-        data = _Rendered()
-        alone = [data[i] for i in range(4)]
-        with ThreadPoolExecutor(4) as pool:
-            for i, pair in enumerate(pool.map(data.__getitem__, 3 * list(range(4)))):
-                self.assertTrue(all(torch.equal(a, b) for a, b in zip(pair, alone[i % 4])))
-
-    def test_forked_workers(self):
-        data = _Rendered()
-        loader = torch.utils.data.DataLoader(data, batch_size=2, num_workers=2,
-                                             multiprocessing_context="fork")
-        alone = [data[i] for i in range(len(data))]  # starts threads here, before the fork
-        for i, (images, gradients) in enumerate(loader):
-            for k in range(2):
-                self.assertTrue(torch.equal(images[k], alone[2 * i + k][0]))
-                self.assertTrue(torch.equal(gradients[k], alone[2 * i + k][1]))
-
-
-class _Rendered:
-    """Images, and gradients of their sums."""
-
-    def __len__(self):
-        return 6
-
-    def __getitem__(self, index):
-        given = tensors(np.float32, seed=index)
-        positions = given["positions"].requires_grad_()
-        image = rendered(given, width=70, height=90, threads=2).color
-        return image.detach(), torch.autograd.grad(image.sum(), positions)[0]
 
 
 @needs_torch

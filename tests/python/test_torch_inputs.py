@@ -7,11 +7,11 @@ import numpy as np
 
 import tilegrad
 from support import needs_torch, torch
+from test_torch import PatchTest, rendered
 from tilegrad import Camera, Texture
 
 if torch:
     import tilegrad.torch as tg
-    from test_torch import rendered, tensors
 
 
 @needs_torch
@@ -88,14 +88,7 @@ class Lists(unittest.TestCase):
 
 
 @needs_torch
-class Types(unittest.TestCase):
-    def setUp(self):
-        self.given = tensors(np.float32)
-        self.positions = self.given["positions"].requires_grad_()
-
-    def gradient(self, loss):
-        return torch.autograd.grad(loss, self.positions)[0]
-
+class Types(PatchTest):
     def test_in_autocast_it_is_float32(self):
         expected = rendered(self.given)
         gradient = self.gradient(expected.color.sum())
