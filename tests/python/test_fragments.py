@@ -143,19 +143,17 @@ class RasterizeMeshes(unittest.TestCase):
             self.assertEqual(got[0][0, 0, 0].tolist(), [0, -1])
             for missing in got[1:]:
                 self.assertTrue((missing[0, 0, 0, 1] == -1).all())
-            return [float(got[1][0, 0, 0, 0]), *got[2][0, 0, 0, 0].tolist(),
-                    float(got[3][0, 0, 0, 0])]
+            self.assertAlmostEqual(got[3][0, 0, 0, 0].item(), distance, delta=1e-12)
+            return [got[1][0, 0, 0, 0].item(), *got[2][0, 0, 0, 0].tolist()]
 
-        near = -0.05  # the squared distance to a side, inside
-        np.testing.assert_allclose(pixel(), [2.75, 0.25, 0.25, 0.5, near], rtol=1e-6)
-        np.testing.assert_allclose(pixel(perspective_correct=True), [2, 0.5, 0.25, 0.25, near],
-                                   rtol=1e-6)
+        distance = -0.05  # its square, to a side, inside
+        np.testing.assert_allclose(pixel(), [2.75, 0.25, 0.25, 0.5], rtol=1e-7)
+        np.testing.assert_allclose(pixel(perspective_correct=True), [2, 0.5, 0.25, 0.25], rtol=1e-7)
         corners[..., 1] -= 0.75  # the pixel is as far above
-        outside = {"blur_radius": 0.07}
-        np.testing.assert_allclose(pixel(**outside), [4.625, -0.125, -0.125, 1.25, 0.0625],
-                                   rtol=1e-6)
-        np.testing.assert_allclose(pixel(clip_barycentric_coords=True, **outside),
-                                   [4, 0, 0, 1, 0.0625], rtol=1e-6, atol=1e-9)
+        distance, outside = 0.0625, {"blur_radius": 0.07}
+        np.testing.assert_allclose(pixel(**outside), [4.625, -0.125, -0.125, 1.25], rtol=1e-7)
+        np.testing.assert_allclose(pixel(clip_barycentric_coords=True, **outside), [4, 0, 0, 1],
+                                   rtol=1e-12, atol=1e-12)
 
     def test_images_have_rows_columns_and_faces_of_their_own(self):
         meshes = Meshes(torch.cat([triangle(), triangle() + torch.tensor([2., 0, 0])]), 2)

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <utility>
 
 #include "compat/nvdiffrast/test_util.h"
 #include "support/expect.h"

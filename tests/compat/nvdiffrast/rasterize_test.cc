@@ -191,8 +191,7 @@ TEST(Rasterize, FloatAgreesWithDouble) {
 
 TEST(Rasterize, SameBitsForEveryTargetAndNumberOfWorkers) {
   Scene<double> scene = WavyGrid(9, 5, 150, 90);
-  for (const double v : Soup(30, 8, 1, 1).positions) scene.positions.push_back(v);
-  for (std::int32_t i = 0; i < 90; ++i) scene.faces.push_back(100 + i);
+  AddSoup(30, 8, &scene);
   const Scene<float> narrow = AsScene<float>(scene);
   const auto expected = Rasterize(narrow);
   const auto d_rast = RandomNumbers<float>(expected.rast.size(), 1);
@@ -227,9 +226,7 @@ TEST(Rasterize, FloatIsDoubleRoundedBitByBit) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const int height = 20 + static_cast<int>(seed), width = 60 + static_cast<int>(seed);
     Scene<double> soup = WavyGrid(8, seed, height, width);
-    const auto first = static_cast<std::int32_t>(soup.vertices());
-    for (const double v : Soup(20, seed, 1, 1).positions) soup.positions.push_back(v);
-    for (std::int32_t i = 0; i < 60; ++i) soup.faces.push_back(first + i);
+    AddSoup(20, seed, &soup);
     const Scene<float> narrow = AsScene<float>(soup);
     Scene<double> wide = soup;
     wide.positions = As<double>(narrow.positions);

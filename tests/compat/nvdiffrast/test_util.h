@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "base/rng.h"
@@ -104,6 +103,14 @@ inline Scene<double> Soup(std::size_t faces, std::uint64_t seed, int height, int
     out.faces.push_back(static_cast<std::int32_t>(v));
   }
   return out;
+}
+
+// Adds faces with corners of their own.
+inline void AddSoup(std::size_t faces, std::uint64_t seed, Scene<double>* scene) {
+  auto first = static_cast<std::int32_t>(scene->vertices());
+  const Scene<double> soup = Soup(faces, seed, 1, 1);
+  scene->positions.insert(scene->positions.end(), soup.positions.begin(), soup.positions.end());
+  for (std::size_t v = 0; v < 3 * faces; ++v) scene->faces.push_back(first++);
 }
 
 // A wavy grid of n x n quads, seen in perspective, within the image; faces share vertices.
