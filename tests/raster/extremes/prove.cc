@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks of extremes_test.cc and extremes_test.cc without an end: counts scenes, violations and
+// The checks of extremes_test.cc without an end: counts scenes, violations and
 // the largest errors into a file, and goes on from there (`./run prove`). A scene is a pure
 // function of its number; `prove --scene N` runs that one alone, on every target.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/error.h"
+#include "base/file.h"
 #include "base/simd_target.h"
 #include "raster/extremes/bound_check.h"
-#include "raster/extremes/prove_tally.h"
 #include "raster/extremes/truth.h"
 
 namespace tilegrad::test {
@@ -28,6 +34,107 @@ struct Arguments {
   Path state = "out/prove/tally.txt";
   std::uint64_t scene = 0;  // this one alone, if not 0
 };
+
+// Of scenes of one kind, or a sum of such.
+struct ProofRow {
+  std::uint64_t scenes = 0, numbers = 0;  // numbers: that were compared
+  std::uint64_t violations = 0;           // scenes with one
+  double ratio = 0;                       // largest error / what is allowed
+  double share = 0;                       // largest error beyond rounding / E
+
+  void Add(const ProofRow& other) {
+    scenes += other.scenes;
+    numbers += other.numbers;
+    violations += other.violations;
+    ratio = std::max(ratio, other.ratio);
+    share = std::max(share, other.share);
+  }
+};
+
+// What has been counted so far, as a file that a later run goes on from.
+struct ProofTally {
+  std::uint64_t next = 0;  // the scene to go on with
+  // By the check, and for alpha the decades of delta and of faces.
+  std::map<std::pair<std::string, std::string>, ProofRow> rows;
+  std::vector<std::string> violations;  // a line each; the first thousand
+
+  void Add(const ProofTally& other) {
+    for (const auto& [key, row] : other.rows) rows[key].Add(row);
+    for (const std::string& line : other.violations) {
+      if (violations.size() < 1000) violations.push_back(line);
+    }
+  }
+  ProofRow Sum() const {
+    ProofRow out;
+    for (const auto& [key, row] : rows) out.Add(row);
+    return out;
+  }
+};
+
+constexpr const char* kFirstLine = "tilegrad prove 1";
+
+Status ReadLine(const std::string& line, ProofTally* tally) {
+  std::istringstream in(line);
+  std::string word;
+  in >> word;
+  if (word == "next") {
+    in >> tally->next;
+  } else if (word == "violation") {
+    std::getline(in >> std::ws, word);
+    tally->violations.push_back(word);
+  } else {
+    std::string group;
+    ProofRow row;
+    in >> group >> row.scenes >> row.numbers >> row.violations >> row.ratio >> row.share;
+    tally->rows[{word, group}] = row;
+  }
+  return in.fail() ? DataLoss("\"{}\" is no line of a tally", line) : Status();
+}
+
+// For people.
+std::string ProofTable(const ProofTally& tally) {
+  std::string out =
+      "| check | scenes of | scenes | numbers | violations | largest error / allowed | largest "
+      "error / E |\n|---|---|--:|--:|--:|--:|--:|\n";
+  const auto add = [&](const std::string& check, const std::string& group, const ProofRow& row) {
+    out += fmt::format("| {} | {} | {} | {} | {} | {:.3g} | {:.3g} |\n", check, group, row.scenes,
+                       row.numbers, row.violations, row.ratio, row.share);
+  };
+  for (const auto& [key, row] : tally.rows) add(key.first, key.second, row);
+  add("all", "", tally.Sum());
+  return out;
+}
+
+// An empty tally if there is no file.
+Result<ProofTally> ReadTally(const Path& file) {
+  ProofTally tally;
+  if (!std::filesystem::exists(file)) return tally;
+  const auto text = ReadText(file);
+  if (!text.ok()) return text.status();
+  std::istringstream lines(*text);
+  std::string line;
+  if (!std::getline(lines, line) || line != kFirstLine) {
+    return DataLoss("{}: not a tally of this program (first line \"{}\")", file.string(),
+                    kFirstLine);
+  }
+  while (std::getline(lines, line)) {
+    if (const Status status = ReadLine(line, &tally); !status.ok()) {
+      return DataLoss("{}: {}", file.string(), status.message());
+    }
+  }
+  return tally;
+}
+
+// Whole or not at all.
+Status WriteTally(const Path& file, const ProofTally& tally) {
+  std::string out = fmt::format("{}\nnext {}\n", kFirstLine, tally.next);
+  for (const auto& [key, row] : tally.rows) {
+    out += fmt::format("{} {} {} {} {} {} {}\n", key.first, key.second, row.scenes, row.numbers,
+                       row.violations, row.ratio, row.share);
+  }
+  for (const std::string& line : tally.violations) out += "violation " + line + "\n";
+  return WriteTextAtomic(file, out);
+}
 
 std::string Decades(double value, const char* name) {
   const int decade = static_cast<int>(std::floor(std::log10(value)));

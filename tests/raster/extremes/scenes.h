@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "raster/soft_mask/test_util.h"
 #include "render/pipeline/test_scenes.h"
