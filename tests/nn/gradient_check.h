@@ -66,6 +66,12 @@ inline double Dot(std::span<const Var> a, std::span<const Var> b) {
   return sum;
 }
 
+inline std::vector<double> Numbers(const Var& v) {
+  if (!v.valid()) return {};
+  const auto span = v.value().span<double>();
+  return {span.begin(), span.end()};
+}
+
 // What a case is examined at: its inputs, and the random numbers that make scalars of it.
 struct Leaves {
   Inputs x;                 // the inputs

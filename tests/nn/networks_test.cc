@@ -159,11 +159,6 @@ TEST(NetworksTraining, SameBitsForAnyNumberOfWorkersOver100Steps) {
 
 // Layers, initialisers and Adam.
 
-std::vector<double> Values(const Tensor& t) {
-  const auto span = t.span<double>();
-  return {span.begin(), span.end()};
-}
-
 TEST(Layers, NamesAndCounts) {
   const Workers workers(1);
   Context context(workers);
@@ -207,11 +202,11 @@ TEST(Layers, RunningStatistics) {
   BatchNorm norm(context, 1);
   const Var x = Constant(context, context.From({4, 1}, std::vector<double>{1, 2, 3, 6}));
   norm.Forward(x, Mode::kTrain);
-  EXPECT_DOUBLE_EQ(Values(norm.running_mean)[0], 0.1 * 3);
-  EXPECT_DOUBLE_EQ(Values(norm.running_variance)[0], 0.9 + 0.1 * 14.0 / 3);  // unbiased
+  EXPECT_DOUBLE_EQ(norm.running_mean.data<double>()[0], 0.1 * 3);
+  EXPECT_DOUBLE_EQ(norm.running_variance.data<double>()[0], 0.9 + 0.1 * 14.0 / 3);  // unbiased
   const Var y = norm.Forward(x, Mode::kEval);
-  EXPECT_NEAR(Values(y.value())[3], (6 - 0.3) / std::sqrt(0.9 + 1.4 / 3 + 1e-5), 1e-12);
-  EXPECT_DOUBLE_EQ(Values(norm.running_mean)[0], 0.1 * 3);  // eval tracks nothing
+  EXPECT_NEAR(Numbers(y)[3], (6 - 0.3) / std::sqrt(0.9 + 1.4 / 3 + 1e-5), 1e-12);
+  EXPECT_DOUBLE_EQ(norm.running_mean.data<double>()[0], 0.1 * 3);  // eval tracks nothing
 }
 
 TEST(AdamOptimizer, HandComputedSteps) {
@@ -224,11 +219,11 @@ TEST(AdamOptimizer, HandComputedSteps) {
   };
   // Step 1: m / (1 - beta1) = g, v / (1 - beta2) = g^2: p moves by the learning rate.
   ASSERT_TRUE(adam.Step(gradient(4.0)).ok());
-  EXPECT_NEAR(Values(p.value())[0], 1.0 - 0.1 * 4.0 / (4.0 + 1e-8), 1e-15);
+  EXPECT_NEAR(p.item(), 1.0 - 0.1 * 4.0 / (4.0 + 1e-8), 1e-15);
   // Step 2 with g = -2: m = 0.9 0.4 - 0.1 2 = 0.16, v = 0.999 0.016 + 0.001 4.
   ASSERT_TRUE(adam.Step(gradient(-2.0)).ok());
   const double m = 0.16 / 0.19, v = (0.999 * 0.016 + 0.004) / (1 - 0.999 * 0.999);
-  EXPECT_NEAR(Values(p.value())[0], 0.9 - 0.1 * m / (std::sqrt(v) + 1e-8), 1e-9);
+  EXPECT_NEAR(p.item(), 0.9 - 0.1 * m / (std::sqrt(v) + 1e-8), 1e-9);
   EXPECT_EQ(adam.steps(), 2);
 }
 
