@@ -7,8 +7,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -3,7 +3,6 @@
 // sweep: float or double.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>

@@ -64,19 +64,19 @@ Json UpstreamAlpha(const Json& scene, std::size_t n) {
   return scene.contains("upstream_alpha") ? scene["upstream_alpha"][n] : scene["upstream"][n][3];
 }
 
-// Calls check(scene, its source of inputs, gradient or null, options, n): null for alpha alone.
-template <class Check>
-void ForSharedImages(const Json& file, const Check& check) {
+// Calls check(scene, its source of inputs, gradient, image) for the gradients that `wanted` takes.
+template <class Wanted, class Check>
+void ForSharedImages(const Json& file, const Wanted& wanted, const Check& check) {
   const Json& scenes = file["scenes"];
   for (const Json& scene : scenes) {
     const Json& inputs = scene.contains("inputs_of_scene")
                              ? scenes[scene["inputs_of_scene"].get<std::size_t>()]
                              : scene;
     for (const Json& gradient : scene["gradients"]) {
-      if (gradient["outputs"] != "alpha") continue;
+      if (!wanted(scene, gradient)) continue;
       for (std::size_t n = 0; n < inputs["face_vertices"].size(); ++n) {
-        SCOPED_TRACE(scene["name"].get<std::string>() + " " + scene["anti_aliasing"].dump() +
-                     " eps " + gradient["eps"].dump());
+        SCOPED_TRACE(scene["name"].get<std::string>() + " " + scene["anti_aliasing"].dump() + " " +
+                     gradient["outputs"].dump() + " eps " + gradient["eps"].dump());
         check(scene, inputs, gradient, n);
       }
     }
@@ -88,7 +88,10 @@ void ForSharedImages(const Json& file, const Check& check) {
 TEST(N3mr, DoubleGivesTheNumbersOfThePublishedKernels) {
   TILEGRAD_VECTORS_OR_SKIP(file, "16_n3mr.json");
   int cases = 0;
-  ForSharedImages(file,
+  const auto alpha_alone = [](const Json&, const Json& gradient) {
+    return gradient["outputs"] == "alpha";
+  };
+  ForSharedImages(file, alpha_alone,
                   [&](const Json& scene, const Json& inputs, const Json& gradient, std::size_t n) {
                     const int size = scene["image_size"];
                     const auto corners = Numbers(inputs["face_vertices"][n]);
@@ -321,25 +324,6 @@ struct SharedScene {
   }
 };
 
-// Calls check(scene of the file, its inputs, gradient, image) for colours.
-template <class Check>
-void ForSharedImages(const Json& file, const Check& check) {
-  for (const Json& of : file["scenes"]) {
-    if (!of.contains("texture")) continue;
-    const Json& inputs = of.contains("inputs_of_scene")
-                             ? file["scenes"][of["inputs_of_scene"].get<std::size_t>()]
-                             : of;
-    for (const Json& gradient : of["gradients"]) {
-      if (gradient["outputs"] == "depth") continue;
-      for (std::size_t n = 0; n < inputs["face_vertices"].size(); ++n) {
-        SCOPED_TRACE(of["name"].get<std::string>() + " " + of["anti_aliasing"].dump() + " " +
-                     gradient["outputs"].get<std::string>());
-        check(of, inputs, gradient, n);
-      }
-    }
-  }
-}
-
 template <class T>
 void ExpectShared(const Json& of, const Json& gradient, std::size_t n, const Result<T>& got,
                   double of_image, double of_gradient) {
@@ -361,14 +345,18 @@ void ExpectShared(const Json& of, const Json& gradient, std::size_t n, const Res
 TEST(N3mrColors, DoubleGivesTheNumbersOfThePublishedKernels) {
   TILEGRAD_VECTORS_OR_SKIP(file, "16_n3mr.json");
   int cases = 0;
-  ForSharedImages(file,
-                  [&](const Json& of, const Json& inputs, const Json& gradient, std::size_t n) {
-                    const SharedScene<double> at(file, of, inputs, n, gradient["eps"]);
-                    const int asked = AskedOf(gradient["outputs"]);
-                    ExpectShared(of, gradient, n, Reference(at.scene, at.d, asked), 1e-10, 1e-10);
-                    ExpectShared(of, gradient, n, Fast(at.scene, at.d, asked), 1e-10, 1e-10);
-                    ++cases;
-                  });
+  const auto of_colors = [](const Json& of, const Json& gradient) {
+    return of.contains("texture") && gradient["outputs"] != "depth";
+  };
+  n3mr_test::ForSharedImages(
+      file, of_colors,
+      [&](const Json& of, const Json& inputs, const Json& gradient, std::size_t n) {
+        const SharedScene<double> at(file, of, inputs, n, gradient["eps"]);
+        const int asked = AskedOf(gradient["outputs"]);
+        ExpectShared(of, gradient, n, Reference(at.scene, at.d, asked), 1e-10, 1e-10);
+        ExpectShared(of, gradient, n, Fast(at.scene, at.d, asked), 1e-10, 1e-10);
+        ++cases;
+      });
   EXPECT_EQ(cases, 22);
 }
 
