@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "raster/interpolate_ref.h"
+#include "raster/mesh_cast.h"
 #include "render/reference.h"
 #include "render/shading/run.h"
 #include "tilegrad/renderer.h"
@@ -43,23 +44,6 @@ struct Wall {
   SceneT<T> View() const { return {.positions = positions, .faces = faces, .camera = camera}; }
 };
 
-// A screen mesh in double, number for number.
-void Widen(const raster::ScreenMeshBuffersT<float>& from, raster::ScreenMeshBuffersT<double>* to) {
-  to->x.assign(from.x.begin(), from.x.end());
-  to->y.assign(from.y.begin(), from.y.end());
-  to->depth.assign(from.depth.begin(), from.depth.end());
-  to->inverse_depth.assign(from.inverse_depth.begin(), from.inverse_depth.end());
-  to->v0 = from.v0;
-  to->v1 = from.v1;
-  to->v2 = from.v2;
-  to->source_face = from.source_face;
-  to->reject = from.reject;
-  to->source_vertices = from.source_vertices;
-  to->source_faces = from.source_faces;
-  to->width = from.width;
-  to->height = from.height;
-}
-
 // Of one mesh the levels are the same in either type, up to a rounding of a logarithm below 32 and
 // of a quotient in it.
 TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
@@ -70,8 +54,7 @@ TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
     PreparedScene<float> scene;
     const Scene view = wall.View();
     PrepareRef(view, {wall.uvs, 2, Rate::kVertex}, Options(), &scene);
-    raster::ScreenMeshBuffersT<double> buffers;
-    Widen(scene.buffers, &buffers);
+    const auto buffers = raster::MeshCast<double>(scene.buffers);
     const raster::ScreenMeshT<double> mesh = buffers.View();
     const std::vector<double> values(scene.attributes.values.begin(),
                                      scene.attributes.values.end());
