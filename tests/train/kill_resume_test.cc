@@ -4,7 +4,6 @@
 // curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers and
 // the size of the cache of meshes.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -178,17 +177,6 @@ TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
     if (::pipe(ends) != 0 || ::dup2(ends[1], 2) < 0 || ::close(ends[0]) != 0) ::_exit(126);
   });
   EXPECT_EQ(EndProcess(child), 0) << Output("run");
-}
-
-TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
-  Write("tiny.toml", kTinyConfig);  // without the picture of what is streamed
-  const pid_t child = Start("run", 1, [] {
-    const rlimit limit = {65536, 65536};  // more than the thumbnails, less than a checkpoint
-    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
-  });
-  EXPECT_EQ(EndProcess(child), 1) << Output("run");
-  ExpectIn(Output("run"), "File too large");
-  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "run" / "checkpoints"));  // no temporary left
 }
 
 }  // namespace tilegrad::train::kill_resume_test

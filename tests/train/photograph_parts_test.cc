@@ -247,18 +247,13 @@ TEST(SphereVertices, GivesTheIndependentNumbers) {
 TEST(SphereVertices, GradientsAreDerivatives) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
-  Rng rng(4);
-  const auto random = [&](std::size_t n) {
-    Vector out(n);
-    for (double& x : out) x = rng.Uniform(-1, 1);
-    return out;
-  };
-  const Vector sphere = random(12);
-  Setting at(context, 2, sphere, random(24), random(6));
+  const Vector sphere = Uniform(12, -1, 1, 4);
+  Setting at(context, 2, sphere, Uniform(24, -1, 1, 5), Uniform(6, -1, 1, 6));
   const auto loss = [&] {
     const nn::Var out = at.Out();
     return nn::Sum(out * out * out + out);
   };
+  Rng rng(7);
   nn::ExpectGradientBy({at.bias, at.centroid}, loss, rng);
 }
 

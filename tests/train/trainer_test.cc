@@ -17,6 +17,7 @@
 #include "train/data/trained_models.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
+#include "train/step_profile.h"
 
 namespace tilegrad::train::trainer_test {
 
@@ -254,8 +255,10 @@ TEST_F(TrainerTest, FullDiskLosesNothingThatWasSaved) {
     const FullDisk full(checkpoint / 2);
     const auto outcome = Run();
     ASSERT_EQ(outcome.status().code(), StatusCode::kIo) << outcome.status().message();
-    ExpectMessage(outcome.status(), "checkpoints");
+    ExpectMessage(outcome.status(), "checkpoints", "File too large");
   }
+  for (const auto& file : std::filesystem::directory_iterator(job_.run / "checkpoints"))
+    EXPECT_EQ(file.path().extension(), ".safetensors");  // no half of one
   EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 6);
   ExpectFinishes();
   ExpectSameBits("whole", "run");
@@ -271,6 +274,42 @@ TEST_F(TrainerTest, BadDatasetsAreNamed) {
   ValueOf<std::int64_t>(job_.config, "schedule.views") = 2;
   CutInHalf(ModelFilePath(job_.data, "noise", "m3"));
   ExpectMessage(Run().status(), "m3.npz");
+}
+
+TEST_F(TrainerTest, ARecordedRunHasTheSameBits) {
+  RunWhole("one", 1);
+  LoopTrace trace;
+  trace.Begin();
+  job_.run = folder_ / "recorded";
+  EXPECT_TRUE(Ok(Train(job_, Workers(16, &trace), {}))->finished);
+  EXPECT_GT(trace.End().loops.size(), 100u);
+  ExpectSameBits("one", "recorded");
+}
+
+TEST_F(TrainerTest, AProfilePredictsForEachNumberOfWorkersAndWritesNothing) {
+  const auto profile = Ok(ProfileSteps(job_, {.steps = 2, .workers = {2, 16}}, {}));
+  EXPECT_GT(profile->one, 0);
+  EXPECT_GT(profile->all, 0);
+  ASSERT_EQ(profile->forecasts.size(), 2u);
+  for (const LoopForecast& forecast : profile->forecasts) {
+    double taken = 0;
+    bool draws = false;
+    for (const HeldBack& place : forecast.places) {
+      taken += place.taken;
+      draws = draws || place.place.starts_with("render/pipeline/pipeline.cc:");
+    }
+    EXPECT_NEAR(taken, forecast.seconds, 1e-9);
+    EXPECT_TRUE(draws);
+  }
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) files += entry.exists();
+  EXPECT_EQ(files, 1u);  // the dataset
+}
+
+TEST_F(TrainerTest, AProfileStops) {
+  const StopFlag stop{true};
+  EXPECT_EQ(ProfileSteps(job_, {.steps = 2, .workers = {2}}, {nullptr, &stop}).status().code(),
+            StatusCode::kCancelled);
 }
 
 }  // namespace tilegrad::train::trainer_test

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
-#include <map>
 
 #include "base/rng.h"
 #include "train/metrics/metrics.h"

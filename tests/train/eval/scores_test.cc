@@ -136,16 +136,25 @@ TEST(PredictionPictures, KnowWhichSidesAViewSees) {
 
 // Tables of scores: names of classes are text, whatever they hold.
 
+// Of models of one class: their 3D IoU.
+Evaluation Scored(const std::string& name, const std::vector<double>& ious,
+                  const std::string& class_name = "chair") {
+  Evaluation out;
+  out.predictor = name;
+  out.split = "test";
+  out.views_per_model = 1;
+  out.classes = {class_name};
+  out.class_models = {static_cast<int>(ious.size())};
+  out.rows = {{name, {{ious[0], 0.5}}, {ious[0], 0.5}}};
+  for (std::size_t m = 0; m < ious.size(); ++m)
+    out.models.push_back({class_name, std::to_string(m), {.iou = ious[m], .f_score = 0.5}});
+  return out;
+}
+
 Evaluation Named(const std::string& name) {
-  Evaluation e;
-  e.predictor = name;
-  e.split = "test";
-  e.views_per_model = 1;
-  e.classes = {name};
-  e.class_models = {1};
-  e.rows = {{name, {{0.5, 0.25}}, {0.5, 0.25}}};
-  e.models = {{name, name, {0.5, 0.25}}};
-  return e;
+  Evaluation out = Scored(name, {0.5}, name);
+  out.models[0].id = name;
+  return out;
 }
 
 TEST(EvaluationTable, MarkdownHoldsNoHtmlAndNoFurtherCells) {
@@ -187,19 +196,6 @@ TEST(StandardErrors, AreThoseOfAMeanOverClasses) {
   EXPECT_NEAR(*MeanOverClasses(three).error, std::sqrt(4.0) / 3, 1e-12);
   const std::vector<std::vector<double>> single = {{1}, {2}};
   EXPECT_FALSE(MeanOverClasses(single).error);
-}
-
-Evaluation Scored(const std::string& name, const std::vector<double>& ious) {
-  Evaluation out;
-  out.predictor = name;
-  out.split = "test";
-  out.views_per_model = 1;
-  out.classes = {"chair"};
-  out.class_models = {static_cast<int>(ious.size())};
-  out.rows = {{name, {{ious[0], 0.5}}, {ious[0], 0.5}}};
-  for (std::size_t m = 0; m < ious.size(); ++m)
-    out.models.push_back({"chair", std::to_string(m), {.iou = ious[m], .f_score = 0.5}});
-  return out;
 }
 
 const PairedDifference& IouOf(const PairedComparison& comparison) { return comparison.measures[0]; }

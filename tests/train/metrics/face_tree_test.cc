@@ -87,18 +87,6 @@ TEST(FaceTree, NoPointOfAFaceIsNearer) {
   }
 }
 
-TEST(FaceTree, WeightsOfRegionsByHand) {
-  const Triangle face = {{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}};
-  const FaceTree tree(std::span(&face, 1));
-  using Weights = std::array<double, 3>;
-  EXPECT_EQ(tree.Find({0.5, 0.5, 3}).weights, (Weights{0.5, 0.25, 0.25}));
-  EXPECT_EQ(tree.Find({-1, -1, 1}).weights, (Weights{1, 0, 0}));
-  EXPECT_EQ(tree.Find({5, -1, 1}).weights, (Weights{0, 1, 0}));
-  EXPECT_EQ(tree.Find({1, -1, 1}).weights, (Weights{0.5, 0.5, 0}));
-  EXPECT_EQ(tree.Find({2, 2, 1}).weights, (Weights{0, 0.5, 0.5}));
-  EXPECT_EQ(tree.Find({-1, 0.5, 1}).weights, (Weights{0.75, 0, 0.25}));
-}
-
 TEST(FaceTree, FacesWithoutArea) {
   const std::vector<Triangle> faces = {{{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}},
                                        {{{1, 0, 0}, {3, 0, 0}, {2, 0, 0}}}};

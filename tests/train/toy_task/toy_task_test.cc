@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A task from outside of src/ goes the whole way through the public seam: it is configured,
-// trains, is killed and continues to the same bits, predicts, is evaluated and reported.
+// trains, is stopped and continues to the same bits, predicts, is evaluated and reported.
 #include "toy_task.h"
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <csignal>
-#include <cstdlib>
-#include <thread>
-
-#include "support/process.h"
 #include "support/temp_folder.h"
 #include "train/predictor.h"
 #include "train/report/report.h"
@@ -20,7 +14,6 @@
 
 namespace tilegrad::train::toy_task_test {
 
-constexpr const char* kFolder = "TILEGRAD_TOY_FOLDER";
 constexpr const char* kConfig = R"(name = "toy"
 [task]
 kind = "box"
@@ -47,31 +40,9 @@ class ToyTaskTest : public TempFolderTest {
  protected:
   ToyTaskTest() : context_(workers_) { RegisterTask("box", &MakeToyTask); }
 
-  // This program again, in a process of its own, as the child below.
-  pid_t StartChild(const std::string& run) const {
-    ::setenv(kFolder, (folder_ / run).c_str(), 1);
-    return StartProcess({"/proc/self/exe", "--gtest_filter=ToyTaskTest.DISABLED_Child",
-                         "--gtest_also_run_disabled_tests"},
-                        folder_ / "child.txt");
-  }
-  std::size_t Logged(const std::string& run) const {
-    const auto log = ReadLog(folder_ / run);
-    return log.ok() ? log->size() : 0;
-  }
-
   Workers workers_{2};
   nn::Context context_;
 };
-
-// A run that takes long enough to be killed in it.
-TEST_F(ToyTaskTest, DISABLED_Child) {
-  const char* folder = std::getenv(kFolder);
-  ASSERT_NE(folder, nullptr);
-  const auto wait = [](const Progress&) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  };
-  EXPECT_TRUE(TrainToy(folder, 1, {wait}).ok());
-}
 
 TEST_F(ToyTaskTest, IsConfiguredByItsOwnKeys) {
   const auto config = Ok(ParseConfig(kConfig, "toy.toml"));
@@ -82,22 +53,22 @@ TEST_F(ToyTaskTest, IsConfiguredByItsOwnKeys) {
                 "schedule.batch");
 }
 
-TEST_F(ToyTaskTest, KilledAndContinuedEndsInTheSameBits) {
+TEST_F(ToyTaskTest, StoppedAndContinuedEndsInTheSameBits) {
   const auto whole = Ok(TrainToy(folder_ / "whole", 2));
-  for (int kill = 1; kill <= 2; ++kill) {
-    const pid_t child = StartChild("killed");
-    for (int i = 0; i < 3000 && Logged("killed") < 60u * static_cast<unsigned>(kill); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    ::kill(child, SIGKILL);
-    ASSERT_EQ(EndProcess(child), -SIGKILL);
+  for (const std::size_t step : {60, 120}) {  // between two checkpoints of the schedule
+    StopFlag stop = false;
+    const auto stop_at = [&](const Progress& at) {
+      if (at.stage == "training" && at.done >= step) stop = true;
+    };
+    EXPECT_FALSE(TrainToy(folder_ / "parts", 1, {stop_at, &stop}).ok());
   }
-  const auto continued = Ok(TrainToy(folder_ / "killed", 1));
-  EXPECT_GE(continued->first_step, 60);
+  const auto continued = Ok(TrainToy(folder_ / "parts", 1));
+  EXPECT_GE(continued->first_step, 120);
   EXPECT_TRUE(continued->finished);
   EXPECT_EQ(FinalTensors(context_, folder_ / "whole", 400).size(),
             8u);  // weight, bias; m, v and steps of each
-  ExpectSameBits(context_, folder_ / "whole", folder_ / "killed", 400);
-  ExpectSameCurves(folder_ / "whole", folder_ / "killed", 400);
+  ExpectSameBits(context_, folder_ / "whole", folder_ / "parts", 400);
+  ExpectSameCurves(folder_ / "whole", folder_ / "parts", 400);
 }
 
 TEST_F(ToyTaskTest, LearnsPredictsIsEvaluatedAndReported) {

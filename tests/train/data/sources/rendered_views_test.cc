@@ -169,6 +169,10 @@ TEST_F(RenderedSets, Nmr) {
   // The dataset has them by split: only their order differs.
   const Dataset dataset = Ok(Dataset::Open(Data())).value();
   EXPECT_EQ(dataset.Select(Split::kTest).size(), 2u);
+  EXPECT_EQ(dataset.info().classes, (std::vector<std::string>{"car", "chair"}));
+  EXPECT_DOUBLE_EQ(dataset.info().camera.lens.fov_y, 30);
+  const ModelData first = Ok(dataset.Load(0)).value();
+  EXPECT_TRUE(first.points.empty() && first.mesh.faces.empty());
   std::vector<MiniatureModel> sorted = {models[4], models[0], models[1], models[2], models[3],
                                         models[9], models[5], models[6], models[7], models[8]};
   ExpectMasks(sorted);
@@ -305,19 +309,6 @@ TEST_F(BrokenMembersOfSets, NumbersThatAreNoCamera) {
   const Source large = Ok(ChoySource(Set(), {}, 256)).value();
   ExpectMessage(large->Load(1).status(), "137 x 137 pixels");
   EXPECT_EQ(ChoySource(folder_, {}, 64).status().code(), StatusCode::kNotFound);
-}
-
-TEST(BrokenMembers, OnePercentIsAllowed) {
-  BrokenMembers broken;
-  EXPECT_TRUE(broken.Check(0, false).ok());
-  EXPECT_EQ(broken.Summary(), "");
-  broken.Add("car/a", "a.png: cut off");
-  EXPECT_TRUE(broken.Check(100, false).ok());
-  ExpectMessage(broken.Check(99, false), "car/a");
-  EXPECT_TRUE(broken.Check(99, true).ok());
-  broken.Add("car/b", "b.png: cut off");
-  broken.Add("car/c", "empty");
-  EXPECT_EQ(broken.Summary(), "      2  cut off (car/a, car/b)\n      1  empty (car/c)\n");
 }
 
 }  // namespace tilegrad::train::rendered_views_test

@@ -4,16 +4,17 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "nn/nn.h"
 #include "scene/weak_perspective_ref.h"
-#include "support/source_dir.h"
 #include "train/config.h"
 #include "train/data/photographs/miniature.h"
 #include "train/models/photograph_network.h"
 #include "train/run/log.h"
+#include "train/same_run.h"
 #include "train/tasks/photographs/step.h"
 #include "train/tiny_run_fixture.h"
 
@@ -217,6 +218,78 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
   }
 }
 
+// Section 5.4 with the terms of section 5.3: a second stage starts as another run and has a critic,
+// which is kept and logged.
+TEST_F(PhotographsTask, ASecondStageHasACritic) {
+  const auto train_second = [&] {
+    return TrainPhotographs(
+               "second", {"start.run=" + (folder_ / "first").string(), "adversarial.weight=0.5",
+                          "adversarial.features=1", "adversarial.base=2", "adversarial.halvings=2",
+                          "adversarial.learning_rate=1e-3"})
+        .status();
+  };
+  ExpectMessage(train_second(), "first");  // which is not there
+  Ok(TrainPhotographs("first").status());
+  Ok(train_second());
+  nn::Context context(workers_);
+  const auto tensors = FinalTensors(context, folder_ / "second", 12);
+  EXPECT_TRUE(std::ranges::any_of(
+      tensors, [](const nn::NamedTensor& tensor) { return tensor.name.starts_with("critic."); }));
+  const auto log = Ok(ReadLog(folder_ / "second"));
+  for (const char* name : {"adversarial", "critic_features", "critic_distance", "critic_penalty"}) {
+    EXPECT_TRUE(std::ranges::any_of(log->back().values, [&](const auto& value) {
+      return value.first == name;
+    })) << name;
+  }
+}
+
+// In float64, by a central difference along a random direction of the texture's last layer: h as
+// above.
+TEST_F(PhotographsTask, GradientsOfAStepWithACritic) {
+  PhotographsConfig config;
+  config.network = {.code = {.base = 4, .most = 8, .levels = 2, .latent = 8},
+                    .sphere = {.level = 1, .radius = 1, .smoothing = 2}};
+  config.adversary = {.weight = 0.5, .features = 1, .base = 2, .halvings = 2};
+  config.loss = {.keypoint = 0,
+                 .mask = 0,
+                 .camera = 0,
+                 .deformation = 0,
+                 .laplacian = 0,
+                 .entropy = 0,
+                 .color = 0};
+  config.size = 16;
+  config.render.sharpness = config.render.sharpness_start = 50;
+  config.schedule.steps = 10;
+  const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
+  const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, {});
+  nn::Context context(workers_, nn::DType::kF64);
+  PhotographStep step(context, config, {set.mean_keypoints, 15});
+  const auto adversary = Adversary::Make(context, config.adversary, {.seed = 5}).value();
+  step.SetAdversary(adversary.get());
+  const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
+  std::vector<nn::Var> vars;
+  for (const auto& p : nn::Parameters(step.network().module())) vars.push_back(p.value);
+  StepValues values;
+  const auto gradients = nn::Grad(step.Loss(batch, 1, &values), vars);
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  double largest = 0;
+  for (std::size_t which = 0; which < vars.size(); ++which) {
+    if (!gradients[which].valid()) continue;
+    const std::span<double> value = vars[which].value().span<double>();
+    const double slope = gradients[which].value().span<double>()[0], before = value[0];
+    const auto at = [&](double h) {
+      value[0] = before + h;
+      StepValues ignored;
+      return step.Loss(batch, 1, &ignored).item();
+    };
+    const double h = 1e-7, difference = (at(h) - at(-h)) / (2 * h);
+    at(0);
+    EXPECT_NEAR(slope, difference, 2e-3 * (1 + std::abs(difference))) << which;
+    largest = std::max(largest, std::abs(slope));
+  }
+  EXPECT_GT(largest, 1e-3);  // something depends on the critic
+}
+
 // By hand: a regular octahedron reaches 1 along its axes, 1 / sqrt(3) along its diagonals.
 TEST(HullReaches, OfAnOctahedron) {
   const std::vector<std::array<double, 3>> points = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
@@ -286,15 +359,6 @@ TEST(PhotographNetworks, RowsStartWhereQuaternionsDo) {
         agree += out.camera_choices.value().span<double>()[7 * k + 3 + i] * start[i];
       EXPECT_GT(std::abs(agree), 0.9) << rotation << k;
     }
-  }
-}
-
-TEST(PhotographConfigs, AreRead) {
-  for (const char* file : {"birds", "cars_photos", "photographs_cmr"}) {
-    const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
-    const auto config = Ok(ParseConfig(ReadText(path).value(), path.string()));
-    EXPECT_EQ(config->name, file);
-    Ok(ParseConfig(WriteConfig(*config), "its own text").status());
   }
 }
 
