@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Normals that are known without a formula, and the adjoint by complex step.
+// Normals and light that are known without a formula. Adjoints: render/renderer_gradients_test.cc.
 #include <gtest/gtest.h>
 
-#include <complex>
+#include <array>
 #include <vector>
 
 #include "base/rng.h"
@@ -10,9 +10,6 @@
 #include "shade/mesh_normals_ref.h"
 
 namespace tilegrad::shade::mesh_normals_test {
-
-using Complex = std::complex<double>;
-constexpr double kStep = 1e-40;
 
 // Three faces of a unit cube's corner, at the origin; the one in z = 0 has four times the area.
 const std::vector<float> kCorner = {0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 1, 5, 5, 5};
@@ -91,96 +88,22 @@ TEST(MeshNormals, BothSidesOfASheetHaveNoSmoothNormal) {
   }
 }
 
-// A derivative along a random direction of a random linear loss, against a complex step.
-template <class Normals, class Adjoint>
-void ExpectComplexStep(std::size_t rows, const Normals& normals, const Adjoint& adjoint) {
-  Rng rng(3, 1);
-  std::vector<double> positions(kCorner.size()), along(kCorner.size());
-  std::vector<Complex> moved(kCorner.size());
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    positions[i] = rng.Uniform(-1, 1);
-    along[i] = rng.Uniform(-1, 1);
-    moved[i] = Complex(positions[i], kStep * along[i]);
-  }
-  std::vector<Vec3<double>> d_units(rows);
-  for (auto& d : d_units) d = {rng.Uniform(-1, 1), rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
-  std::vector<UnitVector<Complex>> z(rows);
-  normals(TriangleMeshT<Complex>{moved, kFaces}, std::span(z));
-  double step = 0;
-  for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) step += z[i].unit[c].imag() / kStep * d_units[i][c];
-  }
-  std::vector<UnitVector<double>> units(rows);
-  const TriangleMeshT<double> mesh{positions, kFaces};
-  normals(mesh, std::span(units));
-  std::vector<double> d_positions(positions.size());
-  adjoint(mesh, std::span<const UnitVector<double>>(units), std::span(d_units),
-          std::span(d_positions));
-  double expected = 0;
-  for (std::size_t i = 0; i < along.size(); ++i) expected += d_positions[i] * along[i];
-  EXPECT_NE(expected, 0);
-  EXPECT_NEAR(step, expected, 1e-12 * std::abs(expected));  // some fifty roundings
-}
-
-TEST(MeshNormals, AdjointsAreTheComplexStepDerivative) {
-  ExpectComplexStep(
-      5, [](auto mesh, auto units) { SmoothNormalsRef(mesh, units); },
-      [](auto... all) { SmoothNormalsAdjointRef(all...); });
-  ExpectComplexStep(
-      3, [](auto mesh, auto units) { FlatNormalsRef(mesh, units); },
-      [](auto... all) { FlatNormalsAdjointRef(all...); });
-}
-
 }  // namespace tilegrad::shade::mesh_normals_test
 
 namespace tilegrad::shade::lambert_test {
 
-using Complex = std::complex<double>;
-constexpr double kStep = 1e-30;
-
-template <class T>
-std::array<LightT<T>, 2> Lights() {
-  return {LightT<T>{{T(0), T(1), T(0)}, T(0.5)}, LightT<T>{{T(0.6), T(0), T(0.8)}, T(0.25)}};
-}
+constexpr std::array<LightT<double>, 2> kLights = {{{{0, 1, 0}, 0.5}, {{0.6, 0, 0.8}, 0.25}}};
 
 TEST(Lambert, FacingLightAddsItsIntensityAndAvertedOneNothing) {
-  const auto lights = Lights<double>();
-  const LambertLightT<double> light{0.3, lights};
+  const LambertLightT<double> light{0.3, kLights};
   EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0, 1, 0}), 0.8);
   EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0, -1, 0}), 0.3);
   EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0.6, 0, 0.8}), 0.55);
 }
 
-TEST(Lambert, AdjointIsTheComplexStepDerivative) {
-  const auto lights = Lights<double>();
-  const std::array<double, 3> n = {0.48, 0.6, 0.64};
-  std::array<double, 3> d_n = {};
-  std::array<LightT<double>, 2> d_lights = {kNoLight<double>, kNoLight<double>};
-  LambertAdjointRef<double>({0.3, lights}, n, 1.7, d_n, d_lights);
-
-  const auto step = [&](auto move) {
-    auto z_lights = Lights<Complex>();
-    std::array<Complex, 3> z = {n[0], n[1], n[2]};
-    move(z, z_lights);
-    return 1.7 * LambertRef<Complex>({Complex(0.3), z_lights}, z).imag() / kStep;
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(d_n[i], step([&](auto& z, auto&) { z[i] += Complex(0, kStep); }), 1e-15);
-    for (std::size_t k = 0; k < 2; ++k) {
-      EXPECT_NEAR(d_lights[k].direction[i],
-                  step([&](auto&, auto& l) { l[k].direction[i] += Complex(0, kStep); }), 1e-15);
-    }
-  }
-  for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_NEAR(d_lights[k].intensity,
-                step([&](auto&, auto& l) { l[k].intensity += Complex(0, kStep); }), 1e-15);
-  }
-}
-
 TEST(Lambert, AvertedLightPullsNothing) {
-  const auto lights = Lights<double>();
   std::array<double, 3> d_n = {};
-  LambertAdjointRef<double>({0.3, lights}, {-0.6, -0.8, 0}, 1.0, d_n, {});
+  LambertAdjointRef<double>({0.3, kLights}, {-0.6, -0.8, 0}, 1.0, d_n, {});
   for (double d : d_n) EXPECT_EQ(d, 0.0);
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <complex>
 #include <limits>
 #include <vector>
 
@@ -14,10 +13,7 @@
 
 namespace tilegrad::shade::texture_test {
 
-using Complex = std::complex<double>;
-
 constexpr int kWidth = 5, kHeight = 4, kChannels = 3;
-constexpr double kStep = 1e-30;  // complex step: no cancellation, so the derivative is exact
 
 template <class T>
 TextureViewT<T> View(const std::vector<T>& texels, Wrap wrap) {
@@ -100,46 +96,6 @@ TEST(Texture, EndlessCoordinatesReadATexelNotTheMemoryBeside) {
         EXPECT_LE(c, 1.0);
       }
     }
-  }
-}
-
-struct Pulled {
-  std::vector<double> uv = {0, 0}, texels = std::vector<double>(kWidth * kHeight * kChannels);
-};
-
-Pulled Adjoint(const std::vector<double>& texels, Wrap wrap, double u, double v,
-               const std::vector<double>& d_color) {
-  Pulled out;
-  SampleLevelAdjointRef<double>(View(texels, wrap), u, v, d_color, out.uv, out.texels);
-  return out;
-}
-
-double ComplexLoss(const std::vector<Complex>& texels, Wrap wrap, Complex u, Complex v,
-                   const std::vector<double>& d_color) {
-  const auto color = Sample(View(texels, wrap), u, v);
-  Complex loss = 0;
-  for (std::size_t c = 0; c < color.size(); ++c) loss += color[c] * d_color[c];
-  return loss.imag() / kStep;
-}
-
-TEST(Texture, AdjointIsTheComplexStepDerivative) {
-  const auto texels = RandomTexels();
-  const std::vector<Complex> complex_texels(texels.begin(), texels.end());
-  const std::vector<double> d_color = {0.7, -1.3, 0.4};
-  const Complex step(0, kStep);
-  // A dozen roundings of terms below W * |d_color| * |texel difference| ~ 10.
-  constexpr double kTolerance = 1e-13;
-  Rng rng(3);
-  for (int n = 0; n < 50; ++n) {
-    const Wrap wrap = n % 2 ? Wrap::kRepeat : Wrap::kClamp;
-    const double u = rng.Uniform(-0.6, 1.6), v = rng.Uniform(-0.6, 1.6);
-    const Pulled pulled = Adjoint(texels, wrap, u, v, d_color);
-    EXPECT_NEAR(pulled.uv[0], ComplexLoss(complex_texels, wrap, u + step, v, d_color), kTolerance);
-    EXPECT_NEAR(pulled.uv[1], ComplexLoss(complex_texels, wrap, u, v + step, d_color), kTolerance);
-    const std::size_t k = rng.Below(texels.size());
-    auto moved = complex_texels;
-    moved[k] += step;
-    EXPECT_NEAR(pulled.texels[k], ComplexLoss(moved, wrap, u, v, d_color), kTolerance);
   }
 }
 

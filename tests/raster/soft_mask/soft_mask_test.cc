@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The soft mask on every target against all faces in double, within E + the rounding that
-// docs/numerics.md derives; gradients likewise, and by complex step.
+// docs/numerics.md derives; gradients likewise. The reference itself by complex step:
+// render/renderer_gradients_test.cc.
 #include "raster/soft_mask/soft_mask.h"
 
 #include <gtest/gtest.h>
@@ -160,27 +161,6 @@ TEST(SoftMask, RegionsDoNotMatterOnAnyTarget) {
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
       SCOPED_TRACE(seed);
       CheckRegions(SpotsScene(seed), &scratch);
-    }
-  }
-}
-
-// The order of the faces may move alpha within the budget only, and not at all by bits run to run.
-TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
-  SoftMaskScratch scratch, fresh;
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    SoftScene scene = RandomScene(seed, 60);
-    const SoftTruth truth(scene);
-    const SoftResult a = RunSoftMask(scene, scene.d_alpha, &scratch);
-    const SoftResult again = RunSoftMask(scene, scene.d_alpha, &fresh);
-    EXPECT_EQ(a.alpha, again.alpha);
-    EXPECT_EQ(a.d_corners, again.d_corners);
-    for (auto* index : {&scene.mesh.v0, &scene.mesh.v1, &scene.mesh.v2}) {
-      std::reverse(index->begin(), index->end());
-    }
-    const SoftResult b = RunSoftMask(scene, scene.d_alpha, &scratch);
-    for (std::size_t i = 0; i < scene.pixels(); ++i) {
-      EXPECT_NEAR(static_cast<double>(a.alpha[i]), static_cast<double>(b.alpha[i]),
-                  a.spent + b.spent + 2 * truth.Rounding(i));
     }
   }
 }
@@ -361,46 +341,6 @@ TEST(SoftMask, NoFacesAndNoBackground) {
   const SoftResult covered = RunSoftMask(scene, scene.d_alpha, &scratch);
   for (const float a : covered.alpha) EXPECT_EQ(a, 1.0f);
   EXPECT_EQ(covered.spent, 0);
-}
-
-// The reference's gradient, which the others are held to.
-TEST(SoftMaskRef, GradientIsThatOfAComplexStep) {
-  using Complex = std::complex<double>;
-  const std::vector<std::int32_t> faces{0, 1}, v0{0, 1}, v1{1, 2}, v2{2, 3};
-  const std::vector<std::uint8_t> reject{0, 0};
-  const SoftScale<double> scale{0.2, 0.3, 4.0};
-  const SoftScale<Complex> complex_scale{0.2, 0.3, 4.0};
-  Rng rng(11);
-  for (int scene = 0; scene < 200; ++scene) {
-    std::vector<double> x, y, d_x(4, 0.0), d_y(4, 0.0);
-    for (int v = 0; v < 4; ++v) {
-      x.push_back(rng.Uniform(0, 10));
-      y.push_back(rng.Uniform(0, 10));
-    }
-    const auto mesh = [&](auto& mx, auto& my, auto out) {
-      out.x = mx;
-      out.y = my;
-      out.v0 = v0;
-      out.v1 = v1;
-      out.v2 = v2;
-      out.reject = reject;
-      return out;
-    };
-    const auto real = mesh(x, y, ScreenMeshT<double>{});
-    SoftAlphaRefBackward<double>(real, faces, 4.5, 5.5, scale, 1.0,
-                                 [&](std::size_t n, int corner, double dx, double dy) {
-                                   const auto v = static_cast<std::size_t>(real.vertex(n, corner));
-                                   d_x[v] += dx;
-                                   d_y[v] += dy;
-                                 });
-    for (std::size_t v = 0; v < 8; ++v) {
-      std::vector<Complex> cx(x.begin(), x.end()), cy(y.begin(), y.end());
-      (v < 4 ? cx[v] : cy[v - 4]) += Complex(0, 1e-100);
-      const Complex alpha = SoftAlphaRef<Complex>(mesh(cx, cy, ScreenMeshT<Complex>{}), faces,
-                                                  Complex(4.5), Complex(5.5), complex_scale);
-      EXPECT_NEAR(v < 4 ? d_x[v] : d_y[v - 4], alpha.imag() * 1e100, 1e-12);
-    }
-  }
 }
 
 // The paper's rule by hand and against a complex step. Golden numbers of a published
