@@ -41,13 +41,10 @@ const std::uint8_t kByHand[] = {
     0x30, 0x2c, 0x38, 0x5d, 0x7d, 0x7d, 0x20, 0x20,  // 0,8]}} and two spaces
     0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x20, 0xc0};
 
-TEST_F(Safetensors, ReadsAFileWrittenByHand) {
-  const auto file = Ok(DecodeSafetensors(context_, kByHand));
-  ASSERT_EQ(file->tensors.size(), 1u);
-  EXPECT_EQ(file->tensors[0].name, "b");
-  EXPECT_EQ(file->tensors[0].value.shape(), (Shape{2}));
-  EXPECT_EQ(file->tensors[0].value.data<float>()[0], 1.0f);
-  EXPECT_EQ(file->tensors[0].value.data<float>()[1], -2.5f);
+TEST_F(Safetensors, WritesTheBytesOfAFileWrittenByHand) {
+  const std::vector<float> values = {1.0f, -2.5f};
+  const auto bytes = EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}});
+  EXPECT_EQ(bytes.value(), Bytes(std::begin(kByHand), std::end(kByHand)));
 }
 
 // What the format's own implementation writes and reads (huggingface/safetensors): the bytes that
@@ -86,12 +83,6 @@ TEST_F(Safetensors, ReadsMetadataAndPaddingOfOthers) {
   ASSERT_EQ(file->tensors.size(), 1u);
   EXPECT_EQ(file->tensors[0].value.dtype(), DType::kI32);
   EXPECT_EQ(file->tensors[0].value.shape(), (Shape{2, 2}));
-}
-
-TEST_F(Safetensors, WritesThoseBytes) {
-  const std::vector<float> values = {1.0f, -2.5f};
-  const auto bytes = EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}});
-  EXPECT_EQ(bytes.value(), Bytes(std::begin(kByHand), std::end(kByHand)));
 }
 
 TEST_F(Safetensors, RoundTripOfAllTypes) {
