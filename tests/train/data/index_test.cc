@@ -74,18 +74,6 @@ TEST(Split, AShareOfNothingIsNone) {
   EXPECT_EQ(Count(models), (std::array<int, 3>{10, 0, 0}));
 }
 
-TEST(Split, CopiesOfOneMeshStayTogether) {
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    auto models = Models(30);
-    for (std::size_t i = 0; i < models.size(); ++i) models[i].geometry = 1 + i / 3;
-    SplitModels({"x"}, {.test_share = 0.2, .validation_share = 0.2, .seed = seed}, &models);
-    std::map<std::uint64_t, std::set<Split>> sides;
-    for (const auto& m : models) sides[m.geometry].insert(m.split);
-    for (const auto& [geometry, splits] : sides) EXPECT_EQ(splits.size(), 1u);
-    EXPECT_EQ(Count(models), (std::array<int, 3>{18, 6, 6}));
-  }
-}
-
 // Ten shapes, the first of 91 liveries: it counts as one, and no shape is divided.
 TEST(Split, ShapesStayTogetherAndCountOnce) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
