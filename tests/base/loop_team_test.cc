@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -76,20 +75,6 @@ TEST(LoopTeam, LoopsOfSeveralCallersRunOneAfterTheOther) {
   second.join();
   EXPECT_EQ(tasks, 3 * 25 * (7 + 1));
   EXPECT_EQ(overlaps, 0);
-}
-
-TEST(LoopTeam, RunsAnotherLoopAfterOneThatThrows) {
-  const Workers workers(4);
-  for (int round = 0; round < 100; ++round) {
-    EXPECT_THROW(workers.For(20,
-                             [](std::size_t i, std::size_t) {
-                               if (i % 7 == 3) throw std::runtime_error("task");
-                             }),
-                 std::runtime_error);
-    std::atomic<int> done = 0;
-    workers.For(20, [&](std::size_t, std::size_t) { ++done; });
-    EXPECT_EQ(done, 20);
-  }
 }
 
 // A member that has been idle for long must be called again.
