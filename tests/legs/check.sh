@@ -85,7 +85,7 @@ leg_headers() {
     exit "${bad:-0}"' _ "${flags[@]}"
 }
 
-leg_docs() { ./run docs; python3 tests/structure/links.py; }
+leg_docs() { ./run docs; python3 tests/structure/references.py; }
 leg_install() {
   leg_configure portable portable
   compile build/portable
