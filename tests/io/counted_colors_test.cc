@@ -5,7 +5,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "base/error.h"
 #include "io/gltf_fixture.h"
 #include "io/mesh_file.h"
 #include "scene/image.h"

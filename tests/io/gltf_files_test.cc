@@ -5,11 +5,10 @@
 
 #include <cstring>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 
+#include "io/gltf_fixture.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::io::gltf_files_test {
 
@@ -196,39 +195,32 @@ TEST_F(GltfFiles, ColoursBeyondTheFirstSetAndOtherScenesAreSaid) {
 
 // glTF beyond geometry: cameras, samplers, texture transforms, how materials are drawn.
 
-using nlohmann::json;
-
 // One triangle with uv (0,0), (1,0), (0,1), a material with a texture, a camera on a node.
 constexpr std::array kMirrored = {TextureWrap::kMirror, TextureWrap::kMirror};
 
-class GltfScene : public TempFolderTest {
+class GltfScene : public GltfTest {
  protected:
   GltfScene() {
-    const std::vector<float> numbers = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1};
-    Write("a.bin", std::string(reinterpret_cast<const char*>(numbers.data()), 60));
     EXPECT_TRUE(io::SavePng(folder_ / "t.png", ImageU8(2, 2, 3, 200)).ok());
-    scene_ = json::parse(R"({
+    Begin(R"({
       "asset": {"version": "2.0"},
       "scenes": [{"nodes": [0, 1]}], "scene": 0,
       "nodes": [{"mesh": 0},
                 {"camera": 0, "name": "eye", "translation": [1, 2, 3], "scale": [2, 2, 2]}],
       "cameras": [{"type": "perspective",
                    "perspective": {"yfov": 0.5, "aspectRatio": 1.5, "znear": 0.25}}],
-      "buffers": [{"uri": "a.bin", "byteLength": 60}],
-      "bufferViews": [{"buffer": 0, "byteLength": 36},
-                      {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
-      "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
-                    {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"}],
+      "bufferViews": [], "accessors": [],
       "images": [{"uri": "t.png"}],
       "samplers": [{"wrapS": 33648, "wrapT": 33648, "magFilter": 9728}],
       "textures": [{"source": 0, "sampler": 0}],
       "materials": [{"name": "m", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
       "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1},
                                   "material": 0}]}]})");
+    Add<float>("VEC3", {0, 0, 0, 1, 0, 0, 0, 1, 0});
+    Add<float>("VEC2", {0, 0, 1, 0, 0, 1});
   }
-  io::LoadedMesh Load() { return Ok(io::LoadMesh(Write("a.gltf", scene_.dump()))).value(); }
-  json& Texture() { return scene_["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]; }
-  json scene_;
+  io::LoadedMesh Load() { return Ok(io::LoadMesh(File())).value(); }
+  Json& Texture() { return json_["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]; }
 };
 
 TEST_F(GltfScene, CameraStandsAtItsNode) {
@@ -242,8 +234,8 @@ TEST_F(GltfScene, CameraStandsAtItsNode) {
 }
 
 TEST_F(GltfScene, OrthographicCamerasAreLeftOutWithAWord) {
-  scene_["cameras"][0] = {{"type", "orthographic"},
-                          {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"zfar", 9}, {"znear", 1}}}};
+  json_["cameras"][0] = {{"type", "orthographic"},
+                         {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"zfar", 9}, {"znear", 1}}}};
   const auto loaded = Load();
   EXPECT_TRUE(loaded.cameras.empty());
   ExpectOnly(loaded.warnings, "orthographic");
@@ -256,10 +248,10 @@ TEST_F(GltfScene, SamplersAndDrawing) {
   EXPECT_FALSE(m.double_sided);
   EXPECT_FALSE(m.unlit);
   EXPECT_EQ(m.alpha_mode, AlphaMode::kOpaque);
-  scene_["samplers"][0] = {{"wrapS", 33071}, {"wrapT", 10497}};
-  scene_["materials"][0]["doubleSided"] = true;
-  scene_["materials"][0]["alphaMode"] = "MASK";
-  scene_["materials"][0]["extensions"]["KHR_materials_unlit"] = json::object();
+  json_["samplers"][0] = {{"wrapS", 33071}, {"wrapT", 10497}};
+  json_["materials"][0]["doubleSided"] = true;
+  json_["materials"][0]["alphaMode"] = "MASK";
+  json_["materials"][0]["extensions"]["KHR_materials_unlit"] = Json::object();
   const auto loaded = Load();
   m = loaded.mesh.materials[0];
   EXPECT_EQ(m.wrap, (std::array{TextureWrap::kClamp, TextureWrap::kRepeat}));
@@ -274,7 +266,7 @@ TEST_F(GltfScene, SamplersAndDrawing) {
 TEST_F(GltfScene, TextureTransform) {
   Texture()["extensions"]["KHR_texture_transform"] = {
       {"offset", {0.25, 0.5}}, {"scale", {2, 3}}, {"rotation", 1.5707963267948966}};
-  scene_["extensionsUsed"] = scene_["extensionsRequired"] = {"KHR_texture_transform"};
+  json_["extensionsUsed"] = json_["extensionsRequired"] = {"KHR_texture_transform"};
   const auto loaded = Load();
   EXPECT_TRUE(loaded.warnings.empty());
   const std::vector<glm::vec2> expected = {{0.25f, 0.5f}, {0.25f, 2.5f}, {3.25f, 0.5f}};
@@ -285,10 +277,10 @@ TEST_F(GltfScene, TextureTransform) {
 
 TEST_F(GltfScene, NonsenseInATransformIsIgnoredOrRefusedButNeverRead) {
   Texture()["extensions"]["KHR_texture_transform"] = {
-      {"offset", {0.25}}, {"scale", "x"}, {"rotation", json::array()}, {"texCoord", 0}};
+      {"offset", {0.25}}, {"scale", "x"}, {"rotation", Json::array()}, {"texCoord", 0}};
   EXPECT_EQ(Load().mesh.corner_uvs.size(), 3u);
   Texture()["extensions"]["KHR_texture_transform"] = {{"offset", {1e39, 0}}};
-  EXPECT_FALSE(io::LoadMesh(Write("a.gltf", scene_.dump())).ok());
+  EXPECT_FALSE(io::LoadMesh(File()).ok());
 }
 
 TEST_F(GltfScene, MaterialsComeBackAsTheyWere) {
@@ -324,8 +316,8 @@ TEST_F(GltfScene, LightsPointToTheSun) {
     const auto bytes = Ok(io::EncodeGlb(triangle, {.sun = sun}));
     std::uint32_t length = 0;
     std::memcpy(&length, bytes->data() + 12, 4);
-    const json scene = json::parse(bytes->begin() + 20, bytes->begin() + 20 + length);
-    const json& q = scene["nodes"][1]["rotation"];
+    const Json scene = Json::parse(bytes->begin() + 20, bytes->begin() + 20 + length);
+    const Json& q = scene["nodes"][1]["rotation"];
     const glm::dvec3 u(q[0], q[1], q[2]), z(0, 0, 1);
     const double w = q[3];
     const glm::dvec3 turned = z + 2.0 * glm::cross(u, glm::cross(u, z) + w * z);

@@ -8,11 +8,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/gltf_fixture.h"
 #include "io/image_file.h"
 #include "io/sh3f.h"
 #include "scene/shapes.h"
@@ -307,50 +307,36 @@ TEST_F(MeshOriginTest, PolygonsAreCutRightFarAway) {
   }
 }
 
-using Json = nlohmann::json;
-
-// A glTF file with a triangle strip's four vertices (x, y, 0) in float, and the document's parts.
-std::string Gltf(const std::string& folder, const Json& nodes, const Json& primitives) {
-  const float corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
-  const std::uint16_t indices[6] = {0, 1, 2, 2, 1, 3};
-  std::string bytes(reinterpret_cast<const char*>(corners), sizeof(corners));
-  bytes.append(reinterpret_cast<const char*>(indices), sizeof(indices));
-  std::ofstream(folder + "/b.bin", std::ios::binary) << bytes;
-  const Json view = {{"buffer", 0}, {"byteLength", 48}},
-             index_view = {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 12}};
-  const auto triangle = [](int offset) {
-    return Json{{"bufferView", 1},
-                {"byteOffset", offset},
-                {"componentType", 5123},
-                {"count", 3},
-                {"type", "SCALAR"}};
-  };
-  const Json position = {{"bufferView", 0}, {"componentType", 5126}, {"count", 4},
-                         {"type", "VEC3"},  {"min", {0, 0, 0}},      {"max", {1, 1, 0}}};
-  return Json{{"asset", {{"version", "2.0"}}},
-              {"buffers", Json::array({{{"uri", "b.bin"}, {"byteLength", 60}}})},
-              {"bufferViews", {view, index_view}},
-              {"accessors", {position, triangle(0), triangle(6), position}},
-              {"materials", {{{"name", "a"}}, {{"name", "b"}}}},
-              {"meshes", Json::array({{{"primitives", primitives}}})},
-              {"scenes", Json::array({{{"nodes", Json::array({0})}}})},
-              {"nodes", nodes}}
-      .dump();
-}
-
-Json Primitive(int position, int indices, int material) {
-  return {{"attributes", {{"POSITION", position}}}, {"indices", indices}, {"material", material}};
-}
+// A triangle strip's four vertices (x, y, 0) in float, twice, and both of its triangles.
+class GltfOriginTest : public GltfTest {
+ protected:
+  GltfOriginTest() {
+    Begin(R"({"asset": {"version": "2.0"}, "materials": [{"name": "a"}, {"name": "b"}],
+              "scenes": [{"nodes": [0]}], "bufferViews": [], "accessors": []})");
+    const std::vector<float> corners = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
+    Add("VEC3", corners);
+    Add<std::uint16_t>("SCALAR", {0, 1, 2});
+    Add<std::uint16_t>("SCALAR", {2, 1, 3});
+    Add("VEC3", corners);
+  }
+  static Json Primitive(int position, int indices, int material) {
+    return {{"attributes", {{"POSITION", position}}}, {"indices", indices}, {"material", material}};
+  }
+  LoadedMesh Load(const Json& nodes, const Json& primitives) {
+    json_["nodes"] = nodes;
+    json_["meshes"] = Json::array({{{"primitives", primitives}}});
+    return Ok(LoadMesh(File())).value();
+  }
+};
 
 // The vertices are local, two nodes carry the place: their sum is formed in double.
-TEST_F(MeshOriginTest, GltfNodesFarAway) {
+TEST_F(GltfOriginTest, NodesFarAway) {
   const Json nodes = {{{"translation", {400000.25, 4600000.125, 300}}, {"children", {1, 2}}},
                       {{"mesh", 0}, {"translation", {31000.125, 0, 0}}},
                       {{"camera", 0}, {"translation", {31000.125, 0, 3}}}};
-  auto document = Json::parse(Gltf(folder_.string(), nodes, Json::array({Primitive(0, 1, 0)})));
-  document["cameras"] =
+  json_["cameras"] =
       Json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}});
-  const auto loaded = Load(Write("a.gltf", document.dump()));
+  const auto loaded = Load(nodes, Json::array({Primitive(0, 1, 0)}));
   EXPECT_EQ(loaded.origin, glm::dvec3(431001, 4600001, 300));
   ASSERT_EQ(loaded.mesh.positions.size(), 4u);
   EXPECT_EQ(loaded.mesh.positions[3], glm::vec3(0.375f, 0.125f, 0));
@@ -364,7 +350,7 @@ TEST_F(MeshOriginTest, GltfNodesFarAway) {
 
 // Normals that a part has not are made of its own small numbers, first or last: in float, all four
 // corners have one x.
-TEST_F(MeshOriginTest, NormalsOfPartsWithoutAny) {
+TEST_F(GltfOriginTest, NormalsOfPartsWithoutAny) {
   const Json nodes = Json::array({{{"mesh", 0},
                                    {"translation", {4600000, 300, 0.5}},
                                    {"rotation", {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}},
@@ -373,7 +359,7 @@ TEST_F(MeshOriginTest, NormalsOfPartsWithoutAny) {
   with["attributes"]["NORMAL"] = 0;  // its own positions, which are no normals of the plane
   for (const bool first : {false, true}) {
     const Json parts = first ? Json{with, Primitive(0, 1, 0)} : Json{Primitive(0, 1, 0), with};
-    const auto loaded = Load(Write("a.gltf", Gltf(folder_.string(), nodes, parts)));
+    const auto loaded = Load(nodes, parts);
     ASSERT_EQ(loaded.mesh.normals.size(), 8u);
     for (std::size_t v = 0; v < 3; ++v) {  // the turned plane faces -y
       const glm::vec3 n = loaded.mesh.normals[v + (first ? 4 : 0)];
@@ -383,18 +369,15 @@ TEST_F(MeshOriginTest, NormalsOfPartsWithoutAny) {
 }
 
 // Primitives of one mesh with one accessor of positions share its vertices; others do not.
-TEST_F(MeshOriginTest, GltfSharedAccessors) {
+TEST_F(GltfOriginTest, SharedAccessors) {
   const Json nodes = Json::array({{{"mesh", 0}}});
-  const auto shared = Load(
-      Write("a.gltf", Gltf(folder_.string(), nodes, {Primitive(0, 1, 0), Primitive(0, 2, 1)})));
+  const auto shared = Load(nodes, {Primitive(0, 1, 0), Primitive(0, 2, 1)});
   EXPECT_EQ(shared.mesh.positions,
             (std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}));
   EXPECT_EQ(shared.mesh.faces, (std::vector<Face>{{0, 1, 2}, {2, 1, 3}}));
   EXPECT_EQ(shared.mesh.face_materials, (std::vector<std::int32_t>{0, 1}));
   EXPECT_EQ(shared.mesh.materials[1].name, "b");
-  const auto apart =
-      Load(Write("b.gltf", Gltf(folder_.string(), nodes,
-                                {Primitive(0, 1, 0), Primitive(3, 2, 1), Primitive(0, 2, 0)})));
+  const auto apart = Load(nodes, {Primitive(0, 1, 0), Primitive(3, 2, 1), Primitive(0, 2, 0)});
   EXPECT_EQ(apart.mesh.positions.size(), 8u);
   EXPECT_EQ(apart.mesh.faces, (std::vector<Face>{{0, 1, 2}, {6, 5, 7}, {2, 1, 3}}));
   EXPECT_EQ(apart.mesh.face_materials, (std::vector<std::int32_t>{0, 1, 0}));
