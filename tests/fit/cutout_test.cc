@@ -4,12 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
-#include "fit/make_views.h"
-#include "io/mesh_file.h"
-#include "scene/shapes.h"
-#include "support/temp_folder.h"
+#include "fit/views_fixture.h"
 
 namespace tilegrad::train::cutout_test {
 
@@ -153,18 +148,17 @@ TEST(Cutout, IsForMasksWithGapsIfAutomatic) {
 }
 
 // Whole fits to images of a board.
-class CutoutFit : public TempFolderTest {
+class CutoutFit : public ViewsTest {
  protected:
+  void SetUp() override {
+    Views(Box({0, 0, 0}, {0.9f, 0.7f, 0.1f}), {.views = 8, .held_out = 0, .size = 32});
+  }
   FitJob Job(const std::string& out) {
-    if (!std::filesystem::exists(folder_ / "views")) {
-      const Status made =
-          MakeViews(Box({0, 0, 0}, {0.9f, 0.7f, 0.1f}), {.views = 8, .held_out = 0, .size = 32},
-                    folder_ / "views", OutputGuard(true), {}, stop_);
-      EXPECT_TRUE(made.ok()) << made.message();
-    }
     FitJob job;
-    job.input = ReadFitFolder(folder_ / "views", 0).value();
-    CutGaps(&job.input.images);
+    job.input = Input();
+    // One column of eight, of all images: narrow enough to be closed.
+    for (std::size_t p = 0; p < job.input.images.alpha.size(); p += 8)
+      job.input.images.alpha[p] = 0;
     job.out = folder_ / out;
     job.config.cutout = Cutout::kOn;
     job.config.steps = 12;
@@ -174,48 +168,33 @@ class CutoutFit : public TempFolderTest {
     job.config.checkpoint_every = 5;
     return job;
   }
-  Mesh Made(const std::string& out) {
-    return io::LoadMesh(folder_ / out / "mesh.glb").value().mesh;
-  }
-  Bytes Read(const std::string& out) { return ReadFile(folder_ / out / "mesh.glb").value(); }
-
-  StopFlag stop_ = false;
-
- private:
-  // One column of eight, of all images: narrow enough to be closed.
-  static void CutGaps(TargetImages* images) {
-    for (std::size_t p = 0; p < images->alpha.size(); p += 8) images->alpha[p] = 0;
-  }
 };
 
 TEST_F(CutoutFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   for (const StartShape start : {StartShape::kHull, StartShape::kSphere}) {
-    const std::string whole = start == StartShape::kHull ? "hull" : "sphere";
-    FitJob job = Job(whole);
+    FitJob job = Job(start == StartShape::kHull ? "hull" : "sphere");
     job.config.start = start;
-    const auto outcome = RunFit(job, Workers(1), {}, stop_);
-    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
-    job.out = folder_ / (whole + "_parts");
-    const std::pair<std::string, std::uint64_t> stops[] = {
-        {"fitting", 3}, {"fitting", 8}, {"fitting the cut-out", 20}};
-    for (const auto& [stage, done] : stops) {
-      const auto stop = [&](const Progress& p) { stop_ = p.stage == stage && p.done == done; };
-      const auto stopped = RunFit(job, Workers(2), stop, stop_);
-      ASSERT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
-      stop_ = false;
-      job.existing = ExistingRun::kContinue;
-    }
-    ASSERT_TRUE(RunFit(job, Workers(2), {}, stop_).ok());
-    EXPECT_EQ(Read(whole), Read(whole + "_parts"));
-    EXPECT_EQ(Made(whole).materials[0].alpha_mode, AlphaMode::kMask);
+    const Path whole = job.out;
+    Ok(Run(job, 1).status());
+    job.out += "_parts";
+    StopAt(job, 3);
+    job.existing = ExistingRun::kContinue;
+    StopAt(job, 8);
+    const auto watch = [&](const Progress& p) {
+      stop_ = p.stage == "fitting the cut-out" && p.done == 20;
+    };
+    EXPECT_EQ(RunFit(job, Workers(2), watch, stop_).status().code(), StatusCode::kCancelled);
+    stop_ = false;
+    Ok(Run(job).status());
+    EXPECT_EQ(ReadFile(whole / "mesh.glb").value(), ReadFile(job.out / "mesh.glb").value());
+    EXPECT_EQ(io::LoadMesh(whole / "mesh.glb")->mesh.materials[0].alpha_mode, AlphaMode::kMask);
   }
 }
 
 TEST_F(CutoutFit, RefusesAMeshWithoutATexture) {
   FitJob job = Job("given");
   job.start = Icosphere(1, 1);
-  const auto refused = RunFit(job, Workers(1), {}, stop_);
-  EXPECT_EQ(refused.status().message(),
+  EXPECT_EQ(Run(job).status().message(),
             "a cut-out texture takes a texture, which the mesh to start from lacks: add "
             "\"texture\" to --optimize, or leave out --cutout on");
 }

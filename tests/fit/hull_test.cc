@@ -58,14 +58,6 @@ class Hull : public ViewsTest {
   }
 };
 
-Mesh Together(const Mesh& a, const Mesh& b) {
-  Mesh out = a;
-  const auto first = static_cast<std::int32_t>(a.positions.size());
-  out.positions.insert(out.positions.end(), b.positions.begin(), b.positions.end());
-  for (const Face& f : b.faces) out.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
-  return out;
-}
-
 TEST_F(Hull, ContainsTheObjectAndIsLittleLarger) {
   const Mesh box = Box({0, 0, 0}, {0.9f, 0.5f, 0.6f});
   const FitInput input = Pictures(box);
@@ -91,8 +83,8 @@ TEST_F(Hull, HasTheHolesAndThePartsOfTheObject) {
   Mesh mesh;
   for (const float x : {-0.26f, 0.26f}) {
     for (const float side : {-0.18f, 0.18f}) {
-      mesh = Together(mesh, Box({x, side, 0}, {0.46f, 0.08f, 0.1f}));
-      mesh = Together(mesh, Box({x + side, 0, 0}, {0.08f, 0.44f, 0.1f}));
+      Append(mesh, Box({x, side, 0}, {0.46f, 0.08f, 0.1f}));
+      Append(mesh, Box({x + side, 0, 0}, {0.08f, 0.44f, 0.1f}));
     }
   }
   const auto hull = Ok(HullMesh(Pictures(mesh), {}, Workers(2)));
@@ -116,23 +108,20 @@ TEST_F(Hull, HasLargerCellsWhereItHasTooManyHandles) {
   HullOptions no_faces;
   no_faces.most_faces = 0;
   const FitInput ring = Pictures(Torus(0.3f, 0.12f, 24, 12), 64);
-  const auto fine = HullMesh(ring, {}, workers), few = HullMesh(ring, no_faces, workers);
+  const auto fine = Ok(HullMesh(ring, {}, workers)), few = Ok(HullMesh(ring, no_faces, workers));
   const double cell = CarveOptions().cell_pixels;
-  const auto coarse = HullMesh(ring, {.carve = {.cell_pixels = 2 * cell}}, workers);
-  ASSERT_TRUE(fine.ok() && few.ok() && coarse.ok());
+  const auto coarse = Ok(HullMesh(ring, {.carve = {.cell_pixels = 2 * cell}}, workers));
   EXPECT_EQ(few->positions, coarse->positions);
   EXPECT_EQ(few->faces, coarse->faces);
   EXPECT_NE(few->positions, fine->positions);
   const FitInput box = Pictures(Box({0, 0, 0}, {0.9f, 0.5f, 0.6f}), 64);
-  const auto plain = HullMesh(box, {}, workers), none = HullMesh(box, no_faces, workers);
-  ASSERT_TRUE(plain.ok() && none.ok());
+  const auto plain = Ok(HullMesh(box, {}, workers)), none = Ok(HullMesh(box, no_faces, workers));
   EXPECT_EQ(plain->positions, none->positions);
 }
 
 TEST_F(Hull, IsTheSameForAnyNumberOfWorkers) {
   const FitInput input = Pictures(Torus(0.3f, 0.12f, 24, 12), 64);
-  const auto one = HullMesh(input, {}, Workers(1)), many = HullMesh(input, {}, Workers(5));
-  ASSERT_TRUE(one.ok() && many.ok());
+  const auto one = Ok(HullMesh(input, {}, Workers(1))), many = Ok(HullMesh(input, {}, Workers(5)));
   EXPECT_EQ(one->positions, many->positions);
   EXPECT_EQ(one->faces, many->faces);
 }

@@ -13,16 +13,16 @@
 
 namespace tilegrad::train::input_test {
 
+constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
+
 class Input : public TempFolderTest {
  protected:
   // 8 x 6 pixels of one grey.
   void Image(const std::string& name, int grey) {
-    std::filesystem::create_directories((folder_ / name).parent_path());
     Ok(io::SavePng(folder_ / name, ImageU8(8, 6, 3, static_cast<std::uint8_t>(grey))));
   }
   // The left half is the object.
   void Mask(const std::string& name) {
-    std::filesystem::create_directories((folder_ / name).parent_path());
     ImageU8 mask(8, 6, 1);
     for (int y = 0; y < 6; ++y) {
       for (int x = 0; x < 4; ++x) mask.at(x, y)[0] = 255;
@@ -34,6 +34,12 @@ class Input : public TempFolderTest {
     Write(folder + "/cameras.txt", std::string("1 PINHOLE 16 12 20 22 9 5\n"));
     Write(folder + "/images.txt",
           std::string("1 0 1 0 0 0 0 4 1 a.png\n3.5 4.5 -1\n2 0 1 0 0 1 0 4 1 deep/b.png\n"));
+  }
+  // Of one frame, with further keys of the file and of the frame.
+  void Transforms(const std::string& folder, const std::string& image, const std::string& keys,
+                  const std::string& of_frame = "") {
+    Write(folder + "/transforms.json",
+          "{" + keys + R"("frames":[{"file_path":")" + image + "\"," + of_frame + kPose + "}]}");
   }
   void Images(const std::string& folder) {
     Image(folder + "/a.png", 51);
@@ -113,20 +119,16 @@ TEST_F(Input, AWorldThatColmapMadeIsTurnedLevel) {
             given.cameras[0].rotation[4]);
 }
 
-constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
-
 TEST_F(Input, TransformsOfWindows) {
   Image("w/images/0.png", 51);
   Mask("w/masks/0.png");
   for (const std::string path : {R"(images\\0.png)", R"(.\\images\\0.png)", R"(images\\0)"}) {
-    Write("w/transforms.json", R"({"fl_x":10,"frames":[{"file_path":")" + path +
-                                   R"(","mask_path":"masks\\0.png",)" + kPose + "}]}");
+    Transforms("w", path, R"("fl_x":10,)", R"("mask_path":"masks\\0.png",)");
     const auto input = Ok(ReadFitFolder(folder_ / "w", 0));
     EXPECT_TRUE(input->masked);
   }
   Image("w/odd\\name.png", 51);  // a name that has one is found as it is
-  Write("w/transforms.json",
-        std::string(R"({"fl_x":10,"frames":[{"file_path":"odd\\name.png",)") + kPose + "}]}");
+  Transforms("w", R"(odd\\name.png)", R"("fl_x":10,)");
   EXPECT_TRUE(ReadFitFolder(folder_ / "w", 0).ok());
 }
 
@@ -136,7 +138,7 @@ TEST_F(Input, TransformsOfOtherLenses) {
   for (const std::string lens :
        {R"("camera_model":"EQUIRECTANGULAR")", R"("orthographic":true)", R"("k4":0.1)",
         R"("camera_model":"OPENCV_FISHEYE","p1":0.1)", R"("k1":"wide")"}) {
-    Write("f/transforms.json", R"({"fl_x":10,)" + lens + R"(,"frames":[{)" + image + "}]}");
+    Transforms("f", "0.png", R"("fl_x":10,)" + lens + ",");
     ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 0",
                   "undistort");
     Write("f/transforms.json",
@@ -150,8 +152,7 @@ TEST_F(Input, TransformsOfOtherLenses) {
 TEST_F(Input, TransformsSayWhatTheySay) {
   Image("t/0.png", 51);
   const auto camera = [&](const std::string& file, const std::string& frame) {
-    Write("t/transforms.json",
-          "{" + file + R"("frames":[{"file_path":"0.png",)" + frame + kPose + "}]}");
+    Transforms("t", "0.png", file, frame);
     const auto input = ReadFitFolder(folder_ / "t", 0);
     EXPECT_TRUE(input.ok()) << input.status().message();
     return input.ok() ? input->cameras[0] : Camera();
@@ -172,8 +173,7 @@ TEST_F(Input, TransformsSayWhatTheySay) {
   EXPECT_EQ(c.fx, 20);
   c = camera(R"("fl_x":10,"fl_y":12,)", R"("camera_angle_x":null,)");
   EXPECT_EQ(c.fy, 12);
-  Write("t/transforms.json",
-        std::string(R"({"fl_x":0,"frames":[{"file_path":"0.png",)") + kPose + "}]}");
+  Transforms("t", "0.png", R"("fl_x":0,)");
   ExpectMessage(ReadFitFolder(folder_ / "t", 0).status(), "0.png", "focal lengths are 0");
 }
 
@@ -191,9 +191,8 @@ TEST_F(Input, ColmapCamerasThatNoImageUsesMayBeOfAnyKind) {
 TEST_F(Input, IsTurnedAsUpSays) {
   Model("u/sparse/0");
   Images("u/images");
-  const auto given = ReadFitFolder(folder_ / "u", {.up = UpAxis::kY});
-  const auto turned = ReadFitFolder(folder_ / "u", {.up = UpAxis::kZ});
-  ASSERT_TRUE(given.ok() && turned.ok());
+  const auto given = Ok(ReadFitFolder(folder_ / "u", {.up = UpAxis::kY}));
+  const auto turned = Ok(ReadFitFolder(folder_ / "u", {.up = UpAxis::kZ}));
   const Camera expected = UprightCamera(UpAxis::kZ, given->cameras[1]);
   EXPECT_TRUE(std::ranges::equal(turned->cameras[1].rotation, expected.rotation));
   EXPECT_FALSE(std::ranges::equal(turned->cameras[1].rotation, given->cameras[1].rotation));
@@ -218,7 +217,6 @@ std::string TenFrames(int which, const std::string& more) {
 }
 
 TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
-  std::filesystem::create_directories(folder_ / "m/images");
   for (int i = 0; i < 10; ++i) {
     const ImageU8 image = i == 7 ? ImageU8(8, 6, 3, 77) : CutOut(4);
     ASSERT_TRUE(io::SavePng(folder_ / "m/images" / (std::to_string(i) + ".png"), image).ok());
@@ -234,8 +232,7 @@ TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
   // Bare pictures, and those of a test file, go the same way.
   std::filesystem::remove(folder_ / "m/transforms.json");
   ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask");
-  Write("m/transforms.json",
-        R"({"fl_x":10,"frames":[{"file_path":"images/0.png",)" + std::string(kPose) + "}]}");
+  Transforms("m", "images/0.png", R"("fl_x":10,)");
   Write("m/transforms_test.json",
         R"({"fl_x":10,"frames":[{"file_path":"images/7.png",)" + std::string(kPose) + "}]}");
   ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask");
@@ -246,14 +243,12 @@ TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
 }
 
 TEST_F(Input, ViewsThatShowNothingAreNamedAndLeftOut) {
-  std::filesystem::create_directories(folder_ / "e/images");
   for (int i = 0; i < 10; ++i) {
     const ImageU8 image = CutOut(i == 2 || i == 3 ? 0 : i == 9 ? 5 : 4);
     ASSERT_TRUE(io::SavePng(folder_ / "e/images" / (std::to_string(i) + ".png"), image).ok());
   }
   Write("e/transforms.json", TenFrames(-1, ""));
-  const auto input = ReadFitFolder(folder_ / "e", 4);  // views 3 and 7 are held out
-  ASSERT_TRUE(input.ok()) << input.status().message();
+  const auto input = Ok(ReadFitFolder(folder_ / "e", 4));  // views 3 and 7 are held out
   EXPECT_EQ(input->names, (std::vector<std::string>{"0.png", "1.png", "4.png", "5.png", "6.png",
                                                     "7.png", "8.png", "9.png"}));
   EXPECT_EQ(input->held_out, std::vector<int>{5});

@@ -177,16 +177,14 @@ TEST(FitMasks, AreFoundBeforePaperOnATableAndInARoom) {
 
 TEST(FitMasks, HoldWhatHasTheColourOfTheTable) {
   const Capture capture(Place::kTable, Thing::kLined);
-  const auto found = FindMasks(capture.input(), Workers(2));
-  ASSERT_TRUE(found.ok()) << found.status().message();
+  const auto found = Ok(FindMasks(capture.input(), Workers(2)));
   EXPECT_GT(capture.Held(found->alpha), 0.6);  // 0.1 without
   EXPECT_GT(MaskIou(found->alpha, capture.truth()), 0.91);
 }
 
 TEST(FitMasks, KeepHolesThatShowTheFloor) {
   const Capture capture(Place::kRoom, Thing::kDrilled);
-  const auto found = FindMasks(capture.input(), Workers(2));
-  ASSERT_TRUE(found.ok()) << found.status().message();
+  const auto found = Ok(FindMasks(capture.input(), Workers(2)));
   EXPECT_LT(capture.Held(found->alpha), 0.3);
   EXPECT_GT(MaskIou(found->alpha, capture.truth()), 0.85);
 }
@@ -217,9 +215,8 @@ TEST(MaskHoles, AreWhatOnlyNarrowGapsJoinToTheBorder) {
 
 TEST(FitMasks, AreTheSameForAnyNumberOfWorkers) {
   const Capture capture(Place::kTable);
-  const auto one = FindMasks(capture.input(), Workers(1)),
-             three = FindMasks(capture.input(), Workers(3));
-  ASSERT_TRUE(one.ok() && three.ok());
+  const auto one = Ok(FindMasks(capture.input(), Workers(1))),
+             three = Ok(FindMasks(capture.input(), Workers(3)));
   EXPECT_EQ(one->alpha, three->alpha);
   EXPECT_EQ(one->agreement, three->agreement);
 }

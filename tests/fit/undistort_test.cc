@@ -40,7 +40,6 @@ class Undistorted : public TempFolderTest {
         image.at(x, y)[3] = Inside(*at, focal, radius) > 0 ? 255 : 0;
       }
     }
-    std::filesystem::create_directories(folder_ / "d");
     ASSERT_TRUE(io::SavePng(folder_ / "d/0.png", image).ok());
   }
 

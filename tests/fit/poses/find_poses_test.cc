@@ -60,7 +60,25 @@ class Poses : public ViewsTest {
     const Workers w(workers);
     return FindInputPoses(job, input, w, {}, stop_);
   }
+  // Of two starts: the numbers of the searches that were begun, of which `last` stops the call.
+  std::vector<std::uint64_t> SearchesUntil(std::uint64_t last, InputPosesJob job, FitInput* input) {
+    job.options.starts = 2;
+    job.options.sweeps = 1;
+    std::vector<std::uint64_t> begun;
+    const auto tell = [&](const Progress& p) {
+      if (p.stage != "looking for cameras") return;
+      begun.push_back(p.done);
+      stop_ = p.done == last;
+    };
+    const Workers workers(2);
+    const Status done = FindInputPoses(job, input, workers, tell, stop_);
+    EXPECT_EQ(done.code(), stop_ ? StatusCode::kCancelled : StatusCode::kOk) << done.message();
+    stop_ = false;
+    return begun;
+  }
 };
+
+using Numbers = std::vector<std::uint64_t>;
 
 double MeanError(const FitInput& input) {
   std::vector<Camera> found, given;
@@ -132,54 +150,25 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
 // The searches that a stopped call came through are not done again.
 TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
   const FitInput input = Pictures(8);
+  FitInput whole = input, stopped = input, parts = input;
   InputPosesJob job = Job();
-  job.options.starts = 2;
-  job.options.sweeps = 1;
-  FitInput whole = input, parts = input;
-  ASSERT_TRUE(Find(job, &whole).ok());
+  EXPECT_EQ(SearchesUntil(9, job, &whole), (Numbers{0, 1}));
   job.file = folder_ / "other" / "cameras_start.json";
-  std::vector<std::uint64_t> searches;
-  const auto tell = [&](const Progress& p) {
-    if (p.stage != "looking for cameras") return;
-    searches.push_back(p.done);
-    stop_ = p.done == 1;
-  };
-  const Workers workers(2);
-  FitInput stopped = input;
-  EXPECT_EQ(FindInputPoses(job, &stopped, workers, tell, stop_).code(), StatusCode::kCancelled);
-  EXPECT_EQ(searches, (std::vector<std::uint64_t>{0, 1}));
-  searches.clear();
-  stop_ = false;
+  EXPECT_EQ(SearchesUntil(1, job, &stopped), (Numbers{0, 1}));
   job.reuse = true;
-  const auto listen = [&](const Progress& p) {
-    if (p.stage == "looking for cameras") searches.push_back(p.done);
-  };
-  ASSERT_TRUE(FindInputPoses(job, &parts, workers, listen, stop_).ok());
-  EXPECT_EQ(searches, std::vector<std::uint64_t>{1});
+  EXPECT_EQ(SearchesUntil(9, job, &parts), Numbers{1});
   for (std::size_t i = 0; i < input.cameras.size(); ++i)
     EXPECT_EQ(std::memcmp(&whole.cameras[i], &parts.cameras[i], sizeof(Camera)), 0) << i;
 }
 
 // Of other images it says nothing.
 TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
-  FitInput input = Pictures(8);
+  FitInput input = Pictures(8), other = input;
   InputPosesJob job = Job();
-  job.options.starts = 2;
-  job.options.sweeps = 1;
-  const Workers workers(2);
-  int begun = 0;
-  const auto tell = [&](const Progress& p) {
-    if (p.stage != "looking for cameras") return;
-    begun += p.done == 0;
-    stop_ = p.done == 1;
-  };
-  FitInput other = input;
-  EXPECT_EQ(FindInputPoses(job, &other, workers, tell, stop_).code(), StatusCode::kCancelled);
+  EXPECT_EQ(SearchesUntil(1, job, &other), (Numbers{0, 1}));
   input.images.color[3] += 0.25f;
-  stop_ = false;
   job.reuse = true;
-  EXPECT_EQ(FindInputPoses(job, &input, workers, tell, stop_).code(), StatusCode::kCancelled);
-  EXPECT_EQ(begun, 2);
+  EXPECT_EQ(SearchesUntil(1, job, &input), (Numbers{0, 1}));
 }
 
 TEST_F(Poses, SaysWhatIsMissing) {
