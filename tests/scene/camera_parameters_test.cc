@@ -21,7 +21,6 @@
 #include "scene/shapes.h"
 #include "scene/weak_perspective_ref.h"
 #include "support/expect.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::camera_parameters_test {
 
