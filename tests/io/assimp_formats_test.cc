@@ -70,8 +70,11 @@ TEST_F(AssimpFormatsTest, UnknownEndingsNameTheKnownOnes) {
 class Md2Test : public TempFolderTest {
  protected:
   void SetUp() override { ASSERT_TRUE(SavePng(folder_ / "red.png", ImageU8(4, 2, 3, 50)).ok()); }
+  // Corner i lies at pixel (i, i / 2) of the skin, whose name stands behind the header.
   LoadedMesh Load(const std::string& skin) {
-    return Ok(LoadMesh(Write("a.md2", Md2Sample(skin)))).value();
+    Bytes file = StoredSample("skin.md2");
+    std::copy(skin.begin(), skin.end(), file.begin() + 68);
+    return Ok(LoadMesh(Write("a.md2", file))).value();
   }
 };
 

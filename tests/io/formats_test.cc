@@ -10,17 +10,9 @@
 #include "io/archive.h"
 #include "io/image_file.h"
 #include "io/npz.h"
+#include "io/samples.h"
 #include "io/sh3f.h"
 #include "support/temp_folder.h"
-
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#define STBI_WRITE_NO_STDIO
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-function"
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#include <stb_image_write.h>
-#pragma GCC diagnostic pop
 
 namespace tilegrad::io::formats_test {
 
@@ -80,20 +72,8 @@ TEST_F(FormatsTest, PngThatPromisesMoreThanItCanHold) {
                 "can hold");
 }
 
-Bytes Jpeg(int width, int height) {
-  Bytes out;
-  std::vector<std::uint8_t> pixels(3 * static_cast<std::size_t>(width) * height);
-  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i * i / 7);
-  const auto append = [](void* to, void* data, int size) {
-    const auto* begin = static_cast<const std::uint8_t*>(data);
-    static_cast<Bytes*>(to)->insert(static_cast<Bytes*>(to)->end(), begin, begin + size);
-  };
-  EXPECT_NE(stbi_write_jpg_to_func(append, &out, width, height, 3, pixels.data(), 80), 0);
-  return out;
-}
-
 TEST_F(FormatsTest, CutFilesAreErrors) {
-  const Bytes jpeg = Jpeg(40, 24);
+  const Bytes jpeg = StoredSample("noise_40x24.jpg");
   EXPECT_EQ(Ok(DecodeImage(jpeg, "a.jpg"))->width, 40);
   const auto decode = [](const Bytes& cut) { return DecodeImage(cut, "cut").status(); };
   ExpectCutsRefused(jpeg, "cut", decode, 5);
@@ -107,7 +87,7 @@ TEST_F(FormatsTest, CutFilesAreErrors) {
 }
 
 TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
-  Bytes jpeg = Jpeg(16, 16);
+  Bytes jpeg = StoredSample("noise_16x16.jpg");
   const std::array<std::uint8_t, 2> marker = {0xff, 0xc4};
   const auto table = std::search(jpeg.begin(), jpeg.end(), marker.begin(), marker.end());
   ASSERT_NE(table, jpeg.end());
@@ -116,13 +96,13 @@ TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
   // Bytes of filler before the first marker hid the file from the check, not from stb_image.
   jpeg.insert(jpeg.begin(), 2, 0xff);
   ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman tables");
-  Bytes filled = Jpeg(16, 16);
+  Bytes filled = StoredSample("noise_16x16.jpg");
   filled.insert(filled.begin(), 2, 0xff);
   EXPECT_TRUE(DecodeImage(filled, "filled.jpg").ok());
 }
 
 TEST_F(FormatsTest, JpegOfManyScans) {
-  const Bytes jpeg = Jpeg(16, 16);
+  const Bytes jpeg = StoredSample("noise_16x16.jpg");
   const std::array<std::uint8_t, 2> marker = {0xff, 0xda};
   const auto scan = std::search(jpeg.begin(), jpeg.end(), marker.begin(), marker.end());
   ASSERT_NE(scan, jpeg.end());

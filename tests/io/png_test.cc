@@ -167,4 +167,76 @@ TEST(Png, ColoursBeyondThePaletteAreBlack) {
   EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{4, 5, 6, 0, 0, 0, 1, 2, 3}));
 }
 
+Bytes ToBytes(const std::string& text) { return {text.begin(), text.end()}; }
+
+// Two columns, two rows; `rows` begin with their filter, which is none.
+Bytes SmallPng(int bits, int color_type, const std::string& rows, Chunks chunks = {},
+               int interlaced = 0) {
+  chunks.emplace_back("IDAT", Packed(ToBytes(rows)));
+  return PngOf({2, 2, color_type, bits, interlaced}, chunks);
+}
+
+// Red, green / blue, white in every way; greys are black, middle / white, quarter.
+TEST(Png, OfEveryKind) {
+  using namespace std::string_literals;
+  using Pixels = std::vector<std::uint8_t>;
+  const std::string r = "\xff\0\0"s, g = "\0\xff\0"s, b = "\0\0\xff"s, w = "\xff\xff\xff"s,
+                    zero = "\0"s;
+  const std::pair<std::string, Bytes> palette("PLTE", ToBytes(r + g + b + w));
+  const auto doubled = [](const std::string& text) {
+    std::string out;
+    for (const char c : text) out += {c, c};
+    return out;
+  };
+  const Pixels colors = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
+  const Pixels with_alpha = {255, 0, 0, 128, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
+  const Pixels keyed = {255, 0, 0, 0, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
+  struct Case {
+    const char* what;
+    Bytes png;
+    Pixels want;
+  };
+  const std::string rows = zero + r + g + zero + b + w;
+  for (const Case& c : std::vector<Case>{
+           {"RGB", SmallPng(8, 2, rows), colors},
+           {"16 bits", SmallPng(16, 2, zero + doubled(r + g) + zero + doubled(b + w)), colors},
+           {"palette", SmallPng(8, 3, "\0\0\1\0\2\3"s, {palette}), colors},
+           {"palette of 2 bits", SmallPng(2, 3, "\0\x10\0\xb0"s, {palette}), colors},
+           {"palette with alpha", SmallPng(8, 3, "\0\0\1\0\2\3"s, {palette, {"tRNS", {0x80}}}),
+            with_alpha},
+           {"transparent red", SmallPng(8, 2, rows, {{"tRNS", {0, 255, 0, 0, 0, 0}}}), keyed},
+           {"interlaced", SmallPng(8, 2, zero + r + zero + g + zero + b + w, {}, 1), colors},
+           {"grey", SmallPng(8, 0, "\0\0\x80\0\xff\x40"s), {0, 128, 255, 64}},
+           {"grey of 1 bit", SmallPng(1, 0, "\0\x80\0\x40"s), {255, 0, 0, 255}},
+           {"grey of 2 bits", SmallPng(2, 0, "\0\x10\0\xb0"s), {0, 85, 170, 255}},
+           {"grey of 4 bits", SmallPng(4, 0, "\0\x0f\0\x88"s), {0, 255, 136, 136}},
+           {"grey of 16 bits", SmallPng(16, 0, "\0\0\0\x80\0\0\xff\xff\x40\0"s), {0, 128, 255, 64}},
+           {"grey and alpha",
+            SmallPng(8, 4, "\0\x80\xff\x80\x80\0\xff\0\x40\xff"s),
+            {128, 255, 128, 128, 255, 0, 64, 255}}}) {
+    const auto image = DecodeImage(c.png, "a.png");
+    ASSERT_TRUE(image.ok()) << c.what << ": " << image.status().message();
+    EXPECT_EQ(image->pixels, c.want) << c.what;
+  }
+}
+
+// PNG's own words on what its numbers mean are not followed: glTF says so, and others do the same.
+TEST(Png, ProfilesAndGammaDoNotChangeNumbers) {
+  using namespace std::string_literals;
+  const std::string rows = "\0\x40\x80\0\xc0\xff"s;
+  const auto plain = DecodeImage(SmallPng(8, 0, rows), "a.png");
+  const auto tagged =
+      Ok(DecodeImage(SmallPng(8, 0, rows, {{"gAMA", {0, 1, 0x86, 0xa0}}, {"sRGB", {0}}}), "a.png"));
+  EXPECT_EQ(tagged->pixels, plain.value().pixels);
+  EXPECT_EQ(tagged->pixels, (std::vector<std::uint8_t>{64, 128, 192, 255}));
+}
+
+TEST(Png, OfXcodeIsRefused) {
+  Bytes png = SmallPng(8, 0, std::string(6, '\0'));
+  Bytes mark;
+  AppendChunk("CgBI", {0x50, 0x20, 0x20, 2}, &mark);
+  png.insert(png.begin() + 8, mark.begin(), mark.end());
+  ExpectMessage(DecodeImage(png, "a.png").status(), "a.png", "Xcode");
+}
+
 }  // namespace tilegrad::io::png_test
