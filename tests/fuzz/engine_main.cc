@@ -25,7 +25,7 @@ const Target& ThisTarget() {
 void WriteSeeds(const Path& folder) {
   std::filesystem::create_directories(folder);
   int n = 0;
-  for (const Bytes& seed : ThisTarget().seeds()) {
+  for (const Bytes& seed : SeedsOf(ThisTarget())) {
     std::ofstream(folder / ("seed" + std::to_string(n++)), std::ios::binary)
         .write(reinterpret_cast<const char*>(seed.data()), static_cast<long>(seed.size()));
   }
@@ -44,7 +44,7 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  tilegrad::fuzz::ThisTarget().run({data, size});
+  tilegrad::fuzz::Run(tilegrad::fuzz::ThisTarget(), {data, size});
   return 0;
 }
 

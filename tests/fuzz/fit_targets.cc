@@ -142,12 +142,6 @@ void Fit(Input input) {
   std::filesystem::remove_all(job.out);
 }
 
-std::vector<Bytes> Seeds() {
-  std::vector<Bytes> out;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) out.push_back(RandomBytes(seed, 4000));
-  return out;
-}
-
-const Registration kTarget({"fit", Fit, Seeds, nullptr, 2});
+const Registration kTarget({"fit", Fit, RandomSeeds<12, 4000>, nullptr, 2});
 
 }  // namespace tilegrad::fuzz::fit_targets

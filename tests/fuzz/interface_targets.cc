@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The C interface: an input is a program of calls, two bytes a choice (api/c_caller.h).
 #include "api/c_caller.h"
+#include "fuzz/numbers.h"
 #include "fuzz/target.h"
 
 namespace tilegrad::fuzz::interface_targets {
@@ -13,17 +14,6 @@ void Calls(Input input) {
   Require(failed_before || !failed, "each call is OK or an error with a message");
 }
 
-std::vector<Bytes> Seeds() {
-  std::vector<Bytes> out;
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    Dice dice(seed);
-    Bytes bytes(3000);
-    for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(dice.Next());
-    out.push_back(bytes);
-  }
-  return out;
-}
-
-const Registration kTarget({"c_interface", Calls, Seeds, nullptr, 2});
+const Registration kTarget({"c_interface", Calls, RandomSeeds<6, 3000>, nullptr, 2});
 
 }  // namespace tilegrad::fuzz::interface_targets

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <string>
 
-#include "base/simd_target.h"
 #include "fuzz/numbers.h"
 #include "fuzz/target.h"
 #include "proof/owned_scene.h"
@@ -55,8 +54,7 @@ test::ExtremeScene SceneOf(Numbers* in) {
 void Raster(Input input) {
   static const Workers one(1);
   Numbers in(input);
-  const auto targets = RunnableTargets();
-  const TargetScope scope(targets[in.Below(static_cast<std::uint32_t>(targets.size()))]);
+  const TargetScope scope(TargetOf(&in));
   Require(scope.status().ok(), "a target can be chosen");
   Renderer renderer = RendererOn(one);
   const std::uint64_t number = in.Take<std::uint16_t>();
@@ -77,8 +75,7 @@ bool SameBits(const T& a, const T& b) {
 void Threads(Input input) {
   static const Workers one(1), two(2);
   Numbers in(input);
-  const auto targets = RunnableTargets();
-  const TargetScope scope(targets[in.Below(static_cast<std::uint32_t>(targets.size()))]);
+  const TargetScope scope(TargetOf(&in));
   Require(scope.status().ok(), "a target can be chosen");
   const auto& recipe =
       test::kRecipes[in.Below(static_cast<std::uint32_t>(std::size(test::kRecipes)))];
@@ -105,20 +102,9 @@ void Threads(Input input) {
   for (const float x : one_thread) Require(std::isfinite(x), "finite gradients");
 }
 
-std::vector<Bytes> Seeds() {
-  std::vector<Bytes> out;
-  Rng rng(5, 5);
-  for (int n = 0; n < 8; ++n) {
-    Bytes bytes(150);
-    for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(rng.Next());
-    out.push_back(bytes);
-  }
-  return out;
-}
-
 const Registration kTargets[] = {
-    Registration({"raster", Raster, Seeds}),
-    Registration({"threads", Threads, Seeds}),
+    Registration({"raster", Raster, RandomSeeds<8, 150>}),
+    Registration({"threads", Threads, RandomSeeds<8, 150>}),
 };
 
 }  // namespace tilegrad::fuzz::kernel_targets

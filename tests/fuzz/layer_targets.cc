@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "base/simd_target.h"
 #include "fuzz/numbers.h"
 #include "fuzz/target.h"
 #include "nn/kernels/kernel_trial.h"
@@ -13,11 +12,6 @@
 #include "shade/texture_levels_ref.h"
 
 namespace tilegrad::fuzz::layer_targets {
-
-std::string TargetOf(Numbers* in) {
-  const auto targets = RunnableTargets();
-  return targets[in->Below(static_cast<std::uint32_t>(targets.size()))];
-}
 
 nn::Conv2dShape ShapeOf(Numbers* in) {
   nn::Conv2dShape s;
@@ -111,20 +105,9 @@ void Texture(Input input) {
   }
 }
 
-std::vector<Bytes> Seeds() {
-  std::vector<Bytes> out;
-  Rng rng(6, 6);
-  for (int n = 0; n < 8; ++n) {
-    Bytes bytes(60);
-    for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(rng.Next());
-    out.push_back(bytes);
-  }
-  return out;
-}
-
 const Registration kTargets[] = {
-    Registration({"convolution", Convolution, Seeds, nullptr, 2}),
-    Registration({"texture", Texture, Seeds}),
+    Registration({"convolution", Convolution, RandomSeeds<8, 60>, nullptr, 2}),
+    Registration({"texture", Texture, RandomSeeds<8, 60>}),
 };
 
 }  // namespace tilegrad::fuzz::layer_targets

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "base/rng.h"
+#include "base/simd_target.h"
 #include "fuzz/target.h"
 
 namespace tilegrad::fuzz {
@@ -29,10 +30,23 @@ class Numbers {
   Input rest_;
 };
 
+// One of those that this machine has.
+inline std::string TargetOf(Numbers* in) {
+  const auto targets = RunnableTargets();
+  return targets[in->Below(static_cast<std::uint32_t>(targets.size()))];
+}
+
 inline Bytes RandomBytes(std::uint64_t seed, std::size_t size) {
   Rng rng(seed);
   Bytes out(size);
   for (std::uint8_t& byte : out) byte = static_cast<std::uint8_t>(rng.Next());
+  return out;
+}
+
+template <std::uint64_t count, std::size_t size>
+std::vector<Bytes> RandomSeeds() {
+  std::vector<Bytes> out;
+  for (std::uint64_t seed = 1; seed <= count; ++seed) out.push_back(RandomBytes(seed, size));
   return out;
 }
 

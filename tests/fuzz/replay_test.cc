@@ -8,25 +8,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <filesystem>
 
 #include "fuzz/numbers.h"
 #include "fuzz/target.h"
-#include "support/source_dir.h"
 
 namespace tilegrad::fuzz::replay_test {
-
-Path Folder(const char* kind, const std::string& target) {
-  return Path(TILEGRAD_SOURCE_DIR) / "tests" / "fuzz" / kind / target;
-}
-
-std::vector<Path> FilesIn(const Path& folder) {
-  std::vector<Path> out;
-  if (!std::filesystem::exists(folder)) return out;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) out.push_back(entry.path());
-  std::sort(out.begin(), out.end());
-  return out;
-}
 
 // Bytes that change, go, come twice, or come from another place; or the end is missing.
 Bytes Mutated(Bytes bytes, Rng* rng) {
@@ -75,14 +61,14 @@ extern "C" void KeepInput(int signal) {
 void Feed(const Target& target, Input input) {
   for (const int signal : {SIGABRT, SIGSEGV, SIGFPE}) std::signal(signal, KeepInput);
   g_input = input;
-  target.run(input);
+  Run(target, input);
 }
 
 class Replay : public testing::TestWithParam<Target> {};
 
 TEST_P(Replay, SeedsAndMutationsOfThem) {
   const Target& target = GetParam();
-  const std::vector<Bytes> seeds = target.seeds();
+  const std::vector<Bytes> seeds = SeedsOf(target);
   ASSERT_FALSE(seeds.empty());
   Rng rng(20, 26);
   for (const Bytes& seed : seeds) {
@@ -98,7 +84,7 @@ TEST_P(Replay, SeedsAndMutationsOfThem) {
 
 TEST_P(Replay, WhatWasFound) {
   for (const char* kind : {"found", "corpus"}) {
-    for (const Path& file : FilesIn(Folder(kind, GetParam().name))) {
+    for (const Path& file : FilesIn(kind, GetParam().name)) {
       SCOPED_TRACE(file.string());
       const auto bytes = ReadFile(file);
       ASSERT_TRUE(bytes.ok()) << bytes.status().message();
@@ -139,8 +125,8 @@ TEST(RandomFits, LongListsEndOrSayWhy) { RunRandomFits(1000); }
 
 // A folder of another name would never be looked at.
 TEST(ReplayFolders, EachIsOfATarget) {
-  for (const char* kind : {"found", "corpus"}) {
-    for (const Path& folder : FilesIn(Folder(kind, ""))) {
+  for (const char* kind : {"seeds", "found", "corpus"}) {
+    for (const Path& folder : FilesIn(kind, "")) {
       EXPECT_TRUE(std::any_of(Targets().begin(), Targets().end(), [&](const Target& t) {
         return t.name == folder.filename();
       })) << folder;

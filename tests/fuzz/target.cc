@@ -10,6 +10,8 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/read_budget.h"
+#include "support/source_dir.h"
 
 namespace tilegrad::fuzz {
 namespace {
@@ -29,6 +31,27 @@ const std::vector<Target>& Targets() {
   return Registered();
 }
 
+std::vector<Path> FilesIn(const char* kind, const std::string& target) {
+  std::vector<Path> out;
+  const Path folder = Path(TILEGRAD_SOURCE_DIR) / "tests/fuzz" / kind / target;
+  if (!std::filesystem::exists(folder)) return out;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) out.push_back(entry.path());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+void Run(const Target& target, Input input) {
+  const ReadBudget budget(target.read_budget);
+  target.run(input);
+}
+
+std::vector<Bytes> SeedsOf(const Target& target) {
+  if (target.seeds != nullptr) return target.seeds();
+  std::vector<Bytes> out;
+  for (const Path& file : FilesIn("seeds", target.name)) out.push_back(ReadFile(file).value());
+  return out;
+}
+
 void Require(bool kept, std::string_view promise) {
   if (kept) return;
   std::fprintf(stderr, "BROKEN PROMISE: %.*s\n", static_cast<int>(promise.size()), promise.data());
@@ -43,14 +66,6 @@ std::vector<Input> SplitFiles(Input input) {
     if (at == input.end()) return out;
     input = input.subspan(out.back().size() + kNextFile.size());
   }
-}
-
-Bytes JoinFiles(const std::vector<std::string>& files) {
-  std::string out;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    out += (i == 0 ? "" : std::string(kNextFile)) + files[i];
-  }
-  return ToBytes(out);
 }
 
 Bytes ToBytes(std::string_view text) { return {text.begin(), text.end()}; }

@@ -20,11 +20,17 @@ using Input = std::span<const std::uint8_t>;
 struct Target {
   std::string name;
   void (*run)(Input input);
-  std::vector<Bytes> (*seeds)();  // small and sound; made by our own writers where there are any
+  std::vector<Bytes> (*seeds)() = nullptr;  // small and sound; null: the files of seeds/<name>
   // Mends what a mutation breaks with certainty, as checksums; null: nothing.
   void (*repair)(std::span<std::uint8_t> bytes) = nullptr;
   int mutations = 200;  // of each seed in tests: few where one starts processes or threads
+  std::size_t read_budget = std::size_t{64} << 20;  // bytes
 };
+
+void Run(const Target& target, Input input);
+std::vector<Bytes> SeedsOf(const Target& target);
+// Files of seeds/, corpus/ or found/, by name: of a target, or its folders if that is "".
+std::vector<Path> FilesIn(const char* kind, const std::string& target);
 
 // Of all targets that are linked in, by name.
 const std::vector<Target>& Targets();
@@ -35,10 +41,16 @@ struct Registration {
 // Ends the program with the message unless `kept`: a promise that no input may break.
 void Require(bool kept, std::string_view promise);
 
+// Whether there is a result; an error says why there is none.
+template <class T>
+bool Accepted(const Result<T>& result) {
+  Require(result.ok() || !result.status().message().empty(), "an error has a message");
+  return result.ok();
+}
+
 // An input that is several files: they are separated by this line. The first is the main one.
 inline constexpr std::string_view kNextFile = "\n=%=next file=%=\n";
 std::vector<Input> SplitFiles(Input input);
-Bytes JoinFiles(const std::vector<std::string>& files);
 Bytes ToBytes(std::string_view text);
 
 // One file by its name, and others that serve any other name, in turn.
@@ -70,16 +82,5 @@ class MemoryFile {
 // A folder in memory, the same for all calls of this process, gone at its end.
 const Path& ScratchFolder();
 void PutFile(const Path& relative, Input bytes);
-
-// A file that a writer of ours makes in the scratch folder.
-template <class Write>
-Bytes Written(const char* name, Write write) {
-  const Path path = ScratchFolder() / name;
-  Require(write(path).ok(), "a seed can be written");
-  auto bytes = ReadFile(path);
-  Require(bytes.ok(), "a seed can be read");
-  std::filesystem::remove(path);
-  return *std::move(bytes);
-}
 
 }  // namespace tilegrad::fuzz
