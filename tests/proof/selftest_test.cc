@@ -30,8 +30,6 @@ std::size_t Count(const std::string& text, const std::string& part) {
   return count;
 }
 
-bool Contains(const std::string& text, const std::string& part) { return Count(text, part) > 0; }
-
 // ---- The program ----
 
 class SelftestCommand : public TempFolderTest {
@@ -53,9 +51,7 @@ TEST_F(SelftestCommand, AllChecksHoldOnEveryTargetAndNothingStaysBehind) {
   EXPECT_EQ(Count(outcome.output, "ok    "), count) << outcome.output;
   EXPECT_TRUE(std::regex_search(outcome.output, std::regex("\nall " + std::to_string(count) +
                                                            R"( checks hold \(\d+\.\d s\)\n$)")));
-  for (const Check& check : selftest::AllChecks()) {
-    EXPECT_TRUE(Contains(outcome.output, "ok    " + check.title)) << check.title;
-  }
+  for (const Check& check : selftest::AllChecks()) ExpectIn(outcome.output, "ok    " + check.title);
   for (const auto& target : RunnableTargets()) {
     const std::regex fingerprint(target + " [0-9a-f]{8}[,) ]");
     EXPECT_EQ(std::distance(
@@ -72,10 +68,9 @@ TEST_F(SelftestCommand, AForcedTargetIsCheckedAlone) {
   ::setenv("TILEGRAD_TARGET", target.c_str(), 1);
   const Outcome outcome = RunProgram("selftest --only BITS");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_TRUE(
-      Contains(outcome.output, "SIMD targets: " + target + " (forced by TILEGRAD_TARGET)\n"));
-  EXPECT_TRUE(Contains(outcome.output, "all 2 checks hold"));
-  EXPECT_FALSE(Contains(outcome.output, "SSE4"));
+  ExpectIn(outcome.output, "SIMD targets: " + target + " (forced by TILEGRAD_TARGET)\n",
+           "all 2 checks hold");
+  ExpectNotIn(outcome.output, "SSE4");
 }
 
 // The bits that it prints are those of any number of threads.
@@ -96,7 +91,7 @@ TEST_F(SelftestCommand, TrainingHasTheBitsThatItHad) {
     const auto digits = kTrainingDigits.find(target);
     if (digits == kTrainingDigits.end()) continue;
     const Outcome outcome = RunProgram("selftest --only training");
-    EXPECT_TRUE(Contains(outcome.output, target + " " + digits->second)) << outcome.output;
+    ExpectIn(outcome.output, target + " " + digits->second);
   }
 }
 
@@ -108,17 +103,14 @@ TEST_F(SelftestCommand, ListsItsChecksAndRunsSome) {
   EXPECT_EQ(RunProgram("selftest --list --workers 2").output, list.output);  // the old name
   const Outcome some = RunProgram("selftest --only png");
   EXPECT_EQ(some.exit_code, 0) << some.output;
-  EXPECT_TRUE(Contains(some.output, "ok    files: PNG"));
-  EXPECT_TRUE(Contains(some.output, "all 1 checks hold"));
+  ExpectIn(some.output, "ok    files: PNG", "all 1 checks hold");
 }
 
 TEST_F(SelftestCommand, AnUnknownCheckIsAnErrorWithTheList) {
   const Outcome outcome = RunProgram("selftest --only nonsense");
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_TRUE(Contains(outcome.output, "nonsense"));
-  for (const Check& check : selftest::AllChecks()) {
-    EXPECT_TRUE(Contains(outcome.output, check.title));
-  }
+  ExpectIn(outcome.output, "nonsense");
+  for (const Check& check : selftest::AllChecks()) ExpectIn(outcome.output, check.title);
 }
 
 TEST_F(SelftestCommand, AFailureIsPrintedAndEndsWithOne) {
@@ -127,7 +119,7 @@ TEST_F(SelftestCommand, AFailureIsPrintedAndEndsWithOne) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(Count(outcome.output, "FAIL  files: "), 4u) << outcome.output;
   EXPECT_EQ(Count(outcome.output, "set TMPDIR"), 4u);
-  EXPECT_TRUE(Contains(outcome.output, "4 of 4 checks FAILED ("));
+  ExpectIn(outcome.output, "4 of 4 checks FAILED (");
 }
 
 // ---- The checks ----
