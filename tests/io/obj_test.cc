@@ -121,6 +121,8 @@ TEST_F(ObjTest, DamageNamesTheLine) {
   ExpectMessage(LoadStatus(kSquare + "f 0 1 2\n"), "line 5", "vertex 0");
   ExpectMessage(LoadStatus(kSquare + "f a b c\n"), "line 5", "\"a\"");
   ExpectMessage(LoadStatus("v 0 0\nf 1 1 1\n"), "line 1", "three finite numbers");
+  ExpectMessage(LoadStatus("v 1e39 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "a.obj");
+  ExpectMessage(LoadStatus("v 0 0 0\nv 1 0 0\n"), "a.obj");  // points alone
   ExpectMessage(LoadStatus("v 0 0 0\nv 1 zero 0\n"), "line 2", "\"zero\"");
   ExpectMessage(LoadStatus(kSquare + "f 1 2 \\\n 9\n"), "line 6", "vertex 9");
   ExpectMessage(LoadStatus(kSquare + "f 1 2 3\nl 1 77\n"), "line 6", "vertex 77");

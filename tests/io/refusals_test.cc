@@ -105,12 +105,6 @@ TEST_F(Refusals, NpzNamesComeBackOrAreRefused) {
   ExpectMessage(SaveNpz(file, {{"\xff", MakeNpy<float>({0}, {})}}), "a.npz");
 }
 
-TEST_F(Refusals, NpzWithoutArrays) {
-  const Path file = folder_ / "a.npz";
-  ExpectMessage(SaveNpz(file, {}), "a.npz", "no array");
-  EXPECT_FALSE(std::filesystem::exists(file));
-}
-
 // One limit for a file and all that it names or packs, in every container; what is within is read.
 constexpr int kSide = 512;
 constexpr std::size_t kPicture = std::size_t{3} * kSide * kSide;  // bytes of one, decoded
