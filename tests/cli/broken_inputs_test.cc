@@ -40,7 +40,6 @@ class BrokenInputs : public ProgramTest {
     for (const char* folder : {"in", "out"}) std::filesystem::remove_all(folder_ / folder);
   }
   void Save(const std::string& name, const ImageU8& image) const {
-    std::filesystem::create_directories((folder_ / name).parent_path());
     Ok(io::SavePng(folder_ / name, image));
   }
   std::string Predict(const std::string& image, const std::string& more = "") const {

@@ -7,7 +7,6 @@
 #include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 
 namespace tilegrad::fit_command_test {
 
@@ -32,18 +31,7 @@ class FitCommand : public ProgramTest {
       for (Json& number : rows[1]) number = -number.get<double>();
     }
     Write("v/transforms_train.json", json.dump());
-    std::string obj;
-    for (const glm::vec3& p : box.positions) {
-      const glm::vec3 q = WithZUp(p);
-      obj +=
-          "v " + std::to_string(q.x) + " " + std::to_string(q.y) + " " + std::to_string(q.z) + "\n";
-    }
-    for (const Face& f : box.faces) {
-      obj += "f";
-      for (const std::int32_t corner : f) obj += " " + std::to_string(corner + 1);
-      obj += "\n";
-    }
-    Write("box.obj", obj);
+    Write("box.obj", ObjText(box, WithZUp));
   }
 
   struct Fitted {

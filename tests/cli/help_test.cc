@@ -106,9 +106,8 @@ TEST_F(Help, ConfigurationsAreKnownByNameAnywhere) {
   const std::string quick = ExpectDone("configs quick", in_folder);
   EXPECT_EQ(quick, ReadText(Path(TILEGRAD_CONFIGS) / "quick.toml").value());
   ExpectIn(ExpectDone("configs"), "paper");
-  const Outcome wrong = RunProgram("train --config qick --data x --out y", in_folder);
-  EXPECT_EQ(wrong.exit_code, 3);
-  ExpectIn(wrong.output, "there are best, ");
+  ExpectRefused(RunProgram("train --config qick --data x --out y", in_folder), 3,
+                "there are best, ");
   // It gets as far as the dataset.
   const Outcome named = RunProgram("train --config quick --data none --out y", in_folder);
   ExpectIn(named.output, "none");
@@ -132,9 +131,7 @@ TEST_F(Help, JsonIsOneObjectAndQuietSaysNothing) {
   EXPECT_TRUE(std::filesystem::exists(fit["mesh"].get<std::string>()));
   EXPECT_EQ(Json::parse(ExpectDone("info --json"))["target"].is_string(), true);
   // Errors stay sentences on the other stream.
-  const Outcome wrong = RunProgram("render --json " + In("none.glb"), "");
-  EXPECT_EQ(wrong.exit_code, 3);
-  ExpectIn(wrong.output, "none.glb");
+  ExpectRefused("render --json " + In("none.glb"), 3, "none.glb");
 }
 
 // Options of several words, wherever files stand among them; options that commands share.
@@ -224,9 +221,8 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
     ExpectRefused(line, 2, part);
   }
   for (const std::string& line : {std::string("info"), render}) {
-    const Outcome outcome = RunProgram(line, "TILEGRAD_THREADS=many ");
-    EXPECT_EQ(outcome.exit_code, 2);
-    ExpectIn(outcome.output, "TILEGRAD_THREADS: \"many\" must be");
+    ExpectRefused(RunProgram(line, "TILEGRAD_THREADS=many "), 2,
+                  "TILEGRAD_THREADS: \"many\" must be");
   }
   ExpectRefused("help", 0, "Usage: tilegrad");
   ExpectRefused("version", 0, ".");

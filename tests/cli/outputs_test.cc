@@ -9,7 +9,6 @@
 
 #include "base/simd_target.h"
 #include "io/image_file.h"
-#include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
 
@@ -36,10 +35,9 @@ class Outputs : public ProgramTest {
   void ExpectKept(const std::string& file, const std::string& arguments,
                   const std::string& part) const {
     const std::string before = ReadText(folder_ / file).value();
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << arguments << "\n" << outcome.output;
-    ExpectIn(outcome.output, part);
-    EXPECT_EQ(ReadText(folder_ / file).value(), before) << arguments;
+    SCOPED_TRACE(arguments);
+    ExpectRefused(Run(arguments), 2, part);
+    EXPECT_EQ(ReadText(folder_ / file).value(), before);
   }
 };
 
@@ -132,9 +130,7 @@ TEST_F(Outputs, FitsStartAnewOrGoOn) {
   ExpectDone(fit + "3 --out f --resume");
   EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "of the run");
   EXPECT_TRUE(Exists("f/me.jpg"));
-  const Outcome resumed = Run(fit + "1 --out nowhere --resume");
-  EXPECT_EQ(resumed.exit_code, 3) << resumed.output;
-  ExpectIn(resumed.output, "nowhere: no checkpoint to resume");
+  ExpectRefused(Run(fit + "1 --out nowhere --resume"), 3, "nowhere: no checkpoint to resume");
   EXPECT_FALSE(Exists("nowhere"));
   const std::string from_itself = fit + "3 --out f --mesh f/mesh.glb";
   ExpectKept("f/mesh.glb", from_itself + " --force", "is an input of this command");
@@ -289,26 +285,16 @@ TEST_F(InfoCommand, KnowsWhatIsWatertight) {
   open.faces.pop_back();
   more.faces.push_back(more.faces[0]);
   for (const auto& [name, mesh] :
-       {std::pair("torn.ply", &torn), {"open.ply", &open}, {"more.ply", &more}}) {
-    std::string text = "ply\nformat ascii 1.0\nelement vertex " +
-                       std::to_string(mesh->positions.size()) +
-                       "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-                       std::to_string(mesh->faces.size()) +
-                       "\nproperty list uchar int vertex_indices\nend_header\n";
-    for (const glm::vec3& p : mesh->positions)
-      text += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
-    for (const Face& f : mesh->faces)
-      text += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " +
-              std::to_string(f[2]) + "\n";
-    Write(name, text);
+       {std::pair("torn.obj", &torn), {"open.obj", &open}, {"more.obj", &more}}) {
+    Write(name, ObjText(*mesh, [](glm::vec3 p) { return p; }));
   }
-  const auto all = Described(In("torn.ply") + " " + In("open.ply") + " " + In("more.ply"));
+  const auto all = Described(In("torn.obj") + " " + In("open.obj") + " " + In("more.obj"));
   EXPECT_EQ(all[0]["watertight"], true);
   EXPECT_EQ(all[1]["watertight"], false);
   EXPECT_EQ(all[1]["edges_of_one_face"], 3);
   EXPECT_EQ(all[2]["watertight"], false);
   EXPECT_EQ(all[2]["edges_of_more_than_two"], 3);
-  ExpectRefused("info " + In("none.obj") + " " + In("torn.ply"), 3, "watertight: yes");
+  ExpectRefused("info " + In("none.obj") + " " + In("torn.obj"), 3, "watertight: yes");
 }
 
 }  // namespace tilegrad::outputs_test

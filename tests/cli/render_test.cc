@@ -34,17 +34,9 @@ class Render : public ProgramTest {
 
 // `mesh` as near.obj, and as far.obj with every vertex at (431000, 4600000, 300) more.
 void WriteNearAndFar(const Path& folder, const Mesh& mesh) {
-  std::string near, far;
-  for (const glm::vec3& p : mesh.positions) {
-    near += fmt::format("v {:.6f} {:.6f} {:.6f}\n", p.x, p.y, p.z);
-    far += fmt::format("v {:.6f} {:.6f} {:.6f}\n", 431000. + p.x, 4600000. + p.y, 300. + p.z);
-  }
-  for (const auto& [a, b, c] : mesh.faces) {
-    near += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
-    far += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
-  }
-  ASSERT_TRUE(WriteTextAtomic(folder / "near.obj", near).ok());
-  ASSERT_TRUE(WriteTextAtomic(folder / "far.obj", far).ok());
+  const auto far = [](glm::vec3 p) { return glm::dvec3(431000, 4600000, 300) + glm::dvec3(p); };
+  Ok(WriteTextAtomic(folder / "near.obj", ObjText(mesh, [](glm::vec3 p) { return p; })));
+  Ok(WriteTextAtomic(folder / "far.obj", ObjText(mesh, far)));
 }
 
 class RenderFar : public Render {

@@ -48,18 +48,16 @@ class Resources : public ProgramTest {
         "dataset --source folder --workers 2 --size 16 --views 2 --input " + In("in") + " --out " +
         out.string();
     const Outcome outcome = RunProgram(arguments, limit + "; exec ");
+    SCOPED_TRACE(limit);
     if (outcome.exit_code == 0) {
-      EXPECT_NE(outcome.output.find("4 models"), std::string::npos) << limit << outcome.output;
-      EXPECT_EQ(outcome.output.find("could not be used"), std::string::npos)
-          << limit << outcome.output;
-      EXPECT_EQ(outcome.output.find("while reading models"), std::string::npos)
-          << limit << outcome.output;
+      ExpectIn(outcome.output, "4 models");
+      ExpectNotIn(outcome.output, "could not be used", "while reading models");
     } else {
-      EXPECT_GT(outcome.exit_code, 0) << "a signal: " << limit << outcome.output;
+      EXPECT_GT(outcome.exit_code, 0) << "a signal: " << outcome.output;
       const auto rejected = ReadText(out / "rejected.jsonl");
-      EXPECT_TRUE(!rejected.ok() || rejected->empty()) << limit << *rejected;
-      EXPECT_EQ(outcome.output.find("damaged"), std::string::npos) << limit << outcome.output;
-      EXPECT_EQ(RunProgram(arguments).exit_code, 0) << limit;
+      EXPECT_TRUE(!rejected.ok() || rejected->empty()) << *rejected;
+      ExpectNotIn(outcome.output, "damaged");
+      EXPECT_EQ(RunProgram(arguments).exit_code, 0);
     }
     std::filesystem::remove_all(out);
     return outcome.exit_code == 0;

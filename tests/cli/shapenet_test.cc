@@ -44,7 +44,6 @@ class ShapeNetTest : public ProgramTest {
     Write(model + "/" + layout.folder + layout.file + ".obj", obj);
     Write(model + "/" + layout.folder + layout.file + ".mtl",
           fmt::format("newmtl painted\nKd 0 0 0\nmap_Kd {}/texture0.png\n", layout.images));
-    std::filesystem::create_directories(folder_ / model / "images");
     Ok(io::SavePng(folder_ / model / "images/texture0.png", Texture()));
   }
   static ImageU8 Texture() {

@@ -145,17 +145,13 @@ TEST_F(Weights, OfTheRepositoryPredictAndSample) {
 
 TEST_F(Weights, ThatAreMissingAreToldOf) {
   const std::string to = " --out " + In("out") + " " + Shared("view.png");
-  const Outcome other = RunProgram("predict --run cars" + to, Alone());
-  EXPECT_EQ(other.exit_code, 3);
-  ExpectIn(other.output, "cars: no run or file has that path",
-           "there are car-generator, furniture");
+  ExpectRefused(RunProgram("predict --run cars" + to, Alone()), 3,
+                "cars: no run or file has that path", "there are car-generator, furniture");
   const std::string nowhere = "cd " + folder_.string() + " && TILEGRAD_WEIGHTS=" + In("none") + " ";
   for (const char* command : {"predict", "sample"}) {
-    const Outcome none =
-        RunProgram(command + (std::string(command) == "predict" ? to : " --out x"), nowhere);
-    EXPECT_EQ(none.exit_code, 3);
-    ExpectIn(none.output, "no run with a checkpoint below runs/", "no weights are installed",
-             In("none"));
+    const std::string line = command + (std::string(command) == "predict" ? to : " --out x");
+    ExpectRefused(RunProgram(line, nowhere), 3, "no run with a checkpoint below runs/",
+                  "no weights are installed", In("none"));
   }
 }
 

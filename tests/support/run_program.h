@@ -2,6 +2,7 @@
 // The program itself, as a person starts it.
 #pragma once
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <string>
 
+#include "scene/mesh.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -58,6 +60,18 @@ steps = 2
 batch = 2
 )";
 
+// As an OBJ file has it, each vertex where `place` puts it.
+template <class Place>
+std::string ObjText(const Mesh& mesh, const Place& place) {
+  std::string out;
+  for (const glm::vec3& p : mesh.positions) {
+    const glm::dvec3 q = place(p);
+    out += fmt::format("v {:.6f} {:.6f} {:.6f}\n", q.x, q.y, q.z);
+  }
+  for (const auto& [a, b, c] : mesh.faces) out += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+  return out;
+}
+
 // A fixture that runs the program, with its own folder.
 class ProgramTest : public TempFolderTest {
  protected:
@@ -72,10 +86,14 @@ class ProgramTest : public TempFolderTest {
   }
   // Its output has all `parts`.
   template <class... Parts>
-  static void ExpectRefused(const std::string& arguments, int code, const Parts&... parts) {
-    const Outcome outcome = RunProgram(arguments);
-    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
+  static void ExpectRefused(const Outcome& outcome, int code, const Parts&... parts) {
+    EXPECT_EQ(outcome.exit_code, code) << outcome.output;
     if constexpr (sizeof...(parts) > 0) ExpectIn(outcome.output, parts...);
+  }
+  template <class... Parts>
+  static void ExpectRefused(const std::string& arguments, int code, const Parts&... parts) {
+    SCOPED_TRACE(arguments);
+    ExpectRefused(RunProgram(arguments), code, parts...);
   }
   // Any error code, but neither a signal nor a failure of the shell itself.
   template <class... Parts>
