@@ -18,7 +18,7 @@
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
 #include "train/data/build/build.h"
-#include "train/data/few_models.h"
+#include "train/data/dataset.h"
 #include "train/data/sources/installed.h"
 #include "train/data/sources/model_source.h"
 #include "train/data/sources/split_list.h"

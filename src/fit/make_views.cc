@@ -14,7 +14,7 @@
 #include "io/mesh_file.h"
 #include "render/picture/mesh_pictures.h"
 #include "render/picture/mesh_scene.h"
-#include "train/data/build/glass.h"
+#include "train/data/build/make_model.h"
 
 namespace tilegrad::train {
 namespace {

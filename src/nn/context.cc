@@ -27,26 +27,6 @@ Tensor Converted(Tensor tensor, std::span<const From> values, const Workers& wor
   return tensor;
 }
 
-}  // namespace
-
-Context::Lane::Lane(const Workers& w)
-    : workers(&w), pool(MemoryPool::Make()), step_memory(MakeStepMemory()) {}
-
-Context::Context(const Workers& workers, DType dtype) : dtype_(dtype) {
-  assert(dtype == DType::kF32 || dtype == DType::kF64);
-  lanes_.push_back(std::make_unique<Lane>(workers));
-}
-
-void Context::MakeLanes(std::size_t most) {
-  assert(!groups_);
-  if (most <= 1 || workers().count() == 1) return;
-  groups_.emplace(workers(), most);
-  for (std::size_t i = 0; i < groups_->count(); ++i)
-    lanes_.push_back(std::make_unique<Lane>(groups_->group(i)));
-}
-
-namespace {
-
 // Which lane of which context a thread is in.
 struct Entered {
   const Context* context = nullptr;
@@ -67,6 +47,22 @@ class Entering {
 };
 
 }  // namespace
+
+Context::Lane::Lane(const Workers& w)
+    : workers(&w), pool(MemoryPool::Make()), step_memory(MakeStepMemory()) {}
+
+Context::Context(const Workers& workers, DType dtype) : dtype_(dtype) {
+  assert(dtype == DType::kF32 || dtype == DType::kF64);
+  lanes_.push_back(std::make_unique<Lane>(workers));
+}
+
+void Context::MakeLanes(std::size_t most) {
+  assert(!groups_);
+  if (most <= 1 || workers().count() == 1) return;
+  groups_.emplace(workers(), most);
+  for (std::size_t i = 0; i < groups_->count(); ++i)
+    lanes_.push_back(std::make_unique<Lane>(groups_->group(i)));
+}
 
 std::size_t Context::lane() const { return t_entered.context == this ? t_entered.lane : 0; }
 

@@ -26,6 +26,13 @@ Var Initialised(Context& context, const Shape& shape, Rng& rng, std::int64_t fan
   return Parameter(context, std::move(tensor));
 }
 
+template <class Draw>
+void FillBy(Tensor& tensor, const Draw& draw) {
+  WithFloatType(tensor.dtype(), [&]<class T>(T) {
+    std::generate_n(tensor.data<T>(), tensor.elements(), [&] { return static_cast<T>(draw()); });
+  });
+}
+
 }  // namespace
 
 std::vector<NamedVar> Parameters(Module& module) {
@@ -162,17 +169,6 @@ void Sequential::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   for (const auto& [name, module] : children_) module->Visit(prefix + name + ".", visitor);
 }
 
-namespace {
-
-template <class Draw>
-void FillBy(Tensor& tensor, const Draw& draw) {
-  WithFloatType(tensor.dtype(), [&]<class T>(T) {
-    std::generate_n(tensor.data<T>(), tensor.elements(), [&] { return static_cast<T>(draw()); });
-  });
-}
-
-}  // namespace
-
 void FillConstant(Tensor& tensor, double value) {
   FillBy(tensor, [value] { return value; });
 }
@@ -198,9 +194,8 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
   shape.bias = shape.bias && !block.norm;
   net.Add<Conv2dLayer>(name + ".conv", context, shape, rng);
   const bool fused = block.norm && block.activation == &Relu;
-  if (block.norm) {
+  if (block.norm)
     net.Add<BatchNorm>(name + ".norm", context, shape.out, BatchNormOptions{.relu = fused});
-  }
   if (block.activation != nullptr && !fused) net.Add<Activation>(name + ".act", block.activation);
 }
 

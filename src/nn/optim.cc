@@ -39,6 +39,52 @@ double DecayOf(const Tensor& parameter, double weight_decay) {
   return parameter.shape().rank() > 1 ? weight_decay : 0.0;
 }
 
+double SquaresOf(const Context& context, const Var& x) {
+  if (!x.valid()) return 0;
+  return WithFloatType(x.dtype(), [&]<class T>(T) {
+    return SumOfSquares(x.value().data<T>(), x.value().elements(), context.workers());
+  });
+}
+
+// |a_i . b_j| <= |a_i| |b_j| <= |a| |b|, and so is every partial sum but for rounding.
+bool IsSurelyFinite(DType dtype, double squares_a, double squares_b) {
+  const double bound = std::sqrt(squares_a) * std::sqrt(squares_b);
+  return WithFloatType(dtype, [&]<class T>(T) {
+    return bound < 0.5 * static_cast<double>(std::numeric_limits<T>::max());
+  });
+}
+
+// Adds those of factors of type T.
+template <class T>
+void AddSquares(const Context& context, std::span<const Gradient> gradients,
+                std::vector<double>* sums) {
+  std::vector<std::span<const T>> factors;
+  for (const Gradient& g : gradients) {
+    for (const Var* factor : {&g.a(), &g.b()}) {
+      const bool counts = factor->valid() && factor->dtype() == kDTypeOf<T>;
+      factors.push_back(counts ? factor->value().template span<T>() : std::span<const T>());
+    }
+  }
+  const auto more = SumsOfSquares(std::span<const std::span<const T>>(factors), context.workers());
+  std::transform(more.begin(), more.end(), sums->begin(), sums->begin(), std::plus());
+}
+
+// Of a and b of each gradient, in one loop; 0 of what is not valid.
+std::vector<double> SquaresOfFactors(const Context& context, std::span<const Gradient> gradients) {
+  std::vector<double> sums(2 * gradients.size());
+  AddSquares<float>(context, gradients, &sums);
+  AddSquares<double>(context, gradients, &sums);
+  return sums;
+}
+
+constexpr std::string_view kPrefix = "ema.";
+// y = decay y + (1 - decay) x. Memory bounds it, and every compiler vectorises it.
+template <class T>
+void Blend(double decay, std::span<const T> x, std::span<T> y) {
+  const auto old = static_cast<T>(decay), rest = static_cast<T>(1 - decay);
+  for (std::size_t i = 0; i < x.size(); ++i) y[i] = old * y[i] + rest * x[i];
+}
+
 }  // namespace
 
 Adam::Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions& options)
@@ -60,9 +106,8 @@ Status Adam::Step(std::span<const Var> gradients) {
 
 Status Adam::Check(std::span<const Gradient> gradients) const {
   TILEGRAD_TRY(context_.status());
-  if (gradients.size() != slots_.size()) {
+  if (gradients.size() != slots_.size())
     return InvalidArgument("adam: {} gradients for {} parameters", gradients.size(), slots_.size());
-  }
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     TILEGRAD_TRY(CheckGradient(slots_[i].parameter, gradients[i]));
     if (options_.map != nullptr && gradients[i].dtype() != DType::kF32)
@@ -172,9 +217,8 @@ void Adam::UpdatePieces(std::span<const Gradient> gradients) {
 void Adam::AddProduct(Slot& slot, const Gradient& product) {
   const Tensor &a = product.a().value(), &b = product.b().value();
   const auto steps = static_cast<std::size_t>(a.shape()[0]);
-  if (a.dtype() != DType::kF32 || steps == 0 || steps > kMostProductAdamSteps) {
+  if (a.dtype() != DType::kF32 || steps == 0 || steps > kMostProductAdamSteps)
     return Update(slot, product.Value().value(), {0, slot.parameter.value.value().elements()});
-  }
   GemmProblem<float> gradient;
   gradient.m = static_cast<std::size_t>(a.shape()[1]);
   gradient.k = steps;
@@ -224,48 +268,6 @@ void Adam::UpdateThroughMap(Slot& slot, const Tensor& gradient) {
   for (std::size_t i = 0; i < x.size(); ++i) p[i] -= x[i];
 }
 
-namespace {
-
-double SquaresOf(const Context& context, const Var& x) {
-  if (!x.valid()) return 0;
-  return WithFloatType(x.dtype(), [&]<class T>(T) {
-    return SumOfSquares(x.value().data<T>(), x.value().elements(), context.workers());
-  });
-}
-
-// |a_i . b_j| <= |a_i| |b_j| <= |a| |b|, and so is every partial sum but for rounding.
-bool IsSurelyFinite(DType dtype, double squares_a, double squares_b) {
-  const double bound = std::sqrt(squares_a) * std::sqrt(squares_b);
-  return WithFloatType(dtype, [&]<class T>(T) {
-    return bound < 0.5 * static_cast<double>(std::numeric_limits<T>::max());
-  });
-}
-
-// Adds those of factors of type T.
-template <class T>
-void AddSquares(const Context& context, std::span<const Gradient> gradients,
-                std::vector<double>* sums) {
-  std::vector<std::span<const T>> factors;
-  for (const Gradient& g : gradients) {
-    for (const Var* factor : {&g.a(), &g.b()}) {
-      const bool counts = factor->valid() && factor->dtype() == kDTypeOf<T>;
-      factors.push_back(counts ? factor->value().template span<T>() : std::span<const T>());
-    }
-  }
-  const auto more = SumsOfSquares(std::span<const std::span<const T>>(factors), context.workers());
-  std::transform(more.begin(), more.end(), sums->begin(), sums->begin(), std::plus());
-}
-
-// Of a and b of each gradient, in one loop; 0 of what is not valid.
-std::vector<double> SquaresOfFactors(const Context& context, std::span<const Gradient> gradients) {
-  std::vector<double> sums(2 * gradients.size());
-  AddSquares<float>(context, gradients, &sums);
-  AddSquares<double>(context, gradients, &sums);
-  return sums;
-}
-
-}  // namespace
-
 double GlobalNorm(Context& context, std::span<const Var> gradients) {
   double sum = 0;
   for (const Var& g : gradients) sum += SquaresOf(context, g);
@@ -288,18 +290,6 @@ bool IsFinite(Context& context, std::span<const Gradient> gradients) {
   }
   return true;
 }
-
-namespace {
-
-constexpr std::string_view kPrefix = "ema.";
-// y = decay y + (1 - decay) x. Memory bounds it, and every compiler vectorises it.
-template <class T>
-void Blend(double decay, std::span<const T> x, std::span<T> y) {
-  const auto old = static_cast<T>(decay), rest = static_cast<T>(1 - decay);
-  for (std::size_t i = 0; i < x.size(); ++i) y[i] = old * y[i] + rest * x[i];
-}
-
-}  // namespace
 
 MovingAverage::MovingAverage(Context& context, std::vector<NamedTensor> tensors, double decay)
     : context_(context), decay_(decay), tensors_(std::move(tensors)) {

@@ -59,22 +59,19 @@ Status BadEntry(const std::string& name, const char* why) {
 bool IsCount(const Json& value) { return value.is_number_unsigned(); }
 
 Result<Shape> ParseShape(const std::string& name, const Json& extents, std::size_t max_elements) {
-  if (extents.size() > static_cast<std::size_t>(Shape::kMaxRank)) {
+  if (extents.size() > static_cast<std::size_t>(Shape::kMaxRank))
     return BadEntry(name, "more than five axes");
-  }
   Shape shape;
   for (const Json& extent : extents) {
     if (!IsCount(extent)) return BadEntry(name, "an extent is not a count");
     const auto e = extent.get<std::uint64_t>();
-    if (e > static_cast<std::uint64_t>(Shape::kMostElements)) {
+    if (e > static_cast<std::uint64_t>(Shape::kMostElements))
       return BadEntry(name, "its shape is larger than the file");
-    }
     shape.Append(static_cast<std::int64_t>(e));
   }
   // [0, 3] has more columns than a file without data has bytes.
-  if (shape.IsPossible() && static_cast<std::uint64_t>(shape.elements()) <= max_elements) {
+  if (shape.IsPossible() && static_cast<std::uint64_t>(shape.elements()) <= max_elements)
     return shape;
-  }
   return BadEntry(name, "its shape is larger than the file");
 }
 
@@ -84,9 +81,8 @@ Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t 
                         json.contains("data_offsets") && json["data_offsets"].is_array();
   if (!complete) return BadEntry(name, "dtype, shape or data_offsets is missing");
   const Json& offsets = json["data_offsets"];
-  if (offsets.size() != 2 || !IsCount(offsets[0]) || !IsCount(offsets[1])) {
+  if (offsets.size() != 2 || !IsCount(offsets[0]) || !IsCount(offsets[1]))
     return BadEntry(name, "data_offsets are not two counts");
-  }
   const auto stored = json["dtype"].get<std::string>();
   const std::optional<DType> dtype = DTypeNamed(stored);
   if (!dtype) return BadEntry(name, "its dtype is none of F32, F64, F16, U8, I32, I64");
@@ -135,9 +131,8 @@ Status CheckApart(std::vector<std::tuple<std::size_t, std::size_t, std::string>>
   std::string_view last;  // the tensor that reaches there
   for (const auto& [begin, end, name] : ranges) {
     if (begin == end) continue;
-    if (begin < last_end) {
+    if (begin < last_end)
       return BadEntry(name, fmt::format("its data overlaps that of \"{}\"", last).c_str());
-    }
     last_end = end;
     last = name;
   }
@@ -154,11 +149,10 @@ Result<Header> ParseHeader(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kLengthBytes)
     return DataLoss("safetensors: {} bytes are too few for a file", bytes.size());
   std::memcpy(&length, bytes.data(), kLengthBytes);
-  if (length > kMaxHeader || length > bytes.size() - kLengthBytes) {
+  if (length > kMaxHeader || length > bytes.size() - kLengthBytes)
     return DataLoss(
         "safetensors: a header of {} bytes in a file of {}: cut short, or not a safetensors file",
         length, bytes.size());
-  }
   const char* begin = reinterpret_cast<const char*>(bytes.data()) + kLengthBytes;
   const std::string_view text(begin, length);
   Header header{ParseJsonOrDiscard(text), {}};
@@ -166,9 +160,8 @@ Result<Header> ParseHeader(std::span<const std::uint8_t> bytes) {
   EntryNames entries;
   Json::sax_parse(text, &entries);
   header.names = std::move(entries.names);
-  if (header.json.size() != header.names.size()) {
+  if (header.json.size() != header.names.size())
     return DataLoss("safetensors: the header has a name twice");
-  }
   return header;
 }
 
@@ -198,51 +191,6 @@ Tensor TensorOf(const Context& context, const Entry& entry, std::span<const std:
   return tensor;
 }
 
-}  // namespace
-
-Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes) {
-  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
-  std::uint64_t length = 0;
-  std::memcpy(&length, bytes.data(), kLengthBytes);
-  const auto data = bytes.subspan(kLengthBytes + static_cast<std::size_t>(length));
-  TensorFile file;
-  std::vector<std::pair<std::string, Entry>> entries;
-  std::vector<std::tuple<std::size_t, std::size_t, std::string>> ranges;
-  for (const std::string& name : header.names) {
-    const Json& json = header.json[name];
-    if (name == kMetadata) {
-      TILEGRAD_TRY(ParseMetadata(json, file.metadata));
-      continue;
-    }
-    TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
-    ranges.emplace_back(entry.begin, entry.begin + entry.Size(), name);
-    entries.emplace_back(name, entry);
-  }
-  TILEGRAD_TRY(CheckApart(std::move(ranges)));
-  for (const auto& [name, entry] : entries)
-    file.tensors.push_back({name, TensorOf(context, entry, data)});
-  return file;
-}
-
-Result<std::map<std::string, std::string>> SafetensorsMetadata(
-    std::span<const std::uint8_t> bytes) {
-  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
-  std::map<std::string, std::string> metadata;
-  if (header.json.contains(kMetadata)) {
-    TILEGRAD_TRY(ParseMetadata(header.json[kMetadata], metadata));
-  }
-  return metadata;
-}
-
-Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
-  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
-  auto file = DecodeSafetensors(context, bytes);
-  if (!file.ok()) return file.status().Within(path.string());
-  return file;
-}
-
-namespace {
-
 void AppendMember(const std::string& name, const std::string& json, std::string* text) {
   if (text->size() > 1) *text += ',';
   *text += DumpJson(Json(name)) + ':' + json;
@@ -260,10 +208,9 @@ Result<Bytes> HalvesOf(const NamedTensor& t) {
   std::uint8_t* to = bytes.data();
   for (const float value : t.value.span<float>()) {
     const std::uint16_t half = ToHalf(value);
-    if ((half & kHalfInfinity) == kHalfInfinity) {
+    if ((half & kHalfInfinity) == kHalfInfinity)
       return InvalidArgument("safetensors: tensor \"{}\": {} is no number of float16 (at most {})",
                              t.name, value, kLargestHalf);
-    }
     std::memcpy(to, &half, sizeof half);
     to += sizeof half;
   }
@@ -296,9 +243,8 @@ Status CheckTexts(const TensorFile& file) {
   }
   std::unordered_set<std::string> names = {kMetadata};
   for (const NamedTensor& t : file.tensors) {
-    if (t.value.empty() || !names.insert(t.name).second) {
+    if (t.value.empty() || !names.insert(t.name).second)
       return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
-    }
     if (!IsUtf8(t.name)) return InvalidArgument("safetensors: a tensor's name is not UTF-8");
   }
   return {};
@@ -331,10 +277,9 @@ Result<EncodedFile> Encode(const TensorFile& file, StoredFloats floats) {
   }
   text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
-  if (text.size() > kMaxHeader) {
+  if (text.size() > kMaxHeader)
     return InvalidArgument("safetensors: names and metadata make a header of {} bytes, {} at most",
                            text.size(), kMaxHeader);
-  }
   out.header = HeaderOf(text);
   return out;
 }
@@ -348,6 +293,46 @@ std::vector<std::span<const std::uint8_t>> PiecesOf(const EncodedFile& file) {
 }
 
 }  // namespace
+
+Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes) {
+  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data(), kLengthBytes);
+  const auto data = bytes.subspan(kLengthBytes + static_cast<std::size_t>(length));
+  TensorFile file;
+  std::vector<std::pair<std::string, Entry>> entries;
+  std::vector<std::tuple<std::size_t, std::size_t, std::string>> ranges;
+  for (const std::string& name : header.names) {
+    const Json& json = header.json[name];
+    if (name == kMetadata) {
+      TILEGRAD_TRY(ParseMetadata(json, file.metadata));
+      continue;
+    }
+    TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
+    ranges.emplace_back(entry.begin, entry.begin + entry.Size(), name);
+    entries.emplace_back(name, entry);
+  }
+  TILEGRAD_TRY(CheckApart(std::move(ranges)));
+  for (const auto& [name, entry] : entries)
+    file.tensors.push_back({name, TensorOf(context, entry, data)});
+  return file;
+}
+
+Result<std::map<std::string, std::string>> SafetensorsMetadata(
+    std::span<const std::uint8_t> bytes) {
+  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
+  std::map<std::string, std::string> metadata;
+  if (header.json.contains(kMetadata))
+    TILEGRAD_TRY(ParseMetadata(header.json[kMetadata], metadata));
+  return metadata;
+}
+
+Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
+  auto file = DecodeSafetensors(context, bytes);
+  if (!file.ok()) return file.status().Within(path.string());
+  return file;
+}
 
 Result<Bytes> EncodeSafetensors(const TensorFile& file, StoredFloats floats) {
   TILEGRAD_ASSIGN(const EncodedFile encoded, Encode(file, floats));

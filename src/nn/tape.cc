@@ -83,9 +83,8 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
   for (const Var* v : operands) {
     if (v->has_context() && first.has_context() && &v->context() != &first.context()) {
       // Memory, errors and recording belong to a context: with two, each would have half.
-      for (Context* of : {&first.context(), &v->context()}) {
+      for (Context* of : {&first.context(), &v->context()})
         of->Fail(InvalidArgument("{}: operands are of two contexts; copy one's tensor", op));
-      }
       return false;
     }
     if (!v->valid()) return false;

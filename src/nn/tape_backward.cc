@@ -83,9 +83,8 @@ class Backward {
       open.pop_back();
       order_.push_back(node);
       for (const auto& edge : node->edges) {
-        if (edge.node && visits_.try_emplace(edge.node.get()).second) {
+        if (edge.node && visits_.try_emplace(edge.node.get()).second)
           open.push_back(edge.node.get());
-        }
       }
     }
   }
@@ -146,9 +145,8 @@ class Backward {
         node.rule(Adjoint(y, d, needs, consumer_.leave_products ? &left : nullptr));
     d.clear();
     for (std::size_t i = 0; i < d_inputs.size(); ++i) {
-      if (needs[i] && d_inputs[i].valid()) {
+      if (needs[i] && d_inputs[i].valid())
         Deposit(node.edges[i].node.get(), node.edges[i].slot, d_inputs[i]);
-      }
     }
     if (left.product.valid()) DepositProduct(node.edges[left.input], left.product);
     if (left.part.value.valid()) DepositPart(node.edges[left.input], left.part);
@@ -157,9 +155,8 @@ class Backward {
 
   InlineVector<std::uint8_t, 8> Needs(const Node& node) {
     InlineVector<std::uint8_t, 8> needs;
-    for (const auto& edge : node.edges) {
+    for (const auto& edge : node.edges)
       needs.push_back(edge.node && visits_[edge.node.get()].useful);
-    }
     return needs;
   }
 

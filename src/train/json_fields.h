@@ -31,9 +31,8 @@ class JsonFields {
     if (v == nullptr) return;
     const bool huge = v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX;
     const std::int64_t n = huge ? INT64_MAX : v->get<std::int64_t>();
-    if (n < low || n > high) {
+    if (n < low || n > high)
       return Fail(DataLoss("{}: \"{}\" must be in [{}, {}]", place_, key, low, high));
-    }
     *out = static_cast<int>(n);
   }
   void Read(const char* key, std::vector<std::string>* out) {
@@ -41,9 +40,8 @@ class JsonFields {
     if (v == nullptr) return;
     out->clear();
     for (const auto& item : *v) {
-      if (!item.is_string()) {
+      if (!item.is_string())
         return Fail(DataLoss("{}: \"{}\" must be an array of strings", place_, key));
-      }
       out->push_back(item);
     }
   }

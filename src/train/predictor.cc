@@ -20,10 +20,9 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
     return DataLoss("{}: image size {} is not possible", path.string(), info.image_size);
   if (!(info.half_extent > 0 && info.half_extent < 1e6))
     return DataLoss("{}: half-extent {} is not possible", path.string(), info.half_extent);
-  if (IsOfFit(info.config)) {
+  if (IsOfFit(info.config))
     return InvalidArgument("{}: is a fit, which predicts nothing; name a run of tilegrad train",
                            path.string());
-  }
   TILEGRAD_ASSIGN(all.config, ParseConfig(info.config, path.string() + ": its configuration"));
   auto model = all.config.task->LoadModel(all.context, all.found.checkpoint);
   if (!model.ok()) return model.status().Within(path.string());
@@ -56,10 +55,9 @@ std::string Predictor::description() const {
 
 Result<std::vector<Mesh>> Predictor::Predict(std::span<const std::uint8_t> images) const {
   const std::size_t bytes = 4 * static_cast<std::size_t>(image_size() * image_size());
-  if (images.size() % bytes != 0) {
+  if (images.size() % bytes != 0)
     return InvalidArgument("images must be [N][4][{0}][{0}] bytes, got {1}", image_size(),
                            images.size());
-  }
   std::vector<Mesh> out;
   for (std::size_t at = 0; at < images.size(); at += Model::kImagesAtOnce * bytes) {
     const std::size_t size = std::min(Model::kImagesAtOnce * bytes, images.size() - at);

@@ -35,12 +35,11 @@ class PortionedUpdate {
   static Result<std::unique_ptr<PortionedUpdate>> Make(nn::Context& context, Task& task,
                                                        std::int64_t portions, ProcessGroup* group) {
     Transport* const ranks = group ? &group->ranks() : nullptr;
-    if (ranks && ranks->size() > portions) {
+    if (ranks && ranks->size() > portions)
       return InvalidArgument(
           "{} ranks cannot share {} of a batch: set schedule.portions to a power of two that is "
           "not smaller, or start fewer ranks",
           ranks->size(), Count(portions, "portion"));
-    }
     if (context.dtype() != nn::DType::kF32) return InternalError("portions are summed in F32");
     TILEGRAD_ASSIGN(auto statistics, task.Statistics());
     const GradientSums::Shape shape{.portions = portions, .ranks = ranks};

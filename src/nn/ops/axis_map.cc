@@ -55,6 +55,53 @@ SparseRows<T> RowsOf(const AxisMap& map) {
           map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(), map.weight.data<T>()};
 }
 
+// The element of [0, extent) that stands at position i, which may lie outside.
+std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
+  if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
+  return std::clamp<std::int64_t>(i, 0, extent - 1);
+}
+
+// Padding of one axis.
+struct AxisPadding {
+  std::int64_t extent, before, after;
+  PadMode mode;
+  bool IsPossible() const {
+    const std::int64_t most = std::max(before, after);
+    return extent > 0 && before >= 0 && after >= 0 && most <= AxisMap::kMostExtent &&
+           before + extent + after <= AxisMap::kMostExtent;
+  }
+  AxisMap Map(const Var& like) const {
+    const auto row = [&](std::int64_t i, AxisTerms& terms) {
+      const std::int64_t at = i - before;
+      if (mode == PadMode::kZero && (at < 0 || at >= extent)) return;
+      terms.push_back({SourceOf(at, extent, mode), 1.0});
+    };
+    return MakeAxisMap(like, {extent, before + extent + after}, row);
+  }
+};
+
+Var RefusedPadding(const Var& x, const AxisPadding& padding, int axis) {
+  return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", padding.before,
+                                 padding.after, axis, x.shape().ToString()));
+}
+
+void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
+  const double scale = static_cast<double>(e.in) / static_cast<double>(e.out);
+  const double at = std::max(0.0, (static_cast<double>(i) + 0.5) * scale - 0.5);
+  const auto below = std::min(e.in - 1, static_cast<std::int64_t>(at));
+  const double share = below == e.in - 1 ? 0.0 : at - static_cast<double>(below);
+  terms.push_back({below, 1.0 - share});
+  if (share > 0) terms.push_back({below + 1, share});
+}
+
+AxisMap ResizedAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
+  const AxisExtents extents{x.shape()[axis], extent};
+  return MakeAxisMap(x, extents, [&](std::int64_t i, AxisTerms& terms) {
+    if (mode == ResizeMode::kBilinear) return AppendBilinear(extents, i, terms);
+    terms.push_back({i * extents.in / extents.out, 1.0});
+  });
+}
+
 }  // namespace
 
 AxisMap MakeAxisMap(const Var& like, const AxisExtents& extents,
@@ -123,40 +170,6 @@ Var MapImage(const Var& x, const AxisMap& rows, const AxisMap& columns) {
   });
 }
 
-namespace {
-
-// The element of [0, extent) that stands at position i, which may lie outside.
-std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
-  if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
-  return std::clamp<std::int64_t>(i, 0, extent - 1);
-}
-
-// Padding of one axis.
-struct AxisPadding {
-  std::int64_t extent, before, after;
-  PadMode mode;
-  bool IsPossible() const {
-    const std::int64_t most = std::max(before, after);
-    return extent > 0 && before >= 0 && after >= 0 && most <= AxisMap::kMostExtent &&
-           before + extent + after <= AxisMap::kMostExtent;
-  }
-  AxisMap Map(const Var& like) const {
-    const auto row = [&](std::int64_t i, AxisTerms& terms) {
-      const std::int64_t at = i - before;
-      if (mode == PadMode::kZero && (at < 0 || at >= extent)) return;
-      terms.push_back({SourceOf(at, extent, mode), 1.0});
-    };
-    return MakeAxisMap(like, {extent, before + extent + after}, row);
-  }
-};
-
-Var RefusedPadding(const Var& x, const AxisPadding& padding, int axis) {
-  return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", padding.before,
-                                 padding.after, axis, x.shape().ToString()));
-}
-
-}  // namespace
-
 Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode mode) {
   if (!Usable("pad", {&x})) return Invalid({&x});
   if (mode == PadMode::kZero) return Pad(x, axis, before, after);
@@ -171,9 +184,8 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
 
 Var PadImage(const Var& x, const Padding& padding, const PadModes& modes) {
   if (!Usable("pad image", {&x})) return Invalid({&x});
-  if (x.shape().rank() != 4) {
+  if (x.shape().rank() != 4)
     return Fail(x, InvalidArgument("pad image: {} is not [n, c, h, w]", x.shape().ToString()));
-  }
   const AxisPadding rows{x.shape()[2], padding.top, padding.bottom, modes.vertical};
   const AxisPadding columns{x.shape()[3], padding.left, padding.right, modes.horizontal};
   if (!rows.IsPossible()) return RefusedPadding(x, rows, 2);
@@ -184,39 +196,16 @@ Var PadImage(const Var& x, const Padding& padding, const PadModes& modes) {
   return MapImage(x, rows.Map(x), columns.Map(x));
 }
 
-namespace {
-
-void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
-  const double scale = static_cast<double>(e.in) / static_cast<double>(e.out);
-  const double at = std::max(0.0, (static_cast<double>(i) + 0.5) * scale - 0.5);
-  const auto below = std::min(e.in - 1, static_cast<std::int64_t>(at));
-  const double share = below == e.in - 1 ? 0.0 : at - static_cast<double>(below);
-  terms.push_back({below, 1.0 - share});
-  if (share > 0) terms.push_back({below + 1, share});
-}
-
-AxisMap ResizedAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
-  const AxisExtents extents{x.shape()[axis], extent};
-  return MakeAxisMap(x, extents, [&](std::int64_t i, AxisTerms& terms) {
-    if (mode == ResizeMode::kBilinear) return AppendBilinear(extents, i, terms);
-    terms.push_back({i * extents.in / extents.out, 1.0});
-  });
-}
-
-}  // namespace
-
 Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
   if (!Usable("resize", {&x})) return Invalid({&x});
   const bool image = x.shape().rank() == 4 && x.shape()[2] > 0 && x.shape()[3] > 0;
   const bool fits = size.height >= 1 && size.height <= AxisMap::kMostExtent && size.width >= 1 &&
                     size.width <= AxisMap::kMostExtent;
-  if (!image || !fits) {
+  if (!image || !fits)
     return Fail(
         x, InvalidArgument("resize: {} to {} x {}", x.shape().ToString(), size.height, size.width));
-  }
-  if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
+  if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width}))
     return Invalid({&x});
-  }
   if (x.shape()[2] == size.height && x.shape()[3] == size.width) return x;
   return MapImage(x, ResizedAxis(x, 2, size.height, mode), ResizedAxis(x, 3, size.width, mode));
 }

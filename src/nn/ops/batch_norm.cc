@@ -86,10 +86,9 @@ BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
                                const BatchNormOptions& options) {
   if (!Usable("batch norm", {&x, &gamma, &beta})) return {Invalid({&x, &gamma, &beta}), {}, {}};
   Status status = CheckOperands(x, gamma, beta);
-  if (status.ok() && ShapeOf(x.shape()).count() < 2) {
+  if (status.ok() && ShapeOf(x.shape()).count() < 2)
     status =
         InvalidArgument("batch norm: {} has no two elements to a channel", x.shape().ToString());
-  }
   if (!status.ok()) return {Fail(x, status), {}, {}};
   Context& context = x.context();
   const Operands operands{x, gamma, beta, options};

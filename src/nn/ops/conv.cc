@@ -30,10 +30,9 @@ Shape PaddedShape(const Shape& x, std::int64_t padding) {
 
 Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   const bool images = e.x.rank() == 4 && e.weight.rank() == 4 && e.x[1] == e.weight[1];
-  if (!images || options.stride < 1 || options.padding < 0) {
+  if (!images || options.stride < 1 || options.padding < 0)
     return InvalidArgument("conv2d: input {} with weight {}, stride {}, padding {}", e.x.ToString(),
                            e.weight.ToString(), options.stride, options.padding);
-  }
   // The caller may request an image of any size.
   if (!e.x.IsPossible() || !e.weight.IsPossible() ||
       !PaddedShape(e.x, options.padding).IsPossible()) {
@@ -42,9 +41,8 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
         e.x.ToString(), e.weight.ToString(), options.padding);
   }
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
-  if (options.padding_mode != PadMode::kZero && options.padding > 0) {
+  if (options.padding_mode != PadMode::kZero && options.padding > 0)
     return InvalidArgument("conv2d: this operation pads with zeros only");
-  }
   Conv2dShape s;
   s.batch = size(e.x[0]);
   s.in_channels = size(e.x[1]);
@@ -100,86 +98,6 @@ struct Kernels {
   }
 };
 
-}  // namespace
-
-Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options) {
-  const bool usable =
-      bias.has_context() ? Usable("conv2d", {&x, &weight, &bias}) : Usable("conv2d", {&x, &weight});
-  if (!usable) return Invalid({&x, &weight, &bias});
-  if (options.padding_mode != PadMode::kZero && options.padding > 0) {
-    const Padding frame = Padding::All(options.padding);
-    const Var padded = PadImage(x, frame, options.padding_mode);
-    return Conv2d(padded, weight, bias, {.stride = options.stride});
-  }
-  const auto s = MakeShape({x.shape(), weight.shape()}, options);
-  if (!s.ok()) return Fail(x, s.status());
-  if (bias.valid() && !(bias.shape() == Shape{weight.shape()[0]})) {
-    return Fail(x, InvalidArgument("conv2d: bias {} for weight {}", bias.shape().ToString(),
-                                   weight.shape().ToString()));
-  }
-  Tensor y = x.context().Empty(OutputShape(*s), x.dtype());
-  WithFloatType(x.dtype(), [&]<class T>(T) {
-    Kernels{*s, x.context().kernels()}.Forward(x.value().data<T>(), weight.value().data<T>(),
-                                               bias.valid() ? bias.value().data<T>() : nullptr,
-                                               y.data<T>());
-  });
-  const auto rule = [x, weight, options](const Adjoint& adj) {
-    const Var& dy = adj.dy();
-    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, weight, SizeOf(x), options) : Var(),
-                adj.needs(1) ? Conv2dWeightGrad(x, dy, SizeOf(weight), options) : Var(),
-                adj.needs(2) ? Sum(dy, {0, 2, 3}) : Var()};
-  };
-  return Record({"conv2d"}, std::move(y), {x, weight, bias}, rule);
-}
-
-Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options) {
-  if (!Usable("conv2d input gradient", {&dy, &weight})) return Invalid({&dy, &weight});
-  if (dy.shape().rank() != 4 || weight.shape().rank() != 4) {
-    return Fail(dy, InvalidArgument("conv2d input gradient: dy {}, weight {}",
-                                    dy.shape().ToString(), weight.shape().ToString()));
-  }
-  const Shape shape = {dy.shape()[0], weight.shape()[1], size.height, size.width};
-  const auto s = MakeShape({shape, weight.shape()}, dy.shape(), options);
-  if (!s.ok()) return Fail(dy, s.status());
-  Tensor dx = dy.context().Empty(shape, dy.dtype());
-  WithFloatType(dy.dtype(), [&]<class T>(T) {
-    Kernels{*s, dy.context().kernels()}.InputGrad(dy.value().data<T>(), weight.value().data<T>(),
-                                                  dx.data<T>());
-  });
-  // Linear in dy and in the weight; `d` is the adjoint of dx.
-  const auto rule = [dy, weight, options](const Adjoint& adj) {
-    const Var& d = adj.dy();
-    return Vars{adj.needs(0) ? Conv2d(d, weight, Var(), options) : Var(),
-                adj.needs(1) ? Conv2dWeightGrad(d, dy, SizeOf(weight), options) : Var()};
-  };
-  return Record({"conv2d input gradient"}, std::move(dx), {dy, weight}, rule);
-}
-
-Var Conv2dWeightGrad(const Var& x, const Var& dy, ImageSize kernel, const ConvOptions& options) {
-  if (!Usable("conv2d weight gradient", {&x, &dy})) return Invalid({&x, &dy});
-  if (x.shape().rank() != 4 || dy.shape().rank() != 4) {
-    return Fail(x, InvalidArgument("conv2d weight gradient: input {}, dy {}", x.shape().ToString(),
-                                   dy.shape().ToString()));
-  }
-  const Shape shape = {dy.shape()[1], x.shape()[1], kernel.height, kernel.width};
-  const auto s = MakeShape({x.shape(), shape}, dy.shape(), options);
-  if (!s.ok()) return Fail(x, s.status());
-  Tensor dw = x.context().Empty(shape, x.dtype());
-  WithFloatType(x.dtype(), [&]<class T>(T) {
-    Kernels{*s, x.context().kernels()}.WeightGrad(x.value().data<T>(), dy.value().data<T>(),
-                                                  dw.data<T>());
-  });
-  // Linear in x and in dy; `d` is the adjoint of dw.
-  const auto rule = [x, dy, options](const Adjoint& adj) {
-    const Var& d = adj.dy();
-    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, d, SizeOf(x), options) : Var(),
-                adj.needs(1) ? Conv2d(x, d, Var(), options) : Var()};
-  };
-  return Record({"conv2d weight gradient"}, std::move(dw), {x, dy}, rule);
-}
-
-namespace {
-
 // The position of the largest element in each window of an image. There is no arithmetic, and a
 // window's few elements lie in few cache lines, so there is no vector body.
 
@@ -218,9 +136,8 @@ void MaxPoolIndices(const PoolShape& s, const T* x, std::int32_t* first, const W
   workers.For(s.planes * s.out_height, [&](std::size_t row, std::size_t) {
     const T* plane = x + row / s.out_height * s.height * s.width;
     const Range rows = Window(s, row % s.out_height, s.height);
-    for (std::size_t j = 0; j < s.out_width; ++j) {
+    for (std::size_t j = 0; j < s.out_width; ++j)
       first[row * s.out_width + j] = Largest(s, plane, rows, Window(s, j, s.width));
-    }
   });
 }
 
@@ -245,14 +162,86 @@ AxisMap MeansAlong(const Var& x, int axis, const PoolOptions& o) {
   const auto row = [&](std::int64_t i, AxisTerms& terms) {
     const std::int64_t begin = i * o.stride - o.padding;
     const std::int64_t end = std::min(extents.in, begin + o.kernel);
-    for (std::int64_t at = std::max<std::int64_t>(0, begin); at < end; ++at) {
+    for (std::int64_t at = std::max<std::int64_t>(0, begin); at < end; ++at)
       terms.push_back({at, 1.0 / o.kernel});
-    }
   };
   return MakeAxisMap(x, extents, row);
 }
 
 }  // namespace
+
+Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options) {
+  const bool usable =
+      bias.has_context() ? Usable("conv2d", {&x, &weight, &bias}) : Usable("conv2d", {&x, &weight});
+  if (!usable) return Invalid({&x, &weight, &bias});
+  if (options.padding_mode != PadMode::kZero && options.padding > 0) {
+    const Padding frame = Padding::All(options.padding);
+    const Var padded = PadImage(x, frame, options.padding_mode);
+    return Conv2d(padded, weight, bias, {.stride = options.stride});
+  }
+  const auto s = MakeShape({x.shape(), weight.shape()}, options);
+  if (!s.ok()) return Fail(x, s.status());
+  if (bias.valid() && !(bias.shape() == Shape{weight.shape()[0]}))
+    return Fail(x, InvalidArgument("conv2d: bias {} for weight {}", bias.shape().ToString(),
+                                   weight.shape().ToString()));
+  Tensor y = x.context().Empty(OutputShape(*s), x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    Kernels{*s, x.context().kernels()}.Forward(x.value().data<T>(), weight.value().data<T>(),
+                                               bias.valid() ? bias.value().data<T>() : nullptr,
+                                               y.data<T>());
+  });
+  const auto rule = [x, weight, options](const Adjoint& adj) {
+    const Var& dy = adj.dy();
+    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, weight, SizeOf(x), options) : Var(),
+                adj.needs(1) ? Conv2dWeightGrad(x, dy, SizeOf(weight), options) : Var(),
+                adj.needs(2) ? Sum(dy, {0, 2, 3}) : Var()};
+  };
+  return Record({"conv2d"}, std::move(y), {x, weight, bias}, rule);
+}
+
+Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options) {
+  if (!Usable("conv2d input gradient", {&dy, &weight})) return Invalid({&dy, &weight});
+  if (dy.shape().rank() != 4 || weight.shape().rank() != 4)
+    return Fail(dy, InvalidArgument("conv2d input gradient: dy {}, weight {}",
+                                    dy.shape().ToString(), weight.shape().ToString()));
+  const Shape shape = {dy.shape()[0], weight.shape()[1], size.height, size.width};
+  const auto s = MakeShape({shape, weight.shape()}, dy.shape(), options);
+  if (!s.ok()) return Fail(dy, s.status());
+  Tensor dx = dy.context().Empty(shape, dy.dtype());
+  WithFloatType(dy.dtype(), [&]<class T>(T) {
+    Kernels{*s, dy.context().kernels()}.InputGrad(dy.value().data<T>(), weight.value().data<T>(),
+                                                  dx.data<T>());
+  });
+  // Linear in dy and in the weight; `d` is the adjoint of dx.
+  const auto rule = [dy, weight, options](const Adjoint& adj) {
+    const Var& d = adj.dy();
+    return Vars{adj.needs(0) ? Conv2d(d, weight, Var(), options) : Var(),
+                adj.needs(1) ? Conv2dWeightGrad(d, dy, SizeOf(weight), options) : Var()};
+  };
+  return Record({"conv2d input gradient"}, std::move(dx), {dy, weight}, rule);
+}
+
+Var Conv2dWeightGrad(const Var& x, const Var& dy, ImageSize kernel, const ConvOptions& options) {
+  if (!Usable("conv2d weight gradient", {&x, &dy})) return Invalid({&x, &dy});
+  if (x.shape().rank() != 4 || dy.shape().rank() != 4)
+    return Fail(x, InvalidArgument("conv2d weight gradient: input {}, dy {}", x.shape().ToString(),
+                                   dy.shape().ToString()));
+  const Shape shape = {dy.shape()[1], x.shape()[1], kernel.height, kernel.width};
+  const auto s = MakeShape({x.shape(), shape}, dy.shape(), options);
+  if (!s.ok()) return Fail(x, s.status());
+  Tensor dw = x.context().Empty(shape, x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    Kernels{*s, x.context().kernels()}.WeightGrad(x.value().data<T>(), dy.value().data<T>(),
+                                                  dw.data<T>());
+  });
+  // Linear in x and in dy; `d` is the adjoint of dw.
+  const auto rule = [x, dy, options](const Adjoint& adj) {
+    const Var& d = adj.dy();
+    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, d, SizeOf(x), options) : Var(),
+                adj.needs(1) ? Conv2d(x, d, Var(), options) : Var()};
+  };
+  return Record({"conv2d weight gradient"}, std::move(dw), {x, dy}, rule);
+}
 
 Var AvgPool2d(const Var& x, const PoolOptions& options) {
   if (!Usable("average pooling", {&x})) return Invalid({&x});
@@ -263,9 +252,7 @@ Var AvgPool2d(const Var& x, const PoolOptions& options) {
 // The elements are picked by index; picking is linear, and its adjoint puts them back.
 Var MaxPool2d(const Var& x, const PoolOptions& options) {
   if (!Usable("max pooling", {&x})) return Invalid({&x});
-  if (const Status s = Check("max pooling", x.shape(), options); !s.ok()) {
-    return Fail(x, s);
-  }
+  if (const Status s = Check("max pooling", x.shape(), options); !s.ok()) return Fail(x, s);
   const Shape& in = x.shape();
   const Shape out = {in[0], in[1], Windows(in[2], options), Windows(in[3], options)};
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };

@@ -52,11 +52,10 @@ bool AreMatrices(const Var& a, const Var& b, const MatmulOptions& options) {
 // c = op(a) op(b):  d_a = d_c op(b)^T,  d_b = op(a)^T d_c,  each transposed back where a or b was.
 Var Matmul(const Var& a, const Var& b, const MatmulOptions& options) {
   if (!Usable("matmul", {&a, &b})) return Invalid({&a, &b});
-  if (!AreMatrices(a, b, options)) {
+  if (!AreMatrices(a, b, options))
     return Fail(a, InvalidArgument("matmul: {}{} by {}{}", a.shape().ToString(),
                                    options.transpose_a ? "^T" : "", b.shape().ToString(),
                                    options.transpose_b ? "^T" : ""));
-  }
   const bool ta = options.transpose_a, tb = options.transpose_b;
   if (!IsPossibleResult("matmul", a, {a.shape()[ta ? 1 : 0], b.shape()[tb ? 0 : 1]}))
     return Invalid({&a});
@@ -76,10 +75,9 @@ Var Linear(const Var& x, const Var& w, const Var& b) {
   const bool usable = b.has_context() ? Usable("linear", {&x, &w, &b}) : Usable("linear", {&x, &w});
   if (!usable) return Invalid({&x, &w, &b});
   const MatmulOptions options{false, true};
-  if (!AreMatrices(x, w, options) || (b.valid() && !(b.shape() == Shape{w.shape()[0]}))) {
+  if (!AreMatrices(x, w, options) || (b.valid() && !(b.shape() == Shape{w.shape()[0]})))
     return Fail(x, InvalidArgument("linear: input {}, weight {}, bias {}", x.shape().ToString(),
                                    w.shape().ToString(), b.shape().ToString()));
-  }
   if (!IsPossibleResult("linear", x, {x.shape()[0], w.shape()[0]})) return Invalid({&x});
   const auto rule = [x, w](const Adjoint& adj) {
     const Var& dy = adj.dy();

@@ -61,13 +61,22 @@ Tensor ComputeBinary(const BinaryCall& call, const Var& a, const Var& b, Tensor 
 Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Var& b, Rule rule) {
   if (!Usable(info.name, {&a, &b})) return Invalid({&a, &b});
   Shape shape;
-  if (!BroadcastShape(a.shape(), b.shape(), shape)) {
+  if (!BroadcastShape(a.shape(), b.shape(), shape))
     return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
                                    a.shape().ToString(), b.shape().ToString()));
-  }
   if (!IsPossibleResult(info.name, a, shape)) return Invalid({&a});
   Tensor y = a.context().Empty(shape, a.dtype());
   return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
+}
+
+// d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the
+// second derivative with respect to y is zero, and with respect to d_y it is the same operation.
+Var RectifierGrad(const BinaryCall& call, const Var& y, Var dy) {
+  if (Usable("rectifier gradient", {&y, &dy}) && IsExpendable(dy) && y.shape() == dy.shape())
+    return Constant(y.context(), ComputeBinary(call, y, dy, dy.value()));
+  return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
+    return Vars{Var(), RectifierGrad(call, y, adj.TakeDy())};
+  });
 }
 
 }  // namespace
@@ -142,21 +151,6 @@ Var Abs(const Var& x) {
   return UnaryVar({"abs"}, UnaryOp::kAbs, x, 0,
                   [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sign(x))}; });
 }
-
-namespace {
-
-// d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the
-// second derivative with respect to y is zero, and with respect to d_y it is the same operation.
-Var RectifierGrad(const BinaryCall& call, const Var& y, Var dy) {
-  if (Usable("rectifier gradient", {&y, &dy}) && IsExpendable(dy) && y.shape() == dy.shape()) {
-    return Constant(y.context(), ComputeBinary(call, y, dy, dy.value()));
-  }
-  return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
-    return Vars{Var(), RectifierGrad(call, y, adj.TakeDy())};
-  });
-}
-
-}  // namespace
 
 Var Relu(const Var& x) {
   return UnaryVar({"relu", true}, UnaryOp::kRelu, x, 0, [](const Adjoint& adj) {

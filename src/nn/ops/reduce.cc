@@ -43,9 +43,8 @@ Reduction Plan(const Shape& shape, const AxisSet& reduced) {
 Status ParseAxes(const char* op, const Shape& shape, std::initializer_list<int> axes,
                  AxisSet& set) {
   for (int axis : axes) {
-    if (axis < 0 || axis >= shape.rank()) {
+    if (axis < 0 || axis >= shape.rank())
       return InvalidArgument("{}: axis {} of shape {}", op, axis, shape.ToString());
-    }
     set[static_cast<std::size_t>(axis)] = true;
   }
   return {};
@@ -105,10 +104,17 @@ Var ExtremumOver(const ExtremumCall& call, const Var& x, std::initializer_list<i
                  Keep keep) {
   if (!Usable(call.name, {&x})) return Invalid({&x});
   AxisSet set{};
-  if (const Status status = ParseAxes(call.name, x.shape(), axes, set); !status.ok()) {
+  if (const Status status = ParseAxes(call.name, x.shape(), axes, set); !status.ok())
     return Fail(x, status);
-  }
   return Extremum(call, x, set, keep);
+}
+
+// x minus its largest element along the axis, which is a constant: every function below is the same
+// for any constant.
+Var Lowered(const Var& x, int axis) { return Sub(x, Detach(ReduceMax(x, {axis}, Keep::kYes))); }
+
+bool AreLogits(const Var& logits, std::int64_t rows) {
+  return logits.shape().rank() == 2 && logits.shape()[0] == rows && rows > 0;
 }
 
 }  // namespace
@@ -116,9 +122,8 @@ Var ExtremumOver(const ExtremumCall& call, const Var& x, std::initializer_list<i
 Var Sum(const Var& x, std::initializer_list<int> axes, Keep keep) {
   if (!Usable("sum", {&x})) return Invalid({&x});
   AxisSet set{};
-  if (const Status status = ParseAxes("sum", x.shape(), axes, set); !status.ok()) {
+  if (const Status status = ParseAxes("sum", x.shape(), axes, set); !status.ok())
     return Fail(x, status);
-  }
   return SumOver(x, set, keep);
 }
 
@@ -153,30 +158,16 @@ Var SumTo(const Var& x, const Shape& shape) {
   if (!Usable("sum to", {&x})) return Invalid({&x});
   if (x.shape() == shape) return x;
   Shape joined;
-  if (!BroadcastShape(x.shape(), shape, joined) || !(joined == x.shape())) {
+  if (!BroadcastShape(x.shape(), shape, joined) || !(joined == x.shape()))
     return Fail(x, InvalidArgument("sum to: {} was not broadcast from {}", x.shape().ToString(),
                                    shape.ToString()));
-  }
   AxisSet axes{};
   const int missing = x.shape().rank() - shape.rank();
-  for (int axis = 0; axis < x.shape().rank(); ++axis) {
+  for (int axis = 0; axis < x.shape().rank(); ++axis)
     axes[static_cast<std::size_t>(axis)] =
         axis < missing || (shape[axis - missing] == 1 && x.shape()[axis] != 1);
-  }
   return Reshape(SumOver(x, axes, Keep::kYes), shape);
 }
-
-namespace {
-
-// x minus its largest element along the axis, which is a constant: every function below is the same
-// for any constant.
-Var Lowered(const Var& x, int axis) { return Sub(x, Detach(ReduceMax(x, {axis}, Keep::kYes))); }
-
-bool AreLogits(const Var& logits, std::int64_t rows) {
-  return logits.shape().rank() == 2 && logits.shape()[0] == rows && rows > 0;
-}
-
-}  // namespace
 
 Var LogSoftmax(const Var& x, int axis) {
   const Var z = Lowered(x, axis);
@@ -191,10 +182,9 @@ Var Softmax(const Var& x, int axis) {
 Var CrossEntropy(const Var& logits, const Tensor& labels) {
   if (!Usable("cross-entropy", {&logits})) return Invalid({&logits});
   const std::int64_t rows = labels.empty() ? 0 : labels.shape().elements();
-  if (!AreLogits(logits, rows)) {
+  if (!AreLogits(logits, rows))
     return Fail(logits, InvalidArgument("cross-entropy: logits {} with {} labels",
                                         logits.shape().ToString(), rows));
-  }
   return Neg(Mean(TakeAlong(LogSoftmax(logits, 1), labels.Reshaped({rows, 1}))));
 }
 

@@ -81,39 +81,6 @@ struct PictureSampling {
   }
 };
 
-}  // namespace
-
-Var SamplePictures(const Tensor& pictures, const Var& flow) {
-  if (!flow.valid()) return flow;
-  const Shape &p = pictures.shape(), &f = flow.shape();
-  if (p.rank() != 4 || f.rank() != 4 || f[1] != 2 || p[0] != f[0] ||
-      pictures.dtype() != flow.dtype())
-    return Fail(flow,
-                InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
-  Context& context = flow.context();
-  const PictureSampling at{pictures, flow.value()};
-  const auto batch = static_cast<std::size_t>(p[0]);
-  Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
-  WithFloatType(flow.dtype(), [&]<class T>(T) {
-    context.workers().For(batch, [&](std::size_t b, std::size_t) { at.Forward(b, out.data<T>()); });
-  });
-  auto backward = [at, batch, &context](std::span<const Tensor> d) {
-    Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
-    WithFloatType(at.flow.dtype(), [&]<class T>(T) {
-      context.workers().For(batch, [&](std::size_t b, std::size_t) {
-        at.Backward(b, d[0].span<T>().data(), d_flow.data<T>());
-      });
-    });
-    return std::vector<Tensor>{d_flow};
-  };
-  return External(context, {.name = "sample pictures",
-                            .inputs = {flow},
-                            .outputs = {out},
-                            .backward = std::move(backward)})[0];
-}
-
-namespace {
-
 // The mean of each cell of one picture.
 template <class T>
 void FillCells(std::span<const T> image, std::size_t size, ColorCells<T>* cells) {
@@ -187,6 +154,35 @@ ExternalOp MakeOp(Context& context, const Tensor& images, const Var& flow) {
 }
 
 }  // namespace
+
+Var SamplePictures(const Tensor& pictures, const Var& flow) {
+  if (!flow.valid()) return flow;
+  const Shape &p = pictures.shape(), &f = flow.shape();
+  if (p.rank() != 4 || f.rank() != 4 || f[1] != 2 || p[0] != f[0] ||
+      pictures.dtype() != flow.dtype())
+    return Fail(flow,
+                InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
+  Context& context = flow.context();
+  const PictureSampling at{pictures, flow.value()};
+  const auto batch = static_cast<std::size_t>(p[0]);
+  Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
+  WithFloatType(flow.dtype(), [&]<class T>(T) {
+    context.workers().For(batch, [&](std::size_t b, std::size_t) { at.Forward(b, out.data<T>()); });
+  });
+  auto backward = [at, batch, &context](std::span<const Tensor> d) {
+    Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
+    WithFloatType(at.flow.dtype(), [&]<class T>(T) {
+      context.workers().For(batch, [&](std::size_t b, std::size_t) {
+        at.Backward(b, d[0].span<T>().data(), d_flow.data<T>());
+      });
+    });
+    return std::vector<Tensor>{d_flow};
+  };
+  return External(context, {.name = "sample pictures",
+                            .inputs = {flow},
+                            .outputs = {out},
+                            .backward = std::move(backward)})[0];
+}
 
 Var SampleColors(const Tensor& images, const Var& flow) {
   if (!flow.valid()) return flow;

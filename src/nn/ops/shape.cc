@@ -80,10 +80,9 @@ StridedBox::Axes StridesOf(const Shape& shape) {
 
 StridedBox::Axes ExtentsOf(const Shape& shape) {
   StridedBox::Axes extents = {1, 1, 1, 1, 1};
-  for (int axis = 0; axis < shape.rank(); ++axis) {
+  for (int axis = 0; axis < shape.rank(); ++axis)
     extents[static_cast<std::size_t>(StridedBox::kRank - shape.rank() + axis)] =
         static_cast<std::size_t>(shape[axis]);
-  }
   return extents;
 }
 
@@ -122,121 +121,6 @@ void MoveRows(const RowMove& move, const Var& x, Tensor& y) {
 
 bool IsPadding(std::int64_t count) { return count >= 0 && count <= Shape::kMostElements; }
 
-}  // namespace
-
-Var Reshape(const Var& x, Shape shape) {
-  if (!Usable("reshape", {&x})) return Invalid({&x});
-  if (x.shape() == shape) return x;
-  const Shape asked = shape;
-  int open = -1;
-  for (int axis = 0; axis < shape.rank(); ++axis) {
-    if (shape[axis] == -1 && open < 0) open = axis;
-  }
-  if (open >= 0) shape[open] = 1;
-  if (open >= 0 && shape.IsPossible()) {
-    const std::int64_t rest = std::max<std::int64_t>(1, shape.elements());
-    shape[open] = x.shape().elements() / rest;
-  }
-  if (!shape.IsPossible() || shape.elements() != x.shape().elements()) {
-    return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
-  }
-  return Record(
-      {"reshape"}, x.value().Reshaped(shape), {x},
-      [before = x.shape()](const Adjoint& adj) { return Vars{Reshape(adj.dy(), before)}; });
-}
-
-Var BroadcastTo(const Var& x, const Shape& shape) {
-  if (!Usable("broadcast", {&x})) return Invalid({&x});
-  if (x.shape() == shape) return x;
-  if (!IsPossibleResult("broadcast", x, shape)) return Invalid({&x});
-  Shape joined;
-  if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape)) {
-    return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
-  }
-  const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
-  Tensor y = x.context().Empty(shape, x.dtype());
-  Move({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
-  return Record({"broadcast"}, std::move(y), {x},
-                [before = x.shape()](const Adjoint& adj) { return Vars{SumTo(adj.dy(), before)}; });
-}
-
-Var Permute(const Var& x, std::span<const int> axes) {
-  if (!Usable("permute", {&x})) return Invalid({&x});
-  const int rank = x.shape().rank();
-  std::array<int, Shape::kMaxRank> inverse;
-  inverse.fill(-1);
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (HasAxis(x.shape(), axes[i]))
-      inverse[static_cast<std::size_t>(axes[i])] = static_cast<int>(i);
-  }
-  const auto known = std::count_if(inverse.begin(), inverse.end(), [](int i) { return i >= 0; });
-  if (static_cast<int>(axes.size()) != rank || known != rank) {
-    return Fail(
-        x, InvalidArgument("permute: shape {} needs each of its axes once", x.shape().ToString()));
-  }
-  Shape shape;
-  for (int axis : axes) shape.Append(x.shape()[axis]);
-  StridedBox box{ExtentsOf(shape), {}, StridesOf(shape)};
-  const StridedBox::Axes strides = StridesOf(x.shape());
-  const auto pad = static_cast<std::size_t>(StridedBox::kRank - rank);
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    box.strides_from[pad + i] = strides[pad + static_cast<std::size_t>(axes[i])];
-  }
-  Tensor y = x.context().Empty(shape, x.dtype());
-  Move(box, x, 0, y, 0);
-  return Record({"permute"}, std::move(y), {x}, [inverse, rank](const Adjoint& adj) {
-    const std::span<const int> back(inverse.data(), static_cast<std::size_t>(rank));
-    return Vars{Permute(adj.dy(), back)};
-  });
-}
-
-Var Permute(const Var& x, std::initializer_list<int> axes) {
-  return Permute(x, std::span<const int>(axes.begin(), axes.size()));
-}
-
-Var Transpose(const Var& x) { return Permute(x, {1, 0}); }
-
-Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
-  if (!Usable("slice", {&x})) return Invalid({&x});
-  if (!HasAxis(x.shape(), axis) || begin < 0 || begin > end || end > x.shape()[axis]) {
-    return Fail(x, InvalidArgument("slice: [{}, {}) of axis {} of {}", begin, end, axis,
-                                   x.shape().ToString()));
-  }
-  Tensor y = x.context().Empty(x.shape().With(axis, end - begin), x.dtype());
-  const auto first = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
-  MoveRows({axis, first, 0, count}, x, y);
-  const std::int64_t after = x.shape()[axis] - end;
-  return Record({"slice"}, std::move(y), {x}, [axis, begin, after](const Adjoint& adj) {
-    return Vars{adj.Part(0, {adj.dy(), axis, begin, after})};
-  });
-}
-
-Var Accumulated(Var sum, const AdjointPart& part) {
-  if (!IsExpendable(sum)) return Add(sum, Pad(part.value, part.axis, part.before, part.after));
-  const auto begin = static_cast<std::size_t>(part.before);
-  const auto count = static_cast<std::size_t>(part.value.shape()[part.axis]);
-  MoveRows<Added>({part.axis, 0, begin, count}, part.value, sum.value());
-  return sum;
-}
-
-Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
-  if (!Usable("pad", {&x})) return Invalid({&x});
-  if (!HasAxis(x.shape(), axis) || !IsPadding(before) || !IsPadding(after)) {
-    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {}", before, after, axis,
-                                   x.shape().ToString()));
-  }
-  const std::int64_t extent = x.shape()[axis];
-  const Shape padded = x.shape().With(axis, before + extent + after);
-  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
-  Tensor y = x.context().Zeros(padded, x.dtype());
-  MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
-  return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
-    return Vars{Slice(adj.dy(), axis, before, before + extent)};
-  });
-}
-
-namespace {
-
 // Joining two at a time would copy the first parts repeatedly; this copies each part once.
 Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
   Context& context = parts[0].context();
@@ -259,6 +143,111 @@ Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
 }
 
 }  // namespace
+
+Var Reshape(const Var& x, Shape shape) {
+  if (!Usable("reshape", {&x})) return Invalid({&x});
+  if (x.shape() == shape) return x;
+  const Shape asked = shape;
+  int open = -1;
+  for (int axis = 0; axis < shape.rank(); ++axis) {
+    if (shape[axis] == -1 && open < 0) open = axis;
+  }
+  if (open >= 0) shape[open] = 1;
+  if (open >= 0 && shape.IsPossible()) {
+    const std::int64_t rest = std::max<std::int64_t>(1, shape.elements());
+    shape[open] = x.shape().elements() / rest;
+  }
+  if (!shape.IsPossible() || shape.elements() != x.shape().elements())
+    return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
+  return Record(
+      {"reshape"}, x.value().Reshaped(shape), {x},
+      [before = x.shape()](const Adjoint& adj) { return Vars{Reshape(adj.dy(), before)}; });
+}
+
+Var BroadcastTo(const Var& x, const Shape& shape) {
+  if (!Usable("broadcast", {&x})) return Invalid({&x});
+  if (x.shape() == shape) return x;
+  if (!IsPossibleResult("broadcast", x, shape)) return Invalid({&x});
+  Shape joined;
+  if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape))
+    return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
+  const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
+  Tensor y = x.context().Empty(shape, x.dtype());
+  Move({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
+  return Record({"broadcast"}, std::move(y), {x},
+                [before = x.shape()](const Adjoint& adj) { return Vars{SumTo(adj.dy(), before)}; });
+}
+
+Var Permute(const Var& x, std::span<const int> axes) {
+  if (!Usable("permute", {&x})) return Invalid({&x});
+  const int rank = x.shape().rank();
+  std::array<int, Shape::kMaxRank> inverse;
+  inverse.fill(-1);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (HasAxis(x.shape(), axes[i]))
+      inverse[static_cast<std::size_t>(axes[i])] = static_cast<int>(i);
+  }
+  const auto known = std::count_if(inverse.begin(), inverse.end(), [](int i) { return i >= 0; });
+  if (static_cast<int>(axes.size()) != rank || known != rank)
+    return Fail(
+        x, InvalidArgument("permute: shape {} needs each of its axes once", x.shape().ToString()));
+  Shape shape;
+  for (int axis : axes) shape.Append(x.shape()[axis]);
+  StridedBox box{ExtentsOf(shape), {}, StridesOf(shape)};
+  const StridedBox::Axes strides = StridesOf(x.shape());
+  const auto pad = static_cast<std::size_t>(StridedBox::kRank - rank);
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    box.strides_from[pad + i] = strides[pad + static_cast<std::size_t>(axes[i])];
+  Tensor y = x.context().Empty(shape, x.dtype());
+  Move(box, x, 0, y, 0);
+  return Record({"permute"}, std::move(y), {x}, [inverse, rank](const Adjoint& adj) {
+    const std::span<const int> back(inverse.data(), static_cast<std::size_t>(rank));
+    return Vars{Permute(adj.dy(), back)};
+  });
+}
+
+Var Permute(const Var& x, std::initializer_list<int> axes) {
+  return Permute(x, std::span<const int>(axes.begin(), axes.size()));
+}
+
+Var Transpose(const Var& x) { return Permute(x, {1, 0}); }
+
+Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
+  if (!Usable("slice", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis) || begin < 0 || begin > end || end > x.shape()[axis])
+    return Fail(x, InvalidArgument("slice: [{}, {}) of axis {} of {}", begin, end, axis,
+                                   x.shape().ToString()));
+  Tensor y = x.context().Empty(x.shape().With(axis, end - begin), x.dtype());
+  const auto first = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
+  MoveRows({axis, first, 0, count}, x, y);
+  const std::int64_t after = x.shape()[axis] - end;
+  return Record({"slice"}, std::move(y), {x}, [axis, begin, after](const Adjoint& adj) {
+    return Vars{adj.Part(0, {adj.dy(), axis, begin, after})};
+  });
+}
+
+Var Accumulated(Var sum, const AdjointPart& part) {
+  if (!IsExpendable(sum)) return Add(sum, Pad(part.value, part.axis, part.before, part.after));
+  const auto begin = static_cast<std::size_t>(part.before);
+  const auto count = static_cast<std::size_t>(part.value.shape()[part.axis]);
+  MoveRows<Added>({part.axis, 0, begin, count}, part.value, sum.value());
+  return sum;
+}
+
+Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
+  if (!Usable("pad", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis) || !IsPadding(before) || !IsPadding(after))
+    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {}", before, after, axis,
+                                   x.shape().ToString()));
+  const std::int64_t extent = x.shape()[axis];
+  const Shape padded = x.shape().With(axis, before + extent + after);
+  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
+  Tensor y = x.context().Zeros(padded, x.dtype());
+  MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
+  return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
+    return Vars{Slice(adj.dy(), axis, before, before + extent)};
+  });
+}
 
 Var Concat(std::span<const Var> parts, int axis) {
   if (parts.empty()) return {};

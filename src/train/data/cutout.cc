@@ -31,11 +31,10 @@ Result<Window> FitWindow(const ImageU8& rgba) {
     }
   }
   if (opaque == 0) return InvalidArgument("the mask is empty: no pixel is opaque");
-  if (opaque == rgba.pixels.size() / 4) {
+  if (opaque == rgba.pixels.size() / 4)
     return InvalidArgument(
         "every pixel is opaque, so the object is not cut out; give an image with a transparent "
         "background, or a mask");
-  }
   const double side = std::max(right - left + 1, bottom - top + 1) / kTrainingFill;
   return Window{0.5 * (left + right + 1) - 0.5 * side, 0.5 * (top + bottom + 1) - 0.5 * side, side};
 }
@@ -83,10 +82,9 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& image, int size, 
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       const Sum mean = AverageArea(rgba, window.x0 + x * cell, window.y0 + y * cell, cell);
-      for (std::size_t c = 0; c < 4; ++c) {
+      for (std::size_t c = 0; c < 4; ++c)
         out[c * plane + static_cast<std::size_t>(y * size + x)] =
             static_cast<std::uint8_t>(std::min(255.0, mean.value[c] + 0.5));
-      }
     }
   }
   return out;
@@ -101,18 +99,16 @@ std::vector<std::uint8_t> MaskValues(const ImageU8& mask) {
   };
   if (channels == 2 || channels == 4) {
     std::vector<std::uint8_t> alpha = channel(channels - 1);
-    if (std::any_of(alpha.begin(), alpha.end(), [](std::uint8_t a) { return a < 255; })) {
+    if (std::any_of(alpha.begin(), alpha.end(), [](std::uint8_t a) { return a < 255; }))
       return alpha;
-    }
   }
   return channel(0);
 }
 
 Result<ImageU8> WithMask(const ImageU8& rgb, const ImageU8& mask) {
-  if (rgb.width != mask.width || rgb.height != mask.height) {
+  if (rgb.width != mask.width || rgb.height != mask.height)
     return InvalidArgument("the mask is {} x {} pixels, the image {} x {}; they must be equal",
                            mask.width, mask.height, rgb.width, rgb.height);
-  }
   ImageU8 out(rgb.width, rgb.height, 4);
   const std::vector<std::uint8_t> values = MaskValues(mask);
   for (int y = 0; y < rgb.height; ++y) {

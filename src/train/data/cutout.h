@@ -21,9 +21,8 @@ enum class Framing {
 // are (then there is no cut-out).
 Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& image, int size, Framing framing);
 
-// The share of the image that the longest side of a normalised object spans when it faces the
-// camera of CameraRule's defaults: half_extent / (distance tan(fov_y / 2)) = 0.45 / (1.45 *
-// 0.4571).
+// The share of the image that a normalised object's longest side spans before CameraRule's default
+// camera: half_extent / (distance tan(fov_y / 2)) = 0.45 / (1.45 * 0.4571).
 inline constexpr double kTrainingFill = 0.679;
 
 // The object's share of each pixel, 255 inside: alpha if any of the picture is transparent; else

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/dataset.h"
 
+#include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "base/error.h"
@@ -48,21 +50,34 @@ std::size_t CountShapes(const std::vector<ModelInfo>& models) {
   return shapes.size();
 }
 
+std::optional<std::string> AdviceOnFewModels(const std::vector<ModelInfo>& models, bool streamed) {
+  std::vector<ModelInfo> training;
+  std::copy_if(models.begin(), models.end(), std::back_inserter(training),
+               [](const ModelInfo& model) { return model.split == Split::kTrain; });
+  const std::size_t shapes = CountShapes(training);
+  if (shapes >= (streamed ? kFewStreamedShapes : kFewShapes)) return std::nullopt;
+  return fmt::format(
+      "{} training shape{} few{}: a network memorises {} and does not generalise. Add models "
+      "(--source procedural makes any number, --per-class), {}or, for one object, use `tilegrad "
+      "fit`",
+      shapes, shapes == 1 ? " is" : "s are",
+      streamed ? ", also with streamed variants of each" : "", shapes == 1 ? "it" : "them",
+      streamed ? "" : "train with --set stream.share=0.5 --set schedule.mirrored=0.5, ");
+}
+
 Result<Dataset> Dataset::Open(const Path& folder) {
   Dataset dataset;
   dataset.folder_ = folder;
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
-  if (!PathExists(DatasetInfoPath(folder))) {
+  if (!PathExists(DatasetInfoPath(folder)))
     return NotFound("{}: not a folder of tilegrad dataset: there is no dataset.json in it",
                     folder.string());
-  }
   TILEGRAD_ASSIGN(dataset.info_, ReadDatasetInfo(folder));
-  if (!PathExists(ModelsPath(folder))) {
+  if (!PathExists(ModelsPath(folder)))
     return NotFound(
         "{}: the dataset is not complete; run the same `tilegrad dataset` command again to finish "
         "it",
         folder.string());
-  }
   TILEGRAD_ASSIGN(dataset.models_, ReadModels(folder, dataset.info_));
   return dataset;
 }

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,13 +71,18 @@ inline const std::string& ShapeOf(const ModelInfo& model) {
 // Counts each shape of a class once.
 std::size_t CountShapes(const std::vector<ModelInfo>& models);
 
+// A network only memorises fewer training shapes than this; streaming (data/stream) makes variants
+// of each, so that fewer suffice.
+inline constexpr std::size_t kFewShapes = 50, kFewStreamedShapes = 20;
+// Advice for the user, if the training models among these are too few.
+std::optional<std::string> AdviceOnFewModels(const std::vector<ModelInfo>& models, bool streamed);
+
 inline constexpr int kOccupancyResolution = 32;  // voxels a side
 inline constexpr int kTruthPoints = 2500;        // as in the official code, for the F-score
 inline constexpr int kTruthFaces = 5000;
 
 struct ModelData {
-  // [views][4][size][size], planar RGBA, row 0 on top. RGB is composited over black (premultiplied
-  // by the anti-aliased alpha).
+  // [views][4][size][size], planar RGBA, row 0 on top; RGB over black (premultiplied).
   std::vector<std::uint8_t> images;
   // By view; empty unless DatasetInfo::own_cameras (CamerasOf).
   std::vector<Camera> cameras = {};

@@ -25,9 +25,8 @@ void ReadHex(JsonFields& fields, const char* key, std::uint64_t* out) {
   fields.Read(key, &text);
   if (!fields.status().ok()) return;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *out, 16);
-  if (error != std::errc() || end != text.data() + text.size()) {
+  if (error != std::errc() || end != text.data() + text.size())
     fields.Fail(DataLoss("{}: \"{}\" must be a hexadecimal number", fields.place(), key));
-  }
 }
 
 // Ids and classes become file names.
@@ -62,24 +61,20 @@ Status ReadCamera(const nlohmann::json& json, const std::string& place, DatasetI
   rule->lens.width = rule->lens.height = info->image_size;
   TILEGRAD_TRY(fields.status());
   const CameraRule& r = *rule;
-  if (!(r.lens.fov_y > 0 && r.lens.fov_y < 180)) {
+  if (!(r.lens.fov_y > 0 && r.lens.fov_y < 180))
     return DataLoss("{}: \"fov_y\" is {}; must be above 0 and below 180 degrees", place,
                     r.lens.fov_y);
-  }
-  if (!(std::abs(r.elevation) <= 90)) {
+  if (!(std::abs(r.elevation) <= 90))
     return DataLoss("{}: \"elevation\" is {}; must be -90 to 90 degrees", place, r.elevation);
-  }
   // A dataset's objects are half_extent large: of a camera at their centre nothing is seen.
   for (const auto& [key, value] :
        {std::pair("distance", r.distance), std::pair("half_extent", r.half_extent)}) {
-    if (!(value > 0 && value <= kMostUnits)) {
+    if (!(value > 0 && value <= kMostUnits))
       return DataLoss("{}: \"{}\" is {}; must be above 0 and at most {:g} world units", place, key,
                       value, kMostUnits);
-    }
   }
-  if (!(std::abs(r.azimuth_step) <= kMostUnits)) {
+  if (!(std::abs(r.azimuth_step) <= kMostUnits))
     return DataLoss("{}: \"azimuth_step\" is {} degrees", place, r.azimuth_step);
-  }
   return {};
 }
 
@@ -101,9 +96,8 @@ void ReadSplit(JsonFields& fields, Split* out) {
   fields.Read("split", &name);
   const auto at = std::find_if(std::begin(kSplits), std::end(kSplits),
                                [&](Split split) { return name == SplitName(split); });
-  if (at == std::end(kSplits)) {
+  if (at == std::end(kSplits))
     return fields.Fail(DataLoss("{}: \"split\" must be train, validation or test", fields.place()));
-  }
   *out = *at;
 }
 
@@ -111,10 +105,9 @@ void ReadClass(JsonFields& fields, const DatasetInfo& info, int* out) {
   std::string name;
   fields.Read("class", &name);
   const auto at = std::find(info.classes.begin(), info.classes.end(), name);
-  if (at == info.classes.end()) {
+  if (at == info.classes.end())
     return fields.Fail(
         DataLoss("{}: class \"{}\" is not listed in dataset.json", fields.place(), name));
-  }
   *out = static_cast<int>(at - info.classes.begin());
 }
 
@@ -181,10 +174,9 @@ Result<DatasetInfo> ReadDatasetInfo(const Path& folder) {
   DatasetInfo info;
   std::string format;
   fields.Read("format", &format);
-  if (fields.status().ok() && format != kFormat) {
+  if (fields.status().ok() && format != kFormat)
     fields.Fail(
         DataLoss("{}: \"format\" is \"{}\", this program reads \"{}\"", place, format, kFormat));
-  }
   fields.Read("source", &info.source);
   fields.Read("image_size", 1, 4096, &info.image_size);
   fields.Read("views", 1, 4096, &info.views);
@@ -217,9 +209,8 @@ Result<std::vector<ModelInfo>> ReadModels(const Path& folder, const DatasetInfo&
     const std::string place = fmt::format("{}: line {}", file, ++line);
     TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(row, file, line));
     TILEGRAD_ASSIGN(ModelInfo model, ReadModel(json, place, info));
-    if (!seen.emplace(model.class_index, model.id).second) {
+    if (!seen.emplace(model.class_index, model.id).second)
       return DataLoss("{}: the id \"{}\" appears twice in its class", place, model.id);
-    }
     models.push_back(std::move(model));
   }
   if (models.empty()) return DataLoss("{}: no models", file);

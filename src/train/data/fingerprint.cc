@@ -30,12 +30,9 @@ Status AddFiles(const std::vector<Path>& files, const Workers& workers, Hash* al
 
 void AddPhotograph(const Photograph& photo, Hash* all) {
   const WeakPerspective camera = photo.camera.value_or(WeakPerspective{.scale = 0});
-  std::vector<double> numbers = {static_cast<double>(photo.split),
-                                 photo.box.left,
-                                 photo.box.top,
-                                 photo.box.right,
-                                 photo.box.bottom,
-                                 camera.scale};
+  const auto& [left, top, right, bottom] = photo.box;
+  const auto split = static_cast<double>(photo.split);
+  std::vector<double> numbers = {split, left, top, right, bottom, camera.scale};
   numbers.insert(numbers.end(), camera.translation.begin(), camera.translation.end());
   numbers.insert(numbers.end(), camera.quaternion.begin(), camera.quaternion.end());
   for (const Keypoint& k : photo.keypoints)

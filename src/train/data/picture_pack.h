@@ -5,8 +5,7 @@
 //   <dataset>/pictures.bin   [models][views][4][size][size] bytes in the order of models.jsonl,
 //                            then a line with the format and a checksum over the model files
 //
-// It is valid as long as that line matches the model files; otherwise the next training rewrites
-// it.
+// Where that line does not match the model files, the next training rewrites it.
 #pragma once
 
 #include <optional>

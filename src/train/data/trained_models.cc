@@ -85,8 +85,7 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
   if (seen.empty()) return {};
   return InvalidArgument(
       "{}: {} of the {} held-out models of {} were trained on ({}, ...): the dataset has been "
-      "split "
-      "anew since; make it with the seed, shares and limits it had then, or train again",
+      "split anew since; make it with the seed, shares and limits it had then, or train again",
       run.string(), seen.size(), held_out.size(), dataset.folder().string(),
       seen[0].substr(seen[0].find(' ') + 1));
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records in the run folder which models a run was trained on: a dataset may be split again or
-// rebuilt under the same name, and then the run cannot be resumed with it, nor are its test models
-// held out.
+// Records in the run folder which models a run was trained on: with a dataset that was split or
+// built again, the run cannot be resumed, nor are its test models held out.
 //
 //   <run>/training_models.txt    a line "recipe <hex>", then one "<geometry> <class>/<id>" for each
 //                                model, as the dataset lists them, a line "camera ..." and one

@@ -22,6 +22,39 @@ std::uint32_t ThumbnailDistance(const std::uint8_t* a, const std::uint8_t* b) {
   return sum;
 }
 
+constexpr std::size_t kLevels = 256;
+using Histogram = std::array<std::size_t, kLevels + 1>;
+
+// For each voxel the share of grids that have it, in units of 1 / kLevels, rounded down.
+std::vector<std::uint16_t> Shares(std::span<const std::vector<std::uint8_t>> grids) {
+  std::vector<std::size_t> count(grids.front().size(), 0);
+  for (const auto& grid : grids) {
+    for (std::size_t i = 0; i < count.size(); ++i) count[i] += grid[i];
+  }
+  std::vector<std::uint16_t> shares(count.size());
+  for (std::size_t i = 0; i < count.size(); ++i)
+    shares[i] = static_cast<std::uint16_t>(count[i] * kLevels / grids.size());
+  return shares;
+}
+
+// How many entries are at level k or above, for each k.
+void SumFromAbove(Histogram* histogram) {
+  for (std::size_t k = kLevels; k-- > 0;) (*histogram)[k] += (*histogram)[k + 1];
+}
+
+// Adds a grid's IoU with the shape {share >= k} for every level k at once.
+void AddIous(const std::vector<std::uint8_t>& grid, std::span<const std::uint16_t> shares,
+             const Histogram& shape_size, std::array<double, kLevels + 1>* sums) {
+  Histogram both{};
+  for (std::size_t i = 0; i < grid.size(); ++i) both[shares[i]] += grid[i];
+  SumFromAbove(&both);
+  const std::size_t solid = both[0];
+  for (std::size_t k = 0; k <= kLevels; ++k) {
+    const std::size_t either = solid + shape_size[k] - both[k];
+    (*sums)[k] += either == 0 ? 1.0 : static_cast<double>(both[k]) / static_cast<double>(either);
+  }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> Thumbnail(std::span<const std::uint8_t> image, int size) {
@@ -69,44 +102,6 @@ ImageIndex::Match ImageIndex::Nearest(std::span<const std::uint8_t> image, int s
   }
   return {entries_[at].model, entries_[at].view, std::sqrt(best / double{kThumbnailBytes}) / 255};
 }
-
-namespace {
-
-constexpr std::size_t kLevels = 256;
-using Histogram = std::array<std::size_t, kLevels + 1>;
-
-// For each voxel the share of grids that have it, in units of 1 / kLevels, rounded down.
-std::vector<std::uint16_t> Shares(std::span<const std::vector<std::uint8_t>> grids) {
-  std::vector<std::size_t> count(grids.front().size(), 0);
-  for (const auto& grid : grids) {
-    for (std::size_t i = 0; i < count.size(); ++i) count[i] += grid[i];
-  }
-  std::vector<std::uint16_t> shares(count.size());
-  for (std::size_t i = 0; i < count.size(); ++i) {
-    shares[i] = static_cast<std::uint16_t>(count[i] * kLevels / grids.size());
-  }
-  return shares;
-}
-
-// How many entries are at level k or above, for each k.
-void SumFromAbove(Histogram* histogram) {
-  for (std::size_t k = kLevels; k-- > 0;) (*histogram)[k] += (*histogram)[k + 1];
-}
-
-// Adds a grid's IoU with the shape {share >= k} for every level k at once.
-void AddIous(const std::vector<std::uint8_t>& grid, std::span<const std::uint16_t> shares,
-             const Histogram& shape_size, std::array<double, kLevels + 1>* sums) {
-  Histogram both{};
-  for (std::size_t i = 0; i < grid.size(); ++i) both[shares[i]] += grid[i];
-  SumFromAbove(&both);
-  const std::size_t solid = both[0];
-  for (std::size_t k = 0; k <= kLevels; ++k) {
-    const std::size_t either = solid + shape_size[k] - both[k];
-    (*sums)[k] += either == 0 ? 1.0 : static_cast<double>(both[k]) / static_cast<double>(either);
-  }
-}
-
-}  // namespace
 
 SingleShape BestSingleShape(std::span<const std::vector<std::uint8_t>> grids) {
   const auto shares = Shares(grids);

@@ -31,10 +31,9 @@ class Evaluator {
 
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);
-    if (held_out.empty()) {
+    if (held_out.empty())
       return InvalidArgument("{}: its {} split has no models; `tilegrad dataset` makes the splits",
                              data_.folder().string(), SplitName(job_.split));
-    }
     const int views = data_.info().views;
     views_ = SpreadViews(views, std::clamp(job_.views_per_model, 1, views));
     color_views_ = SpreadViews(views, std::min(kColorViews, views));
@@ -185,9 +184,8 @@ class Evaluator {
   Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth,
                                  int* unusable_predictions) {
     TILEGRAD_ASSIGN(auto meshes, job_.predict(ViewsOf(data_.info(), data.images, views_)));
-    if (meshes.size() != views_.size()) {
+    if (meshes.size() != views_.size())
       return InternalError("{} predictions for {} images", meshes.size(), views_.size());
-    }
     std::vector<Score> scores(meshes.size());
     std::vector<std::uint8_t> unusable(meshes.size(), 0);
     workers_.For(meshes.size(), [&](std::size_t i, std::size_t worker) {

@@ -29,9 +29,8 @@ struct EvaluationJob {
   FitFunction oracle{};      // the row "oracle"; none: no such row
   Mesh template_mesh;        // the baseline "undeformed template"
   int views_per_model = 24;  // evenly spread over the dataset's views; at most all of them
-  // Training models whose pictures are searched for the nearest to each input, spread evenly over
-  // all if there are more. With 24 views each a search takes some milliseconds, and the shapes take
-  // 200 MB. 0: no such baseline; scores of training models never have it.
+  // Training models, spread evenly, whose pictures are searched for the nearest to each input: some
+  // milliseconds a search, 200 MB. No such baseline: 0, or where training models are scored.
   int retrieval_models = 1000;
   VoxelJob voxels{};      // with the half-extent of predictions
   std::string predictor;  // Predictor::description, for the heading

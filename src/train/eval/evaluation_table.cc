@@ -90,9 +90,8 @@ std::vector<std::size_t> Widths(const std::vector<std::vector<std::string>>& cel
 std::string Join(const std::vector<std::string>& line, const std::vector<std::size_t>& widths,
                  const std::string& between) {
   std::string out = fmt::format("{:<{}}", line[0], widths[0]);
-  for (std::size_t i = 1; i < line.size(); ++i) {
+  for (std::size_t i = 1; i < line.size(); ++i)
     out += fmt::format("{}{:>{}}", between, line[i], widths[i]);
-  }
   return out;
 }
 
@@ -112,24 +111,20 @@ std::string Caption(const Evaluation& evaluation) {
 
 std::string ClassifierNotes(const Evaluation& evaluation) {
   std::string notes = "Most frequent class: always that of most training pictures.";
-  if (evaluation.retrieval_models > 0) {
+  if (evaluation.retrieval_models > 0)
     notes += fmt::format(
         " Nearest training picture: the class of that of {} training models which has the picture "
         "most like the input.",
         evaluation.retrieval_models);
-  }
   return notes;
 }
 
 constexpr const char* kPhotographNotes =
     "Table 3: texture L1 is the mean difference of colour between prediction and object over all "
     "pixels of the crop, black beyond them; 2D IoU loss is 1 - IoU of their silhouettes; PCK@0.1 "
-    "is "
-    "the share of visible keypoints within a tenth of the box's longer side, a mean over "
-    "keypoints. "
-    "All but \"predicted camera\" are seen through the annotated cameras; \"true keypoints\" says "
-    "what "
-    "these leave to gain.";
+    "is the share of visible keypoints within a tenth of the box's longer side, a mean over "
+    "keypoints. All but \"predicted camera\" are seen through the annotated cameras; \"true "
+    "keypoints\" says what these leave to gain.";
 
 constexpr const char* kErrorNote =
     " ±: standard error of the mean over held-out models, of which a class has few: differences "
@@ -139,48 +134,40 @@ std::string Notes(const Evaluation& evaluation) {
   if (Classifies(evaluation)) return ClassifierNotes(evaluation);
   if (IsOfPhotographs(evaluation)) return kPhotographNotes;
   std::string notes;
-  if (evaluation.shape_threshold > 0) {
+  if (evaluation.shape_threshold > 0)
     notes = fmt::format(
         "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
         "that scores best on the training models.",
         100 * evaluation.shape_threshold);
-  }
-  if (evaluation.retrieval_models > 0) {
+  if (evaluation.retrieval_models > 0)
     notes += fmt::format(
         " Nearest training picture: the shape and the colours of that of {} training models which "
         "has the picture most like the input.",
         evaluation.retrieval_models);
-  }
   if (evaluation.voxels != "ours")
     notes += fmt::format(" 3D IoU: of voxels by the rule of {}.", evaluation.voxels);
-  if (HasAny(evaluation, &Score::carved_iou)) {
+  if (HasAny(evaluation, &Score::carved_iou))
     notes +=
         " Carved IoU: mean over classes of the IoU with voxels by the paper's rule (binvox -cb -dc "
         "-aw).";
-  }
-  if (HasAny(evaluation, &Score::color_l1)) {
+  if (HasAny(evaluation, &Score::color_l1))
     notes +=
         " Colour L1: mean difference of colour in views all around, over the pixels that the "
-        "object "
-        "or its prediction covers, of 1.";
-  }
-  if (HasAny(evaluation, &Score::shared_color_l1)) {
+        "object or its prediction covers, of 1.";
+  if (HasAny(evaluation, &Score::shared_color_l1))
     notes +=
         " Where both are: the same over the pixels that both cover; then apart for the sides of a "
         "prediction that its picture shows, and for the others.";
-  }
-  if (HasAny(evaluation, &Score::texture_l1)) {
+  if (HasAny(evaluation, &Score::texture_l1))
     notes +=
         " Texture L1 and texture + light L1: mean difference of colour over all pixels of the "
         "input's view, without light and with it, of 1. Light: angle between its direction and the "
         "true one.";
-  }
   const auto has_error = [](const EvaluationRow& row) { return row.error.has_value(); };
   if (std::ranges::any_of(evaluation.rows, has_error)) notes += kErrorNote;
-  if (evaluation.unusable_predictions > 0) {
+  if (evaluation.unusable_predictions > 0)
     notes += fmt::format(" {} predictions without extent or area score 0.",
                          evaluation.unusable_predictions);
-  }
   return notes.starts_with(' ') ? notes.substr(1) : notes;
 }
 
@@ -201,84 +188,6 @@ Json ToJson(const Evaluation& evaluation, const EvaluationRow& row) {
   if (const auto ratio = LightOfConstant(evaluation, row)) json["light_of_constant"] = *ratio;
   return json;
 }
-
-}  // namespace
-
-bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score::accuracy); }
-
-bool IsOfPhotographs(const Evaluation& evaluation) { return HasAny(evaluation, &Score::mask_loss); }
-
-const char* MainMeasure(const Evaluation& evaluation) {
-  if (HasAny(evaluation, &Score::pck)) return "keypoints within 0.1";
-  if (IsOfPhotographs(evaluation)) return "2D IoU";
-  return Classifies(evaluation) ? "accuracy" : "3D IoU";
-}
-
-std::string FormatTable(const Evaluation& evaluation) {
-  const auto cells = Cells(evaluation);
-  const auto widths = Widths(cells);
-  std::string out = Caption(evaluation) + "\n\n";
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const std::string line = Join(cells[i], widths, "  ");
-    out += line + "\n";
-    if (i == 0) out += std::string(line.size(), '-') + "\n";
-  }
-  return out + "\n" + Notes(evaluation) + "\n";
-}
-
-std::string FormatMarkdown(const Evaluation& evaluation) {
-  auto cells = Cells(evaluation);
-  for (auto& line : cells) {
-    for (std::string& cell : line) cell = EscapeMarkdown(cell);
-  }
-  const auto widths = Widths(cells);
-  std::string out = fmt::format("# Evaluation\n\n{}\n\n{}.\n\n",
-                                EscapeMarkdown(evaluation.predictor), Caption(evaluation));
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    out += "| " + Join(cells[i], widths, " | ") + " |\n";
-    if (i > 0) continue;
-    out += "|" + std::string(widths[0] + 2, '-');
-    for (std::size_t k = 1; k < widths.size(); ++k)
-      out += "|" + std::string(widths[k] + 1, '-') + ":";
-    out += "|\n";
-  }
-  return out + "\n" + Notes(evaluation) + "\n";
-}
-
-nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
-  Json json = {{"predictor", evaluation.predictor},
-               {"dataset", evaluation.dataset_source},
-               {"split", evaluation.split},
-               {"views_per_model", evaluation.views_per_model},
-               {"f_score_threshold", kFScoreThreshold},
-               {"shape_threshold", evaluation.shape_threshold},
-               {"retrieval_models", evaluation.retrieval_models},
-               {"unusable_predictions", evaluation.unusable_predictions},
-               {"classes", evaluation.classes},
-               {"class_models", evaluation.class_models},
-               {"rows", Json::array()},
-               {"models", Json::array()}};
-  if (evaluation.voxels != "ours") json["voxels"] = evaluation.voxels;
-  for (const auto& row : evaluation.rows) json["rows"].push_back(ToJson(evaluation, row));
-  for (const ModelScore& model : evaluation.models) {
-    Json entry = ToJson(model.score);
-    entry["class"] = model.class_name;
-    entry["id"] = model.id;
-    if (!model.shape.empty()) entry["shape"] = model.shape;
-    json["models"].push_back(std::move(entry));
-  }
-  return json;
-}
-
-Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
-  for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
-  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", JsonText(EvaluationJson(evaluation), 1) + "\n"));
-  return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
-}
-
-// eval.json back into an Evaluation.
-
-namespace {
 
 using ParsedJson = nlohmann::json;
 
@@ -358,6 +267,78 @@ Status ReadModelScores(const ParsedJson& json, const std::string& place, Evaluat
 }
 
 }  // namespace
+
+bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score::accuracy); }
+
+bool IsOfPhotographs(const Evaluation& evaluation) { return HasAny(evaluation, &Score::mask_loss); }
+
+const char* MainMeasure(const Evaluation& evaluation) {
+  if (HasAny(evaluation, &Score::pck)) return "keypoints within 0.1";
+  if (IsOfPhotographs(evaluation)) return "2D IoU";
+  return Classifies(evaluation) ? "accuracy" : "3D IoU";
+}
+
+std::string FormatTable(const Evaluation& evaluation) {
+  const auto cells = Cells(evaluation);
+  const auto widths = Widths(cells);
+  std::string out = Caption(evaluation) + "\n\n";
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string line = Join(cells[i], widths, "  ");
+    out += line + "\n";
+    if (i == 0) out += std::string(line.size(), '-') + "\n";
+  }
+  return out + "\n" + Notes(evaluation) + "\n";
+}
+
+std::string FormatMarkdown(const Evaluation& evaluation) {
+  auto cells = Cells(evaluation);
+  for (auto& line : cells) {
+    for (std::string& cell : line) cell = EscapeMarkdown(cell);
+  }
+  const auto widths = Widths(cells);
+  std::string out = fmt::format("# Evaluation\n\n{}\n\n{}.\n\n",
+                                EscapeMarkdown(evaluation.predictor), Caption(evaluation));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    out += "| " + Join(cells[i], widths, " | ") + " |\n";
+    if (i > 0) continue;
+    out += "|" + std::string(widths[0] + 2, '-');
+    for (std::size_t k = 1; k < widths.size(); ++k)
+      out += "|" + std::string(widths[k] + 1, '-') + ":";
+    out += "|\n";
+  }
+  return out + "\n" + Notes(evaluation) + "\n";
+}
+
+nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
+  Json json = {{"predictor", evaluation.predictor},
+               {"dataset", evaluation.dataset_source},
+               {"split", evaluation.split},
+               {"views_per_model", evaluation.views_per_model},
+               {"f_score_threshold", kFScoreThreshold},
+               {"shape_threshold", evaluation.shape_threshold},
+               {"retrieval_models", evaluation.retrieval_models},
+               {"unusable_predictions", evaluation.unusable_predictions},
+               {"classes", evaluation.classes},
+               {"class_models", evaluation.class_models},
+               {"rows", Json::array()},
+               {"models", Json::array()}};
+  if (evaluation.voxels != "ours") json["voxels"] = evaluation.voxels;
+  for (const auto& row : evaluation.rows) json["rows"].push_back(ToJson(evaluation, row));
+  for (const ModelScore& model : evaluation.models) {
+    Json entry = ToJson(model.score);
+    entry["class"] = model.class_name;
+    entry["id"] = model.id;
+    if (!model.shape.empty()) entry["shape"] = model.shape;
+    json["models"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
+  for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
+  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", JsonText(EvaluationJson(evaluation), 1) + "\n"));
+  return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
+}
 
 Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   const Path file = run / "eval.json";

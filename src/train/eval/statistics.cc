@@ -10,6 +10,58 @@
 #include "base/text.h"
 
 namespace tilegrad::train {
+namespace {
+
+std::vector<std::vector<double>> NumbersOf(std::span<const std::vector<Score>> classes,
+                                           const ScoreMeasure& measure) {
+  std::vector<std::vector<double>> out(classes.size());
+  for (std::size_t c = 0; c < classes.size(); ++c) {
+    for (const Score& score : classes[c]) {
+      if (const auto number = measure.Of(score)) out[c].push_back(*number);
+    }
+  }
+  return out;
+}
+
+struct ScorePair {
+  const ModelScore* first;
+  const Score* second;
+};
+
+std::vector<ScorePair> PairsOf(const Evaluation& first, const Evaluation& second) {
+  std::map<std::pair<std::string, std::string>, const Score*> theirs;
+  for (const ModelScore& model : second.models) theirs[{model.class_name, model.id}] = &model.score;
+  std::vector<ScorePair> out;
+  for (const ModelScore& model : first.models) {
+    const auto at = theirs.find({model.class_name, model.id});
+    if (at != theirs.end()) out.push_back({&model, at->second});
+  }
+  return out;
+}
+
+// Nothing if one of the models lacks the measure.
+std::optional<ClassedMean> DifferenceOf(const std::vector<ScorePair>& pairs,
+                                        const ScoreMeasure& measure) {
+  std::map<std::string, std::map<std::string, std::vector<double>>> by_class;
+  for (const ScorePair& pair : pairs) {
+    const auto a = measure.Of(pair.first->score), b = measure.Of(*pair.second);
+    if (!a || !b) return std::nullopt;
+    by_class[pair.first->class_name][ShapeOf(*pair.first)].push_back(*a - *b);
+  }
+  std::vector<std::vector<double>> classes;
+  for (const auto& [name, shapes] : by_class) {
+    std::vector<double>& numbers = classes.emplace_back();
+    for (const auto& [shape, models] : shapes)
+      numbers.push_back(MeanOverClasses({&models, 1}).mean);
+  }
+  return MeanOverClasses(classes);
+}
+
+const char* VerdictOn(const PairedDifference& d) {
+  return d.tie() ? "a tie" : d.better() ? "better" : "worse";
+}
+
+}  // namespace
 
 ClassMeans::ClassMeans(const Dataset& dataset, std::span<const int> models)
     : dataset_(dataset), models_(models.begin(), models.end()) {
@@ -51,21 +103,6 @@ EvaluationRow ClassMeans::Row(const std::string& method, std::span<const Score> 
   return row;
 }
 
-namespace {
-
-std::vector<std::vector<double>> NumbersOf(std::span<const std::vector<Score>> classes,
-                                           const ScoreMeasure& measure) {
-  std::vector<std::vector<double>> out(classes.size());
-  for (std::size_t c = 0; c < classes.size(); ++c) {
-    for (const Score& score : classes[c]) {
-      if (const auto number = measure.Of(score)) out[c].push_back(*number);
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 ClassedMean MeanOverClasses(std::span<const std::vector<double>> classes) {
   double means = 0, squares = 0, shares = 0;
   std::size_t count = 0, freedom = 0;
@@ -94,48 +131,6 @@ std::optional<Score> StandardErrors(std::span<const std::vector<Score>> classes)
   }
   return out;
 }
-
-namespace {
-
-struct ScorePair {
-  const ModelScore* first;
-  const Score* second;
-};
-
-std::vector<ScorePair> PairsOf(const Evaluation& first, const Evaluation& second) {
-  std::map<std::pair<std::string, std::string>, const Score*> theirs;
-  for (const ModelScore& model : second.models) theirs[{model.class_name, model.id}] = &model.score;
-  std::vector<ScorePair> out;
-  for (const ModelScore& model : first.models) {
-    const auto at = theirs.find({model.class_name, model.id});
-    if (at != theirs.end()) out.push_back({&model, at->second});
-  }
-  return out;
-}
-
-// Nothing if one of the models lacks the measure.
-std::optional<ClassedMean> DifferenceOf(const std::vector<ScorePair>& pairs,
-                                        const ScoreMeasure& measure) {
-  std::map<std::string, std::map<std::string, std::vector<double>>> by_class;
-  for (const ScorePair& pair : pairs) {
-    const auto a = measure.Of(pair.first->score), b = measure.Of(*pair.second);
-    if (!a || !b) return std::nullopt;
-    by_class[pair.first->class_name][ShapeOf(*pair.first)].push_back(*a - *b);
-  }
-  std::vector<std::vector<double>> classes;
-  for (const auto& [name, shapes] : by_class) {
-    std::vector<double>& numbers = classes.emplace_back();
-    for (const auto& [shape, models] : shapes)
-      numbers.push_back(MeanOverClasses({&models, 1}).mean);
-  }
-  return MeanOverClasses(classes);
-}
-
-const char* VerdictOn(const PairedDifference& d) {
-  return d.tie() ? "a tie" : d.better() ? "better" : "worse";
-}
-
-}  // namespace
 
 bool PairedDifference::tie() const {
   return !difference.error || !(std::abs(difference.mean) >= 2 * *difference.error) ||

@@ -27,10 +27,9 @@ namespace tilegrad::train {
 inline constexpr std::size_t kMostThumbnails = 8192;
 inline constexpr int kThumbnailSize = 16;  // pixels a side
 
-// A picture is unlike them all if its nearest one is farther than a limit: the distance within
-// which kUsualShare of the training pictures, of which up to kMostMeasured are measured, have the
-// nearest one of another shape. Held-out models are as far from training models as these are from
-// each other, so one picture in ten gets a needless warning.
+// A picture is unlike them all if its nearest one is farther than the distance within which
+// kUsualShare of the training pictures (up to kMostMeasured) have the nearest one of another shape.
+// Held-out models lie as far away, so one picture in ten gets a needless warning.
 inline constexpr double kUsualShare = 0.9;
 inline constexpr std::size_t kMostMeasured = 1024;
 

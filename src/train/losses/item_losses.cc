@@ -159,6 +159,12 @@ double Cotangent(const double* a, const double* b, const double* c) {
   return dot / cross;
 }
 
+std::vector<nn::Var> ConstantFeatures(const FeatureFunction& features, nn::Context& context,
+                                      const nn::Tensor& images) {
+  const nn::NoGrad off(context);
+  return features(nn::Constant(context, images));
+}
+
 }  // namespace
 
 nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth) {
@@ -311,25 +317,14 @@ nn::Var CotangentLaplacianLoss(const nn::Var& positions, std::span<const Weighed
                   });
 }
 
-namespace {
-
-std::vector<nn::Var> ConstantFeatures(const FeatureFunction& features, nn::Context& context,
-                                      const nn::Tensor& images) {
-  const nn::NoGrad off(context);
-  return features(nn::Constant(context, images));
-}
-
-}  // namespace
-
 nn::Var FeatureL1Loss(const FeatureFunction& features, const nn::Var& predicted,
                       const nn::Tensor& truth) {
   if (!predicted.valid()) return predicted;
-  if (!(predicted.shape() == truth.shape()) || predicted.dtype() != truth.dtype()) {
+  if (!(predicted.shape() == truth.shape()) || predicted.dtype() != truth.dtype())
     return nn::Fail(predicted,
                     InternalError("feature loss: predicted {} and truth {} must be equal in shape "
                                   "and dtype",
                                   predicted.shape().ToString(), truth.shape().ToString()));
-  }
   const std::vector<nn::Var> want = ConstantFeatures(features, predicted.context(), truth);
   const std::vector<nn::Var> have = features(predicted);
   if (have.empty())

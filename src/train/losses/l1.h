@@ -30,9 +30,8 @@ template <class T>
 void AbsoluteDifferenceBackward(std::span<const T> truth, std::span<const T> predicted,
                                 double scale, std::span<T> d_predicted) {
   const T s = static_cast<T>(scale);
-  for (std::size_t i = 0; i < truth.size(); ++i) {
+  for (std::size_t i = 0; i < truth.size(); ++i)
     d_predicted[i] = predicted[i] > truth[i] ? s : predicted[i] < truth[i] ? -s : T(0);
-  }
 }
 
 // image and truth: [N, channels, H, W] of one dtype. A scalar.

@@ -43,9 +43,8 @@ void LaplacianBackward(const Topology& topology, std::span<const T> residual, T 
   for (std::size_t v = 0; v + 1 < topology.offsets.size(); ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       T sum = -residual[3 * v + c];
-      for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n) {
+      for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n)
         sum += shares[3 * topology.neighbors[n] + c];
-      }
       d_m[3 * v + c] = 2 * scale * sum;
     }
   }

@@ -84,14 +84,12 @@ inline void NormalBackward(std::span<const T> p, const Face& face, const FaceNor
   }
 }
 
-// d_p += `scale` times the gradient; `normals` as SmoothnessForward filled it. `scratch` is
-// overwritten.
+// d_p = `scale` times the gradient; `normals` as SmoothnessForward filled it.
 template <class T>
-void AddSmoothnessGradient(const Topology& topology, std::span<const Face> faces,
-                           std::span<const T> p, const std::vector<FaceNormal<T>>& normals, T scale,
-                           std::vector<Vec3<T>>* scratch, std::span<T> d_p) {
-  std::vector<Vec3<T>>& d_units = *scratch;
-  d_units.assign(faces.size(), {0, 0, 0});
+void SmoothnessBackward(const Topology& topology, std::span<const Face> faces, std::span<const T> p,
+                        const std::vector<FaceNormal<T>>& normals, T scale, std::span<T> d_p) {
+  std::vector<Vec3<T>> d_units(faces.size(), Vec3<T>{});
+  for (T& d : d_p) d = 0;
   for (const Edge& e : topology.edges) {
     if (e.face1 < 0 || normals[e.face0].inverse_length == 0 || normals[e.face1].inverse_length == 0)
       continue;
@@ -105,15 +103,6 @@ void AddSmoothnessGradient(const Topology& topology, std::span<const Face> faces
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (normals[f].inverse_length != 0) NormalBackward(p, faces[f], normals[f], d_units[f], d_p);
   }
-}
-
-// d_p is overwritten.
-template <class T>
-void SmoothnessBackward(const Topology& topology, std::span<const Face> faces, std::span<const T> p,
-                        const std::vector<FaceNormal<T>>& normals, T scale, std::span<T> d_p) {
-  std::vector<Vec3<T>> scratch;
-  for (T& d : d_p) d = 0;
-  AddSmoothnessGradient(topology, faces, p, normals, scale, &scratch, d_p);
 }
 
 // positions: [B, V, 3] of meshes that share `faces`, which `topology` describes. A scalar.

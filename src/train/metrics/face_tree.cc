@@ -166,9 +166,8 @@ bool FaceTree::Encloses(const dvec3& query) const {
 
 NearestPoint::NearestPoint(std::span<const glm::dvec3> points) {
   nodes_.reserve(points.size());
-  for (const glm::dvec3& p : points) {
+  for (const glm::dvec3& p : points)
     nodes_.push_back({p, static_cast<std::int32_t>(nodes_.size()), 0});
-  }
   Build(0, nodes_.size());
 }
 
@@ -206,9 +205,8 @@ void NearestPoint::Search(std::size_t begin, std::size_t end, const glm::dvec3& 
   const Node& node = nodes_[middle];
   const glm::dvec3 offset = query - node.at;
   const double squared = glm::dot(offset, offset);
-  if (squared < best->squared || (squared == best->squared && node.index < best->index)) {
+  if (squared < best->squared || (squared == best->squared && node.index < best->index))
     *best = {node.index, squared};
-  }
   const double across = offset[node.axis];
   const bool left_first = across < 0;
   for (const bool left : {left_first, !left_first}) {

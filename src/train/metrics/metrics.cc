@@ -31,6 +31,44 @@ glm::dvec3 Corner(const Mesh& mesh, const Face& face, std::size_t k) {
   return glm::dvec3(mesh.positions[static_cast<std::size_t>(face[k])]);
 }
 
+constexpr int kBinomial[3] = {1, 2, 1};
+
+// The response at an inner pixel of one plane.
+double Response(const float* plane, int width, int x, int y) {
+  double blurred = 0;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i)
+      blurred +=
+          kBinomial[j] * kBinomial[i] * static_cast<double>(plane[(y + j - 1) * width + x + i - 1]);
+  }
+  return static_cast<double>(plane[y * width + x]) - blurred / 16;
+}
+
+bool Counts(std::span<const std::uint8_t> covered, int width, int x, int y) {
+  if (covered.empty()) return true;
+  for (int j = y - 1; j <= y + 1; ++j) {
+    const auto row = covered.begin() + std::ptrdiff_t{j} * width + x - 1;
+    if (std::count(row, row + 3, 0) > 0) return false;
+  }
+  return true;
+}
+
+Status CheckPicture(const PlanarPicture& p, std::span<const std::uint8_t> covered) {
+  if (p.channels < 1 || p.height < 0 || p.width < 0)
+    return InvalidArgument("high-pass energy: a picture of {} channels, {} x {} pixels", p.channels,
+                           p.width, p.height);
+  const auto pixels = static_cast<std::size_t>(p.height) * static_cast<std::size_t>(p.width);
+  if (p.values.size() != pixels * static_cast<std::size_t>(p.channels) ||
+      (!covered.empty() && covered.size() != pixels)) {
+    return InvalidArgument(
+        "high-pass energy: {} values and {} marks for {} channels of {} x {} pixels",
+        p.values.size(), covered.size(), p.channels, p.width, p.height);
+  }
+  const auto finite = [](float x) { return std::isfinite(x); };
+  if (std::all_of(p.values.begin(), p.values.end(), finite)) return {};
+  return InvalidArgument("high-pass energy: a value of the picture is not finite");
+}
+
 }  // namespace
 
 double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b) {
@@ -95,49 +133,6 @@ SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<con
           .recall = back.share,
           .f_score = sum > 0 ? 2 * forth.share * back.share / sum : 0};
 }
-
-namespace {
-
-constexpr int kBinomial[3] = {1, 2, 1};
-
-// The response at an inner pixel of one plane.
-double Response(const float* plane, int width, int x, int y) {
-  double blurred = 0;
-  for (int j = 0; j < 3; ++j) {
-    for (int i = 0; i < 3; ++i) {
-      blurred +=
-          kBinomial[j] * kBinomial[i] * static_cast<double>(plane[(y + j - 1) * width + x + i - 1]);
-    }
-  }
-  return static_cast<double>(plane[y * width + x]) - blurred / 16;
-}
-
-bool Counts(std::span<const std::uint8_t> covered, int width, int x, int y) {
-  if (covered.empty()) return true;
-  for (int j = y - 1; j <= y + 1; ++j) {
-    const auto row = covered.begin() + std::ptrdiff_t{j} * width + x - 1;
-    if (std::count(row, row + 3, 0) > 0) return false;
-  }
-  return true;
-}
-
-Status CheckPicture(const PlanarPicture& p, std::span<const std::uint8_t> covered) {
-  if (p.channels < 1 || p.height < 0 || p.width < 0)
-    return InvalidArgument("high-pass energy: a picture of {} channels, {} x {} pixels", p.channels,
-                           p.width, p.height);
-  const auto pixels = static_cast<std::size_t>(p.height) * static_cast<std::size_t>(p.width);
-  if (p.values.size() != pixels * static_cast<std::size_t>(p.channels) ||
-      (!covered.empty() && covered.size() != pixels)) {
-    return InvalidArgument(
-        "high-pass energy: {} values and {} marks for {} channels of {} x {} pixels",
-        p.values.size(), covered.size(), p.channels, p.width, p.height);
-  }
-  const auto finite = [](float x) { return std::isfinite(x); };
-  if (std::all_of(p.values.begin(), p.values.end(), finite)) return {};
-  return InvalidArgument("high-pass energy: a value of the picture is not finite");
-}
-
-}  // namespace
 
 Result<double> HighPassEnergy(const PlanarPicture& picture, std::span<const std::uint8_t> covered) {
   TILEGRAD_TRY(CheckPicture(picture, covered));

@@ -13,6 +13,24 @@
 namespace tilegrad::train {
 namespace {
 
+// |a - b|^2 in double, in order.
+double SquaredDistance(std::span<const float> a, std::span<const float> b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double d = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+    sum += d * d;
+  }
+  return sum;
+}
+
+// As CheckRows for two sets, whose widths must agree.
+Status CheckPair(const FeatureRows& a, const FeatureRows& b, std::size_t least, const char* what) {
+  TILEGRAD_TRY(CheckRows(a, least, what));
+  TILEGRAD_TRY(CheckRows(b, least, what));
+  if (a.width == b.width) return {};
+  return InvalidArgument("{}: rows of {} columns beside rows of {}", what, a.width, b.width);
+}
+
 // Squared distance of each row to its k-th nearest other row.
 std::vector<double> Radii(const FeatureRows& rows, int k, const Workers& workers) {
   std::vector<double> out(rows.rows());
@@ -61,48 +79,6 @@ double ShareSmaller(const std::vector<double>& a, const std::vector<double>& b) 
   return pairs / (static_cast<double>(a.size()) * static_cast<double>(b.size()));
 }
 
-}  // namespace
-
-Result<Coverage> PrecisionRecall(const FeatureRows& truth, const FeatureRows& generated,
-                                 const Workers& workers, int k) {
-  if (k < 1) return InvalidArgument("precision and recall: k is {}, but must be at least 1", k);
-  TILEGRAD_TRY(
-      CheckPair(truth, generated, static_cast<std::size_t>(k) + 1, "precision and recall"));
-  return Coverage{Covered(generated, truth, k, workers), Covered(truth, generated, k, workers)};
-}
-
-Result<std::vector<Nearest>> NearestRows(const FeatureRows& from, const FeatureRows& to,
-                                         const Workers& workers) {
-  TILEGRAD_TRY(CheckPair(from, to, 1, "nearest neighbours"));
-  std::vector<Nearest> out(from.rows());
-  workers.For(from.rows(), [&](std::size_t i, std::size_t) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t j = 0; j < to.rows(); ++j) {
-      const double d = SquaredDistance(from.Row(i), to.Row(j));
-      if (d < least) {
-        least = d;
-        out[i].row = j;
-      }
-    }
-    out[i].distance = std::sqrt(least);
-  });
-  return out;
-}
-
-Result<Memorisation> MeasureMemorisation(const FeatureRows& samples, const FeatureRows& held_out,
-                                         const FeatureRows& train, const Workers& workers) {
-  Memorisation out;
-  TILEGRAD_ASSIGN(out.samples, NearestRows(samples, train, workers));
-  TILEGRAD_ASSIGN(out.held_out, NearestRows(held_out, train, workers));
-  const auto a = SortedDistances(out.samples), b = SortedDistances(out.held_out);
-  out.sample_median = Median(a);
-  out.held_out_median = Median(b);
-  out.nearer = ShareSmaller(a, b);
-  return out;
-}
-
-namespace {
-
 Result<SetScore> ScoreOf(const FeatureRows& truth, const FeatureRows& other,
                          const Workers& workers) {
   SetScore out;
@@ -112,24 +88,6 @@ Result<SetScore> ScoreOf(const FeatureRows& truth, const FeatureRows& other,
   TILEGRAD_ASSIGN(out.coverage, PrecisionRecall(a, b, workers));
   return out;
 }
-
-}  // namespace
-
-Result<SetScores> ScoreSets(const FeatureRows& truth, const FeatureRows& generated,
-                            std::uint64_t seed, const Workers& workers) {
-  constexpr std::size_t kLeast = kNeighbours + 1;
-  TILEGRAD_TRY(CheckRows(truth, 2 * kLeast, "scores of sets, truth"));
-  TILEGRAD_TRY(CheckRows(generated, kLeast, "scores of sets, generated"));
-  SetScores out;
-  out.n = std::min(generated.rows(), truth.rows() / 2);
-  const FeatureRows drawn = DrawRows(truth, 2 * out.n, seed);
-  const FeatureRows half = SliceRows(drawn, 0, out.n), other = SliceRows(drawn, out.n, 2 * out.n);
-  TILEGRAD_ASSIGN(out.generated, ScoreOf(half, DrawRows(generated, out.n, seed + 1), workers));
-  TILEGRAD_ASSIGN(out.floor, ScoreOf(half, other, workers));
-  return out;
-}
-
-namespace {
 
 struct NormalFit {
   std::vector<double> mean, covariance;
@@ -200,26 +158,6 @@ double KernelSum(const FeatureRows& a, const FeatureRows& b, const Workers& work
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
-}  // namespace
-
-Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b) {
-  TILEGRAD_TRY(CheckPair(a, b, 2, "Frechet distance"));
-  const NormalFit p = NormalFitOf(a), q = NormalFitOf(b);
-  TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance, a.width));
-  const double distance = SquaredGap(p.mean, q.mean) + Trace(p.covariance, a.width) +
-                          Trace(q.covariance, a.width) - 2 * root;
-  return std::max(distance, 0.0);
-}
-
-Result<double> KernelDistance(const FeatureRows& a, const FeatureRows& b, const Workers& workers) {
-  TILEGRAD_TRY(CheckPair(a, b, 2, "kernel distance"));
-  const auto m = static_cast<double>(a.rows()), n = static_cast<double>(b.rows());
-  return KernelSum(a, a, workers) / (m * (m - 1)) + KernelSum(b, b, workers) / (n * (n - 1)) -
-         2 * KernelSum(a, b, workers) / (m * n);
-}
-
-namespace {
-
 struct Moments {
   std::vector<double> mean, deviation;  // by column
 };
@@ -243,6 +181,74 @@ bool IsConstant(double mean, double deviation) { return deviation <= 1e-6 * std:
 
 }  // namespace
 
+Result<Coverage> PrecisionRecall(const FeatureRows& truth, const FeatureRows& generated,
+                                 const Workers& workers, int k) {
+  if (k < 1) return InvalidArgument("precision and recall: k is {}, but must be at least 1", k);
+  TILEGRAD_TRY(
+      CheckPair(truth, generated, static_cast<std::size_t>(k) + 1, "precision and recall"));
+  return Coverage{Covered(generated, truth, k, workers), Covered(truth, generated, k, workers)};
+}
+
+Result<std::vector<Nearest>> NearestRows(const FeatureRows& from, const FeatureRows& to,
+                                         const Workers& workers) {
+  TILEGRAD_TRY(CheckPair(from, to, 1, "nearest neighbours"));
+  std::vector<Nearest> out(from.rows());
+  workers.For(from.rows(), [&](std::size_t i, std::size_t) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t j = 0; j < to.rows(); ++j) {
+      const double d = SquaredDistance(from.Row(i), to.Row(j));
+      if (d < least) {
+        least = d;
+        out[i].row = j;
+      }
+    }
+    out[i].distance = std::sqrt(least);
+  });
+  return out;
+}
+
+Result<Memorisation> MeasureMemorisation(const FeatureRows& samples, const FeatureRows& held_out,
+                                         const FeatureRows& train, const Workers& workers) {
+  Memorisation out;
+  TILEGRAD_ASSIGN(out.samples, NearestRows(samples, train, workers));
+  TILEGRAD_ASSIGN(out.held_out, NearestRows(held_out, train, workers));
+  const auto a = SortedDistances(out.samples), b = SortedDistances(out.held_out);
+  out.sample_median = Median(a);
+  out.held_out_median = Median(b);
+  out.nearer = ShareSmaller(a, b);
+  return out;
+}
+
+Result<SetScores> ScoreSets(const FeatureRows& truth, const FeatureRows& generated,
+                            std::uint64_t seed, const Workers& workers) {
+  constexpr std::size_t kLeast = kNeighbours + 1;
+  TILEGRAD_TRY(CheckRows(truth, 2 * kLeast, "scores of sets, truth"));
+  TILEGRAD_TRY(CheckRows(generated, kLeast, "scores of sets, generated"));
+  SetScores out;
+  out.n = std::min(generated.rows(), truth.rows() / 2);
+  const FeatureRows drawn = DrawRows(truth, 2 * out.n, seed);
+  const FeatureRows half = SliceRows(drawn, 0, out.n), other = SliceRows(drawn, out.n, 2 * out.n);
+  TILEGRAD_ASSIGN(out.generated, ScoreOf(half, DrawRows(generated, out.n, seed + 1), workers));
+  TILEGRAD_ASSIGN(out.floor, ScoreOf(half, other, workers));
+  return out;
+}
+
+Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b) {
+  TILEGRAD_TRY(CheckPair(a, b, 2, "Frechet distance"));
+  const NormalFit p = NormalFitOf(a), q = NormalFitOf(b);
+  TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance, a.width));
+  const double distance = SquaredGap(p.mean, q.mean) + Trace(p.covariance, a.width) +
+                          Trace(q.covariance, a.width) - 2 * root;
+  return std::max(distance, 0.0);
+}
+
+Result<double> KernelDistance(const FeatureRows& a, const FeatureRows& b, const Workers& workers) {
+  TILEGRAD_TRY(CheckPair(a, b, 2, "kernel distance"));
+  const auto m = static_cast<double>(a.rows()), n = static_cast<double>(b.rows());
+  return KernelSum(a, a, workers) / (m * (m - 1)) + KernelSum(b, b, workers) / (n * (n - 1)) -
+         2 * KernelSum(a, b, workers) / (m * n);
+}
+
 Status CheckRows(const FeatureRows& rows, std::size_t least, const char* what) {
   if (rows.width == 0 || rows.values.size() % rows.width != 0)
     return InvalidArgument("{}: {} values are no rows of {}", what, rows.values.size(), rows.width);
@@ -254,13 +260,6 @@ Status CheckRows(const FeatureRows& rows, std::size_t least, const char* what) {
   const auto at = static_cast<std::size_t>(bad - rows.values.begin());
   return InvalidArgument("{}: row {}, column {} is not finite", what, at / rows.width,
                          at % rows.width);
-}
-
-Status CheckPair(const FeatureRows& a, const FeatureRows& b, std::size_t least, const char* what) {
-  TILEGRAD_TRY(CheckRows(a, least, what));
-  TILEGRAD_TRY(CheckRows(b, least, what));
-  if (a.width == b.width) return {};
-  return InvalidArgument("{}: rows of {} columns beside rows of {}", what, a.width, b.width);
 }
 
 FeatureRows DrawRows(const FeatureRows& from, std::size_t count, std::uint64_t seed) {
@@ -293,15 +292,6 @@ FeatureRows Standardised(const FeatureRows& rows, const FeatureRows& reference) 
                         : static_cast<float>((rows.values[i] - mean) / deviation);
   }
   return out;
-}
-
-double SquaredDistance(std::span<const float> a, std::span<const float> b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double d = static_cast<double>(a[i]) - static_cast<double>(b[i]);
-    sum += d * d;
-  }
-  return sum;
 }
 
 }  // namespace tilegrad::train

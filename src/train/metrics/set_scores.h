@@ -28,8 +28,6 @@ struct FeatureRows {
 // InvalidArgument with `what` if there are fewer than `least` rows, values that fill no whole row,
 // or one that is not finite.
 Status CheckRows(const FeatureRows& rows, std::size_t least, const char* what);
-// The same for two sets, whose widths must agree.
-Status CheckPair(const FeatureRows& a, const FeatureRows& b, std::size_t least, const char* what);
 
 // `count` of the rows, or all if there are fewer, drawn without replacement by `seed`.
 FeatureRows DrawRows(const FeatureRows& from, std::size_t count, std::uint64_t seed);
@@ -39,9 +37,6 @@ FeatureRows SliceRows(const FeatureRows& from, std::size_t begin, std::size_t en
 // Each column of `rows` minus its mean in `reference`, divided by its standard deviation there;
 // columns that are constant there become 0.
 FeatureRows Standardised(const FeatureRows& rows, const FeatureRows& reference);
-
-// |a - b|^2 in double, in order.
-double SquaredDistance(std::span<const float> a, std::span<const float> b);
 
 // Whether generated points look like the truth (precision), and whether they cover all of it
 // (recall); in [0, 1]. Kynkaanniemi et al. 2019: a set covers a point that is no farther from some

@@ -218,20 +218,6 @@ Status CheckResolution(int resolution) {
   return InvalidArgument("the resolution must be in [1, {}], got {}", kMaxResolution, resolution);
 }
 
-}  // namespace
-
-Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surface, int resolution) {
-  TILEGRAD_TRY(CheckResolution(resolution));
-  Grid grid(resolution);
-  for (Triangle face : surface) {
-    for (dvec3& p : face) p = OffBorders(p, resolution);
-    grid.MarkSurface(face);
-  }
-  return grid.Surface();
-}
-
-namespace {
-
 // The surface of a mesh that fills the grid's cube.
 Result<Grid> GridOf(const Mesh& mesh, int resolution) {
   TILEGRAD_TRY(CheckResolution(resolution));
@@ -256,6 +242,16 @@ Result<Grid> GridOf(const Mesh& mesh, int resolution) {
 }
 
 }  // namespace
+
+Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surface, int resolution) {
+  TILEGRAD_TRY(CheckResolution(resolution));
+  Grid grid(resolution);
+  for (Triangle face : surface) {
+    for (dvec3& p : face) p = OffBorders(p, resolution);
+    grid.MarkSurface(face);
+  }
+  return grid.Surface();
+}
 
 Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
   TILEGRAD_ASSIGN(Grid grid, GridOf(mesh, resolution));

@@ -143,6 +143,21 @@ class RowRotation {
   std::array<double, 4> quaternion_;
 };
 
+// y[n] = matrix n times x[n]; matrices: [N,size,size].
+nn::Var Turn(const nn::Var& x, const std::vector<double>& matrices, std::int64_t size) {
+  const std::int64_t images = static_cast<std::int64_t>(matrices.size()) / (size * size);
+  if (!x.valid()) return x;
+  if (!(x.shape() == nn::Shape{images, size}))
+    return nn::Fail(x, InternalError("lights {} of {} cameras", x.shape().ToString(), images));
+  nn::Context& context = x.context();
+  nn::Tensor tensor = context.Empty({images, size, size}, x.dtype());
+  nn::WithFloatType(x.dtype(), [&]<class T>(T) {
+    for (std::size_t i = 0; i < matrices.size(); ++i)
+      tensor.data<T>()[i] = static_cast<T>(matrices[i]);
+  });
+  return nn::Sum(nn::Constant(context, std::move(tensor)) * nn::Reshape(x, {images, 1, size}), {2});
+}
+
 }  // namespace
 
 nn::Var QuaternionsOfRows(const nn::Var& rows) {
@@ -167,10 +182,7 @@ nn::Var QuaternionsOfRows(const nn::Var& rows) {
     });
     return std::vector<nn::Tensor>{d_rows};
   };
-  return nn::External(context, {.name = "quaternions of rows",
-                                .inputs = {rows},
-                                .outputs = {out},
-                                .backward = std::move(backward)})[0];
+  return nn::External(context, {"quaternions of rows", {rows}, {out}, std::move(backward)})[0];
 }
 
 nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras) {
@@ -191,10 +203,8 @@ nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras) {
     });
     return std::vector<nn::Tensor>{d_points, d_cameras};
   };
-  return nn::External(context, {.name = "project points",
-                                .inputs = {points, cameras},
-                                .outputs = {out},
-                                .backward = std::move(backward)})[0];
+  return nn::External(context,
+                      {"project points", {points, cameras}, {out}, std::move(backward)})[0];
 }
 
 nn::Var PinholeCameras(const nn::Var& cameras, int size) {
@@ -218,10 +228,7 @@ nn::Var PinholeCameras(const nn::Var& cameras, int size) {
     });
     return std::vector<nn::Tensor>{d_cameras};
   };
-  return nn::External(context, {.name = "pinhole cameras",
-                                .inputs = {cameras},
-                                .outputs = {out},
-                                .backward = std::move(backward)})[0];
+  return nn::External(context, {"pinhole cameras", {cameras}, {out}, std::move(backward)})[0];
 }
 
 Camera PinholeIn(const WeakPerspective& camera, int size) {
@@ -234,26 +241,6 @@ nn::Tensor CameraRows(nn::Context& context, std::span<const WeakPerspective> cam
   return context.From({static_cast<std::int64_t>(cameras.size()), kWeakNumbers},
                       std::span<const double>(rows));
 }
-
-namespace {
-
-// y[n] = matrix n times x[n]; matrices: [N,size,size].
-nn::Var Turn(const nn::Var& x, const std::vector<double>& matrices, std::int64_t size) {
-  const std::int64_t images = static_cast<std::int64_t>(matrices.size()) / (size * size);
-  if (!x.valid()) return x;
-  if (!(x.shape() == nn::Shape{images, size})) {
-    return nn::Fail(x, InternalError("lights {} of {} cameras", x.shape().ToString(), images));
-  }
-  nn::Context& context = x.context();
-  nn::Tensor tensor = context.Empty({images, size, size}, x.dtype());
-  nn::WithFloatType(x.dtype(), [&]<class T>(T) {
-    for (std::size_t i = 0; i < matrices.size(); ++i)
-      tensor.data<T>()[i] = static_cast<T>(matrices[i]);
-  });
-  return nn::Sum(nn::Constant(context, std::move(tensor)) * nn::Reshape(x, {images, 1, size}), {2});
-}
-
-}  // namespace
 
 nn::Var DirectionsToWorld(const nn::Var& directions, std::span<const Camera> cameras) {
   std::vector<double> matrices;

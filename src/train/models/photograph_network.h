@@ -23,9 +23,8 @@ struct PhotographNetworkConfig {
   bool symmetric_texture = true;                        // the map is symmetric at x = 0
   SphereConfig sphere = {.radius = 1, .smoothing = 2};  // of movements and mean shape
   double output_deviation = 1e-4;  // initial weights of the movement head are N(0, this^2)
-  // Camera hypotheses per picture, initially spread evenly around the object, with a logit each.
-  // One picture of a car often does not distinguish front from rear; a single camera then learns
-  // the mean of both.
+  // Camera hypotheses per picture, initially spread evenly around the object, with a logit each:
+  // one camera would learn the mean where a picture does not tell front from rear.
   std::int64_t azimuths = 1;
   // Output of the camera head: "quaternion", or "rows", the first two of the rotation matrix.
   std::string rotation = "quaternion";

@@ -79,6 +79,47 @@ std::vector<glm::dvec3> SmoothNormals(const std::vector<Face>& faces, const T* p
   return normals;
 }
 
+// Barycentric coordinates of a cube's texel.
+glm::vec3 PlaceOf(std::int64_t texel) {
+  const glm::vec3 p(texel >> 2 & 1, texel >> 1 & 1, texel & 1);
+  const float sum = p.x + p.y + p.z;
+  return sum > 0 ? p / sum : glm::vec3(1.0f / 3);
+}
+
+// The four texels around (u, v): u repeats, v is clamped.
+void AddBilinear(glm::vec2 uv, std::int64_t side, nn::AxisTerms* terms) {
+  const double x = static_cast<double>(uv.x) * static_cast<double>(side) - 0.5;
+  const double y = (1 - static_cast<double>(uv.y)) * static_cast<double>(side) - 0.5;
+  const double a = x - std::floor(x), b = y - std::floor(y);
+  for (int k = 0; k < 4; ++k) {
+    const auto column = static_cast<std::int64_t>(std::floor(x)) + k % 2;
+    const auto row = static_cast<std::int64_t>(std::floor(y)) + k / 2;
+    const std::int64_t i = std::clamp(row, std::int64_t{0}, side - 1);
+    terms->push_back({i * side + (column % side + side) % side,
+                      (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b)});
+  }
+}
+
+// N3MR's mixture at barycentric weights w of a face: each axis of the cube at w of its corner.
+void AddMixture(std::int64_t face, const std::array<float, 3>& w, nn::AxisTerms* terms) {
+  for (std::int64_t t = 0; t < FaceCubes::kTexels; ++t) {
+    double weight = 1;
+    for (int k = 0; k < 3; ++k) {
+      const double share = w[static_cast<std::size_t>(k)];
+      weight *= (t >> (2 - k) & 1) == 1 ? share : 1 - share;
+    }
+    terms->push_back({face * FaceCubes::kTexels + t, weight});
+  }
+}
+
+nn::Var Cross(const nn::Var& a, const nn::Var& b) {
+  const auto turned = [](const nn::Var& v, int by) {
+    const int axis = v.shape().rank() - 1;
+    return nn::Concat({nn::Slice(v, axis, by, 3), nn::Slice(v, axis, 0, by)}, axis);
+  };
+  return turned(a, 1) * turned(b, 2) - turned(a, 2) * turned(b, 1);
+}
+
 }  // namespace
 
 Pose PoseOf(const Camera& camera, int size) {
@@ -300,51 +341,6 @@ void PictureCode::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
 nn::Var UnitRows(const nn::Var& v) {
   return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
 }
-
-namespace {
-
-// Barycentric coordinates of a cube's texel.
-glm::vec3 PlaceOf(std::int64_t texel) {
-  const glm::vec3 p(texel >> 2 & 1, texel >> 1 & 1, texel & 1);
-  const float sum = p.x + p.y + p.z;
-  return sum > 0 ? p / sum : glm::vec3(1.0f / 3);
-}
-
-// The four texels around (u, v): u repeats, v is clamped.
-void AddBilinear(glm::vec2 uv, std::int64_t side, nn::AxisTerms* terms) {
-  const double x = static_cast<double>(uv.x) * static_cast<double>(side) - 0.5;
-  const double y = (1 - static_cast<double>(uv.y)) * static_cast<double>(side) - 0.5;
-  const double a = x - std::floor(x), b = y - std::floor(y);
-  for (int k = 0; k < 4; ++k) {
-    const auto column = static_cast<std::int64_t>(std::floor(x)) + k % 2;
-    const auto row = static_cast<std::int64_t>(std::floor(y)) + k / 2;
-    const std::int64_t i = std::clamp(row, std::int64_t{0}, side - 1);
-    terms->push_back({i * side + (column % side + side) % side,
-                      (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b)});
-  }
-}
-
-// N3MR's mixture at barycentric weights w of a face: each axis of the cube at w of its corner.
-void AddMixture(std::int64_t face, const std::array<float, 3>& w, nn::AxisTerms* terms) {
-  for (std::int64_t t = 0; t < FaceCubes::kTexels; ++t) {
-    double weight = 1;
-    for (int k = 0; k < 3; ++k) {
-      const double share = w[static_cast<std::size_t>(k)];
-      weight *= (t >> (2 - k) & 1) == 1 ? share : 1 - share;
-    }
-    terms->push_back({face * FaceCubes::kTexels + t, weight});
-  }
-}
-
-nn::Var Cross(const nn::Var& a, const nn::Var& b) {
-  const auto turned = [](const nn::Var& v, int by) {
-    const int axis = v.shape().rank() - 1;
-    return nn::Concat({nn::Slice(v, axis, by, 3), nn::Slice(v, axis, 0, by)}, axis);
-  };
-  return turned(a, 1) * turned(b, 2) - turned(a, 2) * turned(b, 1);
-}
-
-}  // namespace
 
 FaceCubes::FaceCubes(nn::Context& context, const Mesh& sphere, int side)
     : side_(side), faces_(static_cast<std::int64_t>(sphere.faces.size())) {

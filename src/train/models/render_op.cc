@@ -78,11 +78,75 @@ class BatchRender {
     }
   }
 
-  Status Check() const;
-  Status Forward();
+  Status Check() const {
+    const auto images = static_cast<std::int64_t>(job_.cameras.size());
+    const std::int64_t meshes = Has(kPositions) ? inputs_[kPositions].shape()[0] : 0;
+    if (meshes == 0 || meshes * job_.views != images)
+      return InvalidArgument("{} meshes with {} views each, but {} cameras", meshes, job_.views,
+                             images);
+    const std::int64_t vertices = inputs_[kPositions].shape()[1];
+    const nn::Shape expected[kSlots] = {{meshes, vertices, 3},
+                                        {meshes, vertices, 3},
+                                        {},
+                                        {images, 3},
+                                        {images},
+                                        {images, 9},
+                                        {images, kCameraNumbers},
+                                        {static_cast<std::int64_t>(job_.faces.size()) / 3, 3, 2},
+                                        {images, 9}};
+    for (std::size_t s = 0; s < kSlots; ++s) {
+      if (!Has(static_cast<Slot>(s)) || s == kTextures || inputs_[s].shape() == expected[s])
+        continue;
+      return InvalidArgument("{} has the shape {}, expected {}", kSlotNames[s],
+                             inputs_[s].shape().ToString(), expected[s].ToString());
+    }
+    const nn::Shape& t = inputs_[kTextures].shape();
+    if (Has(kTextures) && (t.rank() != 4 || t[0] != meshes || t[3] != 3))
+      return InvalidArgument("textures has the shape {}, expected [{}, h, w, 3]", t.ToString(),
+                             meshes);
+    return {};
+  }
+
+  Status Forward() {
+    TILEGRAD_TRY(Check());
+    const std::size_t images = job_.cameras.size();
+    uvs_.assign(job_.uvs.begin(), job_.uvs.end());
+    records_.resize(images);
+    std::vector<SceneT<T>> scenes;
+    for (std::size_t n = 0; n < images; ++n) scenes.push_back(SceneOf(n));
+    return renderer_.Render(scenes, job_.options,
+                            {.alpha = job_.alpha, .attributes = false, .normals = job_.normals},
+                            &frame_);
+  }
+
   // For the slots present, in their order; empty for those that need none.
   Result<std::vector<nn::Tensor>> Gradients(nn::Context& context,
-                                            std::span<const nn::Tensor> d_outputs);
+                                            std::span<const nn::Tensor> d_outputs) {
+    const std::size_t images = job_.cameras.size();
+    Tensors d;
+    for (std::size_t s = 0; s < kSlots; ++s) {
+      if (wanted_[s]) d[s] = context.Empty(inputs_[s].shape(), nn::kDTypeOf<T>);
+    }
+    std::vector<ImageRecords<T>> records(images);
+    std::vector<SceneGradientsT<T>> d_scenes;
+    d_scenes.reserve(images);
+    for (std::size_t n = 0; n < images; ++n) d_scenes.push_back(GradientsOf(n, d, records[n]));
+    FrameGradientsT<T> d_frame;
+    if (!d_outputs[0].empty()) d_frame.color = d_outputs[0].template span<T>();
+    if (job_.alpha && !d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
+    TILEGRAD_TRY(renderer_.Backward(frame_, d_frame, d_scenes));
+    for (std::size_t n = 0; n < images; ++n) {
+      ForEachRow(records[n], [&](Slot slot, std::size_t at, auto numbers) {
+        if (wanted_[slot]) std::ranges::copy(numbers, RowOf(d[slot], n).subspan(at).begin());
+      });
+    }
+    std::vector<nn::Tensor> out;
+    for (std::size_t s = 0; s < kSlots; ++s) {
+      if (Has(static_cast<Slot>(s))) out.push_back(d[s]);
+    }
+    return out;
+  }
+
   const ImagesT<T>& images() const { return frame_.images(); }
 
  private:
@@ -99,9 +163,56 @@ class BatchRender {
 
   using Tensors = std::array<nn::Tensor, kSlots>;
 
-  void SetRecords(std::size_t image);
-  SceneT<T> SceneOf(std::size_t image);
-  SceneGradientsT<T> GradientsOf(std::size_t image, Tensors& d, ImageRecords<T>& records) const;
+  void SetRecords(std::size_t image) {
+    ImageRecords<T>& r = records_[image];
+    r.surface = SurfaceCast<T>(job_.surface);
+    r.camera = CameraCast<T>(job_.cameras[image]);
+    ForEachRow(r, [&](Slot slot, std::size_t at, auto numbers) {
+      if (Has(slot))
+        std::ranges::copy(Row(slot, image).subspan(at, numbers.size()), numbers.begin());
+    });
+    if (!Has(kTextures)) return;
+    const nn::Shape& shape = inputs_[kTextures].shape();
+    r.surface.texture = 0;
+    r.texture = {Row(kTextures, MeshOf(image)), static_cast<int>(shape[2]),
+                 static_cast<int>(shape[1]), job_.wrap, job_.filter};
+  }
+
+  SceneT<T> SceneOf(std::size_t image) {
+    SetRecords(image);
+    const ImageRecords<T>& r = records_[image];
+    const std::size_t mesh = MeshOf(image);
+    SceneT<T> scene;
+    scene.positions = Row(kPositions, mesh);
+    scene.faces = job_.faces;
+    scene.camera = r.camera;
+    if (Has(kColors)) scene.colors = {Row(kColors, mesh), Rate::kVertex};
+    scene.shading = job_.shading;
+    scene.surfaces = {&r.surface, 1};
+    if (Has(kTextures)) {
+      scene.uvs = {Has(kUvs) ? inputs_[kUvs].span<T>() : std::span<const T>(uvs_), Rate::kCorner};
+      scene.textures = {&r.texture, 1};
+    }
+    if (Has(kLights)) scene.lights = {&r.light, 1};
+    if (Has(kSh)) scene.sh = Row(kSh, image);
+    return scene;
+  }
+
+  // Views of one mesh are given the same arrays, which get their sum in view order.
+  SceneGradientsT<T> GradientsOf(std::size_t image, Tensors& d, ImageRecords<T>& records) const {
+    SceneGradientsT<T> out;
+    const std::size_t mesh = MeshOf(image);
+    if (wanted_[kPositions]) out.positions = RowOf(d[kPositions], mesh);
+    if (wanted_[kColors]) out.colors = RowOf(d[kColors], mesh);
+    if (wanted_[kUvs]) out.uvs = d[kUvs].template span<T>();
+    if (wanted_[kTextures]) records.d_texture = RowOf(d[kTextures], mesh);
+    if (wanted_[kTextures]) out.textures = {&records.d_texture, 1};
+    if (wanted_[kShininess] || wanted_[kReflectance]) out.surfaces = {&records.surface, 1};
+    if (wanted_[kLights]) out.lights = {&records.light, 1};
+    if (wanted_[kSh]) out.sh = RowOf(d[kSh], image);
+    if (wanted_[kCameras]) out.camera = &records.camera;
+    return out;
+  }
 
   RendererT<T>& renderer_;
   FrameT<T>& frame_;
@@ -111,132 +222,6 @@ class BatchRender {
   std::vector<T> uvs_;                    // of the job
   std::vector<ImageRecords<T>> records_;  // of images
 };
-
-template <class T>
-Status BatchRender<T>::Check() const {
-  const auto images = static_cast<std::int64_t>(job_.cameras.size());
-  const std::int64_t meshes = Has(kPositions) ? inputs_[kPositions].shape()[0] : 0;
-  if (meshes == 0 || meshes * job_.views != images) {
-    return InvalidArgument("{} meshes with {} views each, but {} cameras", meshes, job_.views,
-                           images);
-  }
-  const std::int64_t vertices = inputs_[kPositions].shape()[1];
-  const nn::Shape expected[kSlots] = {{meshes, vertices, 3},
-                                      {meshes, vertices, 3},
-                                      {},
-                                      {images, 3},
-                                      {images},
-                                      {images, 9},
-                                      {images, kCameraNumbers},
-                                      {static_cast<std::int64_t>(job_.faces.size()) / 3, 3, 2},
-                                      {images, 9}};
-  for (std::size_t s = 0; s < kSlots; ++s) {
-    if (!Has(static_cast<Slot>(s)) || s == kTextures || inputs_[s].shape() == expected[s]) continue;
-    return InvalidArgument("{} has the shape {}, expected {}", kSlotNames[s],
-                           inputs_[s].shape().ToString(), expected[s].ToString());
-  }
-  const nn::Shape& t = inputs_[kTextures].shape();
-  if (Has(kTextures) && (t.rank() != 4 || t[0] != meshes || t[3] != 3)) {
-    return InvalidArgument("textures has the shape {}, expected [{}, h, w, 3]", t.ToString(),
-                           meshes);
-  }
-  return {};
-}
-
-template <class T>
-void BatchRender<T>::SetRecords(std::size_t image) {
-  ImageRecords<T>& r = records_[image];
-  r.surface = SurfaceCast<T>(job_.surface);
-  r.camera = CameraCast<T>(job_.cameras[image]);
-  ForEachRow(r, [&](Slot slot, std::size_t at, auto numbers) {
-    if (Has(slot)) std::ranges::copy(Row(slot, image).subspan(at, numbers.size()), numbers.begin());
-  });
-  if (!Has(kTextures)) return;
-  const nn::Shape& shape = inputs_[kTextures].shape();
-  r.surface.texture = 0;
-  r.texture = {Row(kTextures, MeshOf(image)), static_cast<int>(shape[2]),
-               static_cast<int>(shape[1]), job_.wrap, job_.filter};
-}
-
-template <class T>
-SceneT<T> BatchRender<T>::SceneOf(std::size_t image) {
-  SetRecords(image);
-  const ImageRecords<T>& r = records_[image];
-  const std::size_t mesh = MeshOf(image);
-  SceneT<T> scene;
-  scene.positions = Row(kPositions, mesh);
-  scene.faces = job_.faces;
-  scene.camera = r.camera;
-  if (Has(kColors)) scene.colors = {Row(kColors, mesh), Rate::kVertex};
-  scene.shading = job_.shading;
-  scene.surfaces = {&r.surface, 1};
-  if (Has(kTextures)) {
-    scene.uvs = {Has(kUvs) ? inputs_[kUvs].span<T>() : std::span<const T>(uvs_), Rate::kCorner};
-    scene.textures = {&r.texture, 1};
-  }
-  if (Has(kLights)) scene.lights = {&r.light, 1};
-  if (Has(kSh)) scene.sh = Row(kSh, image);
-  return scene;
-}
-
-template <class T>
-Status BatchRender<T>::Forward() {
-  TILEGRAD_TRY(Check());
-  const std::size_t images = job_.cameras.size();
-  uvs_.assign(job_.uvs.begin(), job_.uvs.end());
-  records_.resize(images);
-  std::vector<SceneT<T>> scenes;
-  for (std::size_t n = 0; n < images; ++n) scenes.push_back(SceneOf(n));
-  return renderer_.Render(scenes, job_.options,
-                          {.alpha = job_.alpha, .attributes = false, .normals = job_.normals},
-                          &frame_);
-}
-
-// Views of one mesh are given the same arrays, which get their sum in view order.
-template <class T>
-SceneGradientsT<T> BatchRender<T>::GradientsOf(std::size_t image, Tensors& d,
-                                               ImageRecords<T>& records) const {
-  SceneGradientsT<T> out;
-  const std::size_t mesh = MeshOf(image);
-  if (wanted_[kPositions]) out.positions = RowOf(d[kPositions], mesh);
-  if (wanted_[kColors]) out.colors = RowOf(d[kColors], mesh);
-  if (wanted_[kUvs]) out.uvs = d[kUvs].template span<T>();
-  if (wanted_[kTextures]) records.d_texture = RowOf(d[kTextures], mesh);
-  if (wanted_[kTextures]) out.textures = {&records.d_texture, 1};
-  if (wanted_[kShininess] || wanted_[kReflectance]) out.surfaces = {&records.surface, 1};
-  if (wanted_[kLights]) out.lights = {&records.light, 1};
-  if (wanted_[kSh]) out.sh = RowOf(d[kSh], image);
-  if (wanted_[kCameras]) out.camera = &records.camera;
-  return out;
-}
-
-template <class T>
-Result<std::vector<nn::Tensor>> BatchRender<T>::Gradients(nn::Context& context,
-                                                          std::span<const nn::Tensor> d_outputs) {
-  const std::size_t images = job_.cameras.size();
-  Tensors d;
-  for (std::size_t s = 0; s < kSlots; ++s) {
-    if (wanted_[s]) d[s] = context.Empty(inputs_[s].shape(), nn::kDTypeOf<T>);
-  }
-  std::vector<ImageRecords<T>> records(images);
-  std::vector<SceneGradientsT<T>> d_scenes;
-  d_scenes.reserve(images);
-  for (std::size_t n = 0; n < images; ++n) d_scenes.push_back(GradientsOf(n, d, records[n]));
-  FrameGradientsT<T> d_frame;
-  if (!d_outputs[0].empty()) d_frame.color = d_outputs[0].template span<T>();
-  if (job_.alpha && !d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
-  TILEGRAD_TRY(renderer_.Backward(frame_, d_frame, d_scenes));
-  for (std::size_t n = 0; n < images; ++n) {
-    ForEachRow(records[n], [&](Slot slot, std::size_t at, auto numbers) {
-      if (wanted_[slot]) std::ranges::copy(numbers, RowOf(d[slot], n).subspan(at).begin());
-    });
-  }
-  std::vector<nn::Tensor> out;
-  for (std::size_t s = 0; s < kSlots; ++s) {
-    if (Has(static_cast<Slot>(s))) out.push_back(d[s]);
-  }
-  return out;
-}
 
 template <class T>
 RenderedImages Render(SceneRenderer& renderer, const SceneVars& vars, RenderJob job) {
@@ -267,16 +252,6 @@ RenderedImages Render(SceneRenderer& renderer, const SceneVars& vars, RenderJob 
   return {out[0], alpha ? out[1] : nn::Var()};
 }
 
-}  // namespace
-
-RenderedImages RenderScenes(SceneRenderer& renderer, const SceneVars& scenes, RenderJob job) {
-  if (!scenes.positions.valid()) return {scenes.positions, scenes.positions};
-  return nn::WithFloatType(scenes.positions.dtype(),
-                           [&]<class T>(T) { return Render<T>(renderer, scenes, std::move(job)); });
-}
-
-namespace {
-
 rivals::RendererT<float>& RendererOf(RivalRenderer& r, float) { return r.renderer; }
 rivals::RendererT<double>& RendererOf(RivalRenderer& r, double) { return r.renderer64; }
 
@@ -284,6 +259,14 @@ struct RivalColors {
   const nn::Var& colors;  // invalid: none
   bool faces = false;     // texels of faces, else colours of vertices
 };
+
+// The numbers of the i-th tensor, if present.
+template <class T>
+std::span<T> SpanOf(std::span<const nn::Tensor> tensors, std::size_t i) {
+  if (i >= tensors.size() || tensors[i].empty()) return {};
+  nn::Tensor tensor = tensors[i];  // shares its memory
+  return tensor.span<T>();
+}
 
 // One rendering and what its way back needs. Lives in the tape's closure.
 template <class T>
@@ -319,29 +302,18 @@ struct RivalBatch {
     if (!colors.empty()) out.push_back(context.Empty({n, 3, job.size, job.size}, nn::kDTypeOf<T>));
     return out;
   }
-  std::vector<nn::Tensor> Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs);
+
+  std::vector<nn::Tensor> Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs) {
+    std::vector<nn::Tensor> out = {context.Empty(positions.shape(), nn::kDTypeOf<T>)};
+    if (!colors.empty()) out.push_back(context.Empty(colors.shape(), nn::kDTypeOf<T>));
+    rivals::GradientsT<T> to{SpanOf<T>(out, 0), {}};
+    (textured ? to.textures : to.colors) = SpanOf<T>(out, 1);
+    Status done = renderer.Backward(View(), job.options,
+                                    {SpanOf<T>(d_outputs, 0), SpanOf<T>(d_outputs, 1)}, to);
+    if (!done.ok()) context.Fail(std::move(done));
+    return out;
+  }
 };
-
-// The numbers of the i-th tensor, if present.
-template <class T>
-std::span<T> SpanOf(std::span<const nn::Tensor> tensors, std::size_t i) {
-  if (i >= tensors.size() || tensors[i].empty()) return {};
-  nn::Tensor tensor = tensors[i];  // shares its memory
-  return tensor.span<T>();
-}
-
-template <class T>
-std::vector<nn::Tensor> RivalBatch<T>::Gradients(nn::Context& context,
-                                                 std::span<const nn::Tensor> d_outputs) {
-  std::vector<nn::Tensor> out = {context.Empty(positions.shape(), nn::kDTypeOf<T>)};
-  if (!colors.empty()) out.push_back(context.Empty(colors.shape(), nn::kDTypeOf<T>));
-  rivals::GradientsT<T> to{SpanOf<T>(out, 0), {}};
-  (textured ? to.textures : to.colors) = SpanOf<T>(out, 1);
-  Status done = renderer.Backward(View(), job.options,
-                                  {SpanOf<T>(d_outputs, 0), SpanOf<T>(d_outputs, 1)}, to);
-  if (!done.ok()) context.Fail(std::move(done));
-  return out;
-}
 
 template <class T>
 RenderedImages Render(RivalRenderer& renderer, const nn::Var& positions, const RivalColors& colors,
@@ -384,6 +356,12 @@ RenderedImages RenderChecked(RivalRenderer& renderer, const nn::Var& positions,
 }
 
 }  // namespace
+
+RenderedImages RenderScenes(SceneRenderer& renderer, const SceneVars& scenes, RenderJob job) {
+  if (!scenes.positions.valid()) return {scenes.positions, scenes.positions};
+  return nn::WithFloatType(scenes.positions.dtype(),
+                           [&]<class T>(T) { return Render<T>(renderer, scenes, std::move(job)); });
+}
 
 RenderedImages RenderRival(RivalRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
                            RivalJob job) {

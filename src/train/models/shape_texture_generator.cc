@@ -48,10 +48,9 @@ nn::Tensor MapColumns(nn::Context& context, const GeneratorConfig& config) {
 }  // namespace
 
 Status CheckGenerator(const GeneratorConfig& config) {
-  if (config.shape_noise > config.noise) {
+  if (config.shape_noise > config.noise)
     return InvalidArgument("network.shape_noise is {}, but must be at most network.noise, {}",
                            config.shape_noise, config.noise);
-  }
   const auto size = static_cast<std::uint64_t>(config.texture_size);
   if (size >= 2 * kRootRows && std::has_single_bit(size)) return {};
   return InvalidArgument("network.texture_size is {}, but must be a power of two from {}",

@@ -56,6 +56,25 @@ nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
   });
 }
 
+void AddTexture(const SphereModel& sphere, const Prediction& prediction, std::size_t i,
+                Mesh* mesh) {
+  const auto size = static_cast<int>(prediction.textures.shape()[1]);
+  ImageU8 image(size, size, 3);
+  std::ranges::transform(ItemOf(prediction.textures, i), image.pixels.begin(), ToByte);
+  mesh->corner_uvs = sphere.corner_uvs();
+  mesh->textures = {{"predicted", std::move(image)}};
+  mesh->materials = {{.name = "predicted",
+                      .base_color = glm::vec4(1),
+                      .base_color_texture = 0,
+                      .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
+}
+
+void AddColors(std::span<const float> c, Mesh* mesh) {
+  const auto unit = [](float x) { return std::clamp(x, 0.0f, 1.0f); };
+  for (std::size_t i = 0; i < c.size(); i += 3)
+    mesh->colors.emplace_back(unit(c[i]), unit(c[i + 1]), unit(c[i + 2]), 1.0f);
+}
+
 }  // namespace
 
 SphereModel::SphereModel(nn::Context& context, const SphereConfig& config)
@@ -147,29 +166,6 @@ nn::Var SphereVertices(const nn::Var& bias, const nn::Var& centroid, const nn::T
   const nn::Var c = nn::Tanh(0.1 * centroid);
   return 0.5 * (nn::Relu(u) * (1.0 - c) - nn::Relu(-u) * (1.0 + c) + c);
 }
-
-namespace {
-
-void AddTexture(const SphereModel& sphere, const Prediction& prediction, std::size_t i,
-                Mesh* mesh) {
-  const auto size = static_cast<int>(prediction.textures.shape()[1]);
-  ImageU8 image(size, size, 3);
-  std::ranges::transform(ItemOf(prediction.textures, i), image.pixels.begin(), ToByte);
-  mesh->corner_uvs = sphere.corner_uvs();
-  mesh->textures = {{"predicted", std::move(image)}};
-  mesh->materials = {{.name = "predicted",
-                      .base_color = glm::vec4(1),
-                      .base_color_texture = 0,
-                      .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
-}
-
-void AddColors(std::span<const float> c, Mesh* mesh) {
-  const auto unit = [](float x) { return std::clamp(x, 0.0f, 1.0f); };
-  for (std::size_t i = 0; i < c.size(); i += 3)
-    mesh->colors.emplace_back(unit(c[i]), unit(c[i + 1]), unit(c[i + 2]), 1.0f);
-}
-
-}  // namespace
 
 Result<Mesh> MeshOf(const SphereModel& sphere, const Prediction& prediction, std::size_t i) {
   Mesh mesh;

@@ -44,14 +44,66 @@ nn::Var Facing(const nn::Var& raw) {
   return nn::Concat({nn::Slice(raw, 1, 0, 2), nn::Softplus(nn::Slice(raw, 1, 2, 3))}, 1);
 }
 
+// Channels [first, end) of the layers' output for each texel, and of PictureLookup::Look.
+struct Channels {
+  std::int64_t first, end;
+};
+constexpr Channels kShares{0, 3};      // of picture, mirror image and made-up colour, logits
+constexpr Channels kGains{3, 5};       // ln, of the picture's and the mirror image's colours
+constexpr Channels kColor{5, 8};       // made up, logits
+constexpr Channels kPaintShare{8, 9};  // with a palette; then a logit for each paint
+constexpr Channels kUnlit{5, 6};       // of Look: ln of 1 / light
+constexpr Channels kMirrorUnlit{PictureLookup::kChannels + 5, PictureLookup::kChannels + 6};
+
+// The share of any excess above 1 that is removed; the rest keeps a gradient back to 1.
+constexpr double kTooBright = 0.9;
+
+nn::Var Take(const nn::Var& maps, const Channels& channels) {
+  return nn::Slice(maps, 1, channels.first, channels.end);
+}
+
+// A frame of one pixel around a map of the sphere: left and right edges are neighbours.
+nn::Var WrapAround(const nn::Var& map) {
+  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kCircular});
+}
+
+constexpr double kDarkChannel = 0.03;  // of a channel; anything darker counts as unlit
+constexpr double kFewTexels = 1;       // so many seen texels weigh as much as the guess
+constexpr double kNoShare = 1e-3;
+
+// [M, 4, h, w]: colours of `seen` (PictureLookup::Look) without light, and how much to trust each:
+// what faces the camera, is covered by the picture's object and is lit.
+nn::Tensor TrustedColors(nn::Context& context, const nn::Tensor& seen) {
+  const nn::Shape& shape = seen.shape();
+  nn::Tensor out = context.Empty({shape[0], 4, shape[2], shape[3]}, seen.dtype());
+  nn::WithFloatType(seen.dtype(), [&]<class T>(T) {
+    const auto plane = static_cast<std::size_t>(shape[2] * shape[3]);
+    const auto channels = static_cast<std::size_t>(shape[1]);
+    context.workers().For(static_cast<std::size_t>(shape[0]), [&](std::size_t m, std::size_t) {
+      const T* in = seen.data<T>() + m * channels * plane;
+      T* to = out.data<T>() + m * 4 * plane;
+      for (std::size_t t = 0; t < plane; ++t) {
+        const T gain = std::exp(in[5 * plane + t]);
+        T brightest = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+          brightest = std::max(brightest, in[c * plane + t]);
+          to[c * plane + t] = std::min(T(1), in[c * plane + t] * gain);
+        }
+        const T facing = std::max(T(0), in[4 * plane + t]);
+        to[3 * plane + t] = brightest > T(kDarkChannel) ? facing * in[3 * plane + t] / gain : T(0);
+      }
+    });
+  });
+  return out;
+}
+
 }  // namespace
 
 Status CheckImageSize(const PictureCodeConfig& config, int image_size) {
   if (nn::CanHalve(image_size, config.levels)) return {};
   return InvalidArgument(
       "images of {} pixels a side cannot be halved {} times to at least two pixels: choose a "
-      "smaller "
-      "network.levels",
+      "smaller network.levels",
       image_size, config.levels);
 }
 
@@ -171,63 +223,6 @@ Prediction TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
     out.textures = cubes_.Maps(cubes_.Cubes(out.textures));
   return out;
 }
-
-namespace {
-
-// Channels [first, end) of the layers' output for each texel, and of PictureLookup::Look.
-struct Channels {
-  std::int64_t first, end;
-};
-constexpr Channels kShares{0, 3};      // of picture, mirror image and made-up colour, logits
-constexpr Channels kGains{3, 5};       // ln, of the picture's and the mirror image's colours
-constexpr Channels kColor{5, 8};       // made up, logits
-constexpr Channels kPaintShare{8, 9};  // with a palette; then a logit for each paint
-constexpr Channels kUnlit{5, 6};       // of Look: ln of 1 / light
-constexpr Channels kMirrorUnlit{PictureLookup::kChannels + 5, PictureLookup::kChannels + 6};
-
-// The share of any excess above 1 that is removed; the rest keeps a gradient back to 1.
-constexpr double kTooBright = 0.9;
-
-nn::Var Take(const nn::Var& maps, const Channels& channels) {
-  return nn::Slice(maps, 1, channels.first, channels.end);
-}
-
-// A frame of one pixel around a map of the sphere: left and right edges are neighbours.
-nn::Var WrapAround(const nn::Var& map) {
-  return nn::PadImage(map, nn::Padding::All(1), {nn::PadMode::kReplicate, nn::PadMode::kCircular});
-}
-
-constexpr double kDarkChannel = 0.03;  // of a channel; anything darker counts as unlit
-constexpr double kFewTexels = 1;       // so many seen texels weigh as much as the guess
-constexpr double kNoShare = 1e-3;
-
-// [M, 4, h, w]: colours of `seen` (PictureLookup::Look) without light, and how much to trust each:
-// what faces the camera, is covered by the picture's object and is lit.
-nn::Tensor TrustedColors(nn::Context& context, const nn::Tensor& seen) {
-  const nn::Shape& shape = seen.shape();
-  nn::Tensor out = context.Empty({shape[0], 4, shape[2], shape[3]}, seen.dtype());
-  nn::WithFloatType(seen.dtype(), [&]<class T>(T) {
-    const auto plane = static_cast<std::size_t>(shape[2] * shape[3]);
-    const auto channels = static_cast<std::size_t>(shape[1]);
-    context.workers().For(static_cast<std::size_t>(shape[0]), [&](std::size_t m, std::size_t) {
-      const T* in = seen.data<T>() + m * channels * plane;
-      T* to = out.data<T>() + m * 4 * plane;
-      for (std::size_t t = 0; t < plane; ++t) {
-        const T gain = std::exp(in[5 * plane + t]);
-        T brightest = 0;
-        for (std::size_t c = 0; c < 3; ++c) {
-          brightest = std::max(brightest, in[c * plane + t]);
-          to[c * plane + t] = std::min(T(1), in[c * plane + t] * gain);
-        }
-        const T facing = std::max(T(0), in[4 * plane + t]);
-        to[3 * plane + t] = brightest > T(kDarkChannel) ? facing * in[3 * plane + t] / gain : T(0);
-      }
-    });
-  });
-  return out;
-}
-
-}  // namespace
 
 TexturePainter::TexturePainter(nn::Context& context, const Mesh& sphere,
                                const TexturePainterShape& shape, Rng& rng)

@@ -11,9 +11,8 @@
 
 namespace tilegrad::train {
 
-// The one order in which the results of portions are summed: a binary tree over them, independent
-// of which rank holds which leaf. A rank owns portions that lie side by side; it sums the complete
-// subtrees among them, and the rest of the tree is summed from those.
+// The one order in which results of portions are summed: a binary tree, whichever rank holds which
+// leaf. A rank owns neighbouring portions and sums the complete subtrees among them.
 
 // Leaves [first, first + count) of the tree: count is a power of two that divides first.
 struct Subtree {
@@ -25,9 +24,8 @@ struct Subtree {
 // portions [r P / R, (r + 1) P / R); R is at most P, a power of two.
 std::vector<Subtree> SubtreesOf(int ranks, std::int64_t portions);
 
-// Takes leaves in order and says where their sums go: leaf j of a subtree meets the sums of `climb`
-// left neighbours, of levels 0, 1, .., climb - 1, and the result is kept at level `climb`, or is
-// the subtree's if j is its last leaf.
+// Of leaves taken in order: leaf j of a subtree is added to its left neighbours of levels 0, 1, ..,
+// climb - 1; the sum is kept at level `climb`, or is the subtree's if j is its last leaf.
 inline std::size_t ClimbOf(std::int64_t j) {
   return static_cast<std::size_t>(std::countr_one(static_cast<std::uint64_t>(j)));
 }
@@ -60,9 +58,8 @@ struct Range {
 
 class BucketLayout {
  public:
-  // The last parameter comes first: a backward pass is done with it first. `tail` numbers stand
-  // behind all. Buckets have `bucket` numbers, the last one what is left: a large parameter lies in
-  // several, so that its sum need not wait for all of it.
+  // The last parameter comes first, as in a backward pass; `tail` numbers follow all. Buckets have
+  // `bucket` numbers, the last one fewer: a large parameter lies in several and travels in parts.
   void Reset(std::span<const std::size_t> sizes, std::size_t tail, std::size_t bucket);
 
   std::size_t total() const { return tail_.end; }

@@ -17,6 +17,32 @@ std::span<std::byte> WritableBytesOf(float* data, std::size_t n) {
   return std::as_writable_bytes(std::span(data, n));
 }
 
+constexpr auto kMessagePause = std::chrono::microseconds(20);
+constexpr std::size_t kMostBytes = std::size_t{1} << 26;  // of one message; MPI counts in int
+
+// data in pieces of at most kMostBytes.
+template <class Bytes, class Use>
+void InPieces(Bytes data, Use use) {
+  while (!data.empty()) {
+    const std::size_t count = std::min(data.size(), kMostBytes);
+    use(data.first(count));
+    data = data.subspan(count);
+  }
+}
+
+void SendText(Transport& ranks, int peer, const std::string& text) {
+  const Address to{peer, MessageKind::kBytes};
+  SendValue(ranks, to, static_cast<std::uint64_t>(text.size()));
+  SendAndWait(ranks, to, std::as_bytes(std::span(text)));
+}
+
+std::string ReceiveText(Transport& ranks, int peer) {
+  const Address from{peer, MessageKind::kBytes};
+  std::string text(ReceiveValue<std::uint64_t>(ranks, from), '\0');
+  ReceiveAndWait(ranks, from, std::as_writable_bytes(std::span(text)));
+  return text;
+}
+
 }  // namespace
 
 Exchange::Exchange(Transport& ranks, std::vector<Subtree> subtrees)
@@ -67,10 +93,9 @@ void Exchange::Start(std::size_t bucket) {
   const std::size_t mine = Piece(bucket, me).size();
   for (std::size_t i = 0; i < subtrees_.size(); ++i) {
     const int owner = subtrees_[i].owner;
-    if (owner != me && mine > 0) {
+    if (owner != me && mine > 0)
       m.parts.push_back(ranks_.Receive({owner, MessageKind::kPart, number},
                                        WritableBytesOf(SumOf(i, bucket), mine)));
-    }
     for (int peer = 0; owner == me && peer < ranks_.size(); ++peer) {
       const Range piece = Piece(bucket, peer);
       if (peer == me || piece.size() == 0) continue;
@@ -91,14 +116,12 @@ void Exchange::Spread(std::size_t bucket) {
   for (int peer = 0; peer < ranks_.size(); ++peer) {
     const Range piece = Piece(bucket, peer);
     if (peer == ranks_.rank()) continue;
-    if (piece.size() > 0) {
+    if (piece.size() > 0)
       m.rest.push_back(ranks_.Receive({peer, MessageKind::kTotal, number},
                                       WritableBytesOf(job_.total + piece.begin, piece.size())));
-    }
-    if (mine.size() > 0) {
+    if (mine.size() > 0)
       m.rest.push_back(ranks_.Send({peer, MessageKind::kTotal, number},
                                    BytesOf(job_.total + mine.begin, mine.size())));
-    }
   }
   changed_.notify_all();
 }
@@ -177,23 +200,6 @@ bool Exchange::Wait(const std::function<bool()>& meanwhile, std::size_t rounds) 
   return true;
 }
 
-namespace {
-
-constexpr auto kMessagePause = std::chrono::microseconds(20);
-constexpr std::size_t kMostBytes = std::size_t{1} << 26;  // of one message; MPI counts in int
-
-// data in pieces of at most kMostBytes.
-template <class Bytes, class Use>
-void InPieces(Bytes data, Use use) {
-  while (!data.empty()) {
-    const std::size_t count = std::min(data.size(), kMostBytes);
-    use(data.first(count));
-    data = data.subspan(count);
-  }
-}
-
-}  // namespace
-
 bool Await(Transport& ranks, Transport::Ticket ticket, const std::function<bool()>& meanwhile) {
   while (!ranks.Done(ticket)) {
     if (meanwhile && !meanwhile()) return false;
@@ -213,19 +219,6 @@ bool ReceiveAndWait(Transport& ranks, const Address& from, std::span<std::byte> 
     all = all && Await(ranks, ranks.Receive(from, piece), meanwhile);
   });
   return all;
-}
-
-void SendText(Transport& ranks, int peer, const std::string& text) {
-  const Address to{peer, MessageKind::kBytes};
-  SendValue(ranks, to, static_cast<std::uint64_t>(text.size()));
-  SendAndWait(ranks, to, std::as_bytes(std::span(text)));
-}
-
-std::string ReceiveText(Transport& ranks, int peer) {
-  const Address from{peer, MessageKind::kBytes};
-  std::string text(ReceiveValue<std::uint64_t>(ranks, from), '\0');
-  ReceiveAndWait(ranks, from, std::as_writable_bytes(std::span(text)));
-  return text;
 }
 
 // Rank r has the bytes of r without its lowest bit, and passes them on to r plus each lower one.

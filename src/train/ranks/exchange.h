@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of all ranks: bucket by bucket, during the backward pass. Of each bucket every rank
-// gets a piece of all subtrees' sums, folds them in the order of the tree, and later sends what it
-// made of the total to all others. So each rank sends and receives 2 (R - 1) / R of the numbers
-// where each has one subtree, and no sum depends on what arrives first.
+// Sums of all ranks, bucket by bucket, during the backward pass: each rank folds its piece of every
+// bucket in the order of the tree and sends the total to the others. With one subtree each, a rank
+// sends and receives 2 (R - 1) / R of the numbers; no sum depends on what arrives first.
 #pragma once
 
 #include <condition_variable>
@@ -82,8 +81,8 @@ class Exchange {
 
 // Small and blocking exchanges over a Transport.
 
-// Until it is done. It looks again and again with pauses, so that a rank that waits leaves the
-// core to others. `meanwhile`: called between looks; false ends the wait.
+// Until it is done. Polls with pauses, which leave the core to others. `meanwhile`: called between
+// polls; false ends the wait.
 bool Await(Transport& ranks, Transport::Ticket ticket,
            const std::function<bool()>& meanwhile = nullptr);
 
@@ -102,9 +101,6 @@ T ReceiveValue(Transport& ranks, const Address& from) {
   ReceiveAndWait(ranks, from, std::as_writable_bytes(std::span(&value, 1)));
   return value;
 }
-
-void SendText(Transport& ranks, int peer, const std::string& text);
-std::string ReceiveText(Transport& ranks, int peer);
 
 // The bytes of rank 0 to all, along a tree; every rank calls it with as many bytes.
 void Broadcast(Transport& ranks, std::span<std::byte> data);

@@ -24,6 +24,13 @@ int RanksOf(const GradientSums::Shape& shape) { return shape.ranks ? shape.ranks
 const nn::Shape& ShapeOf(const nn::Var& parameter) { return parameter.shape(); }
 nn::Shape ShapeOf(const nn::Gradient& gradient) { return gradient.shape(); }
 
+// Rows to where portion `portion` has its own.
+void CopyRows(const nn::Var& from, std::int64_t portion, nn::Tensor to) {
+  const nn::Tensor& rows = from.value();
+  std::copy_n(rows.data<float>(), rows.elements(),
+              to.data<float>() + static_cast<std::size_t>(portion) * rows.elements());
+}
+
 }  // namespace
 
 GradientSums::GradientSums(nn::Context& context, const Shape& shape,
@@ -204,11 +211,10 @@ void GradientSums::Lane::PartIsReady(const Range& part) {
 // All portions of an update have graphs of one form.
 void GradientSums::Lane::Take(std::size_t i, const nn::Gradient& gradient) {
   const std::int64_t rows = all_.rows_[i];
-  if (all_.RowsOf(gradient) != rows) {
+  if (all_.RowsOf(gradient) != rows)
     return all_.context_.Fail(
         InternalError("gradient {} is a product of {} rows in one portion and of {} in another", i,
                       rows, all_.RowsOf(gradient)));
-  }
   if (rows == 0) return Ready(i, gradient);
   products_[at_][i] = gradient;
 }
@@ -283,17 +289,6 @@ void GradientSums::MakeMeans() {
     mean_numbers_[i] = rows_[i] == 0 ? means_[i].Value().value().data<float>() : nullptr;
   StackProducts();
 }
-
-namespace {
-
-// Rows to where portion `portion` has its own.
-void CopyRows(const nn::Var& from, std::int64_t portion, nn::Tensor to) {
-  const nn::Tensor& rows = from.value();
-  std::copy_n(rows.data<float>(), rows.elements(),
-              to.data<float>() + static_cast<std::size_t>(portion) * rows.elements());
-}
-
-}  // namespace
 
 void GradientSums::StackProducts() {
   for (const auto& lane : lanes_) {

@@ -19,12 +19,11 @@
 
 namespace tilegrad::train {
 
-// Means of gradients and running statistics. Lanes of the context divide the portions of this
-// process as ranks divide those of a run: each lane sums its own portions, then the lanes' sums are
-// added, all in the order of the tree. The exchange with other ranks overlaps the last portion's
-// backward pass with one lane, and starts after the lanes have ended with several. Without other
-// ranks a gradient that is a product stays one: the factors of all portions are stacked, and Adam
-// sums products where it uses them.
+// Means of gradients and running statistics. Lanes divide the portions of this process as ranks
+// divide those of a run: each sums its own, then the lanes' sums are added in the order of the
+// tree. With one lane the exchange with other ranks overlaps the last portion's backward pass; with
+// several it follows them. Without other ranks a gradient that is a product stays one: the factors
+// of all portions are stacked, and Adam sums products where it uses them.
 class GradientSums {
  public:
   struct Shape {

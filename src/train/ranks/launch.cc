@@ -40,8 +40,7 @@ Result<Path> FindPlugin() {
   return NotFound(
       "started as one of {} processes, but this tilegrad was built without MPI: install "
       "libopenmpi-dev (or libmpich-dev), configure and build again, so that there is a {} beside "
-      "the "
-      "program; or start it without mpirun",
+      "the program; or start it without mpirun",
       LaunchedRanks(), kPlugin);
 }
 

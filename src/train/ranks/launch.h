@@ -19,10 +19,9 @@ int LaunchedRanks();
 // joins the other ranks. Once in a process. NotFound says how to get the plugin.
 Result<std::unique_ptr<Transport>> ConnectRanks();
 
-// The number of workers of a rank; `asked` 0: as many as it has cores. A rank that mpirun has
-// bound has those cores. Others have their share of the machine; where that has several NUMA nodes,
-// the rank is kept to its own, unless more workers were asked for than those have cores for. To be
-// called before there are threads and data.
+// The number of workers of a rank; `asked` 0: as many as it has cores, which are those mpirun bound
+// it to or its share of the machine. On several NUMA nodes it is kept to its own, unless more
+// workers are asked for than those have cores for. To be called before there are threads and data.
 int PlaceRank(int asked);
 
 // Where a rank works, on machines of several NUMA nodes: memory belongs to the node whose core

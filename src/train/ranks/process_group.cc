@@ -44,10 +44,9 @@ Status CheckReport(std::size_t rank, const std::string& report, const std::strin
                    const std::vector<Trait>& traits) {
   const std::vector<std::string> parts = PartsOf(report);
   const auto code = static_cast<StatusCode>(std::stoi(parts[1]));
-  if (code != StatusCode::kOk) {
+  if (code != StatusCode::kOk)
     return rank == 0 ? Status(code, parts[2])
                      : Status(code, fmt::format("rank {} on {}: {}", rank, parts[0], parts[2]));
-  }
   for (std::size_t i = 0; i < traits.size(); ++i) {
     const std::string value = i + 3 < parts.size() ? parts[i + 3] : "none";
     if (value == traits[i].value) continue;
@@ -66,10 +65,9 @@ ProcessGroup::ProcessGroup(Transport& ranks) : ranks_(ranks) {
   const auto followers = static_cast<std::size_t>(ranks.size() - 1);
   errors_.resize(followers);
   reported_.resize(followers);
-  for (std::size_t i = 0; i < followers; ++i) {
+  for (std::size_t i = 0; i < followers; ++i)
     tickets_.push_back(ranks.Receive({static_cast<int>(i) + 1, MessageKind::kError},
                                      std::as_writable_bytes(std::span(errors_[i]))));
-  }
 }
 
 Status ProcessGroup::Agree(const Status& own, const std::vector<Trait>& traits) {

@@ -29,9 +29,8 @@ class ProcessGroup {
   Transport& ranks() { return ranks_; }
   bool leads() const { return ranks_.rank() == 0; }
 
-  // Every rank calls it with its status so far. If one failed, or its traits differ from those of
-  // rank 0, the leader gets an error that names rank and host, and the others kCancelled: the
-  // leader reports for them.
+  // Every rank calls it with its status so far. If one failed, or its traits differ from rank 0's,
+  // the leader gets an error that names rank and host, and the others kCancelled.
   Status Agree(const Status& own, const std::vector<Trait>& traits);
 
   // The leader's tensors to all; every rank calls it with tensors of the same names and shapes.

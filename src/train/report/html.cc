@@ -18,12 +18,8 @@ namespace tilegrad::train {
 namespace {
 
 // Pixels: the picture, and the margins for labels, of which the right one holds the key.
-constexpr double kPlotWidth = 720;
-constexpr double kPlotHeight = 440;
-constexpr double kPlotLeft = 80;
-constexpr double kPlotTop = 24;
-constexpr double kPlotRight = 250;
-constexpr double kPlotBottom = 56;
+constexpr double kPlotWidth = 720, kPlotHeight = 440;
+constexpr double kPlotLeft = 80, kPlotTop = 24, kPlotRight = 250, kPlotBottom = 56;
 constexpr std::array kPlotColors = {"#0b6a9a", "#c2571a", "#3a7d44", "#7b4ea3",
                                     "#9a7d0a", "#a31f34", "#2a9d8f", "#555555"};
 
@@ -110,20 +106,13 @@ class LogDrawing {
                  left = kPlotWidth - kPlotRight + 24;
     svg_ +=
         fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\"/>\n", left, key - 4, color);
-    for (std::size_t n = 0; n < series.name.size(); ++n) {
+    for (std::size_t n = 0; n < series.name.size(); ++n)
       Text(left + 12, key + 15 * static_cast<double>(n), "start", series.name[n]);
-    }
   }
 
   LogAxis x_{kPlotLeft, kPlotWidth - kPlotRight}, y_{kPlotHeight - kPlotBottom, kPlotTop};
   std::string svg_;
 };
-
-}  // namespace
-
-std::string LogPlotSvg(const LogPlot& plot) { return LogDrawing(plot).Draw(plot); }
-
-namespace {
 
 // Scripts put texts on the page as they are: marks of writing direction have to be visible by then.
 nlohmann::ordered_json Shown(nlohmann::ordered_json json) {
@@ -135,6 +124,8 @@ nlohmann::ordered_json Shown(nlohmann::ordered_json json) {
 }
 
 }  // namespace
+
+std::string LogPlotSvg(const LogPlot& plot) { return LogDrawing(plot).Draw(plot); }
 
 std::string WithCommas(std::int64_t number) {
   std::string digits = std::to_string(number);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The live page of a running, finished or interrupted run: RUN/live.html, opened from the disk.
-// Once a second it reloads the scripts in RUN/live, since a page from a disk may load scripts but
-// not fetch files. The scripts are made only from the run's own files, so a killed run shows the
-// same.
+// The live page of a running, finished or killed run: RUN/live.html, opened from the disk. Once a
+// second it reloads the scripts in RUN/live, since a page from a disk may load scripts but not
+// fetch files. They are made only from the run's own files.
 //
 // Pictures are samples/step_N.png or timelapse/N.png; meshes timelapse/N.glb and mesh.glb, or else
 // what the newest checkpoint predicts for the first example of a report.

@@ -169,6 +169,53 @@ LogEntry MeanEntry(std::span<const LogEntry> stretch) {
   return mean;
 }
 
+// run.json, config.toml, metrics.jsonl; errors name the file and the key or line.
+Result<RunFacts> ReadRun(const Path& run) {
+  RunFacts facts;
+  facts.folder = run;
+  TILEGRAD_ASSIGN(facts.header, ReadHeader(run));
+  const Path config = run / kTrainSettings;
+  TILEGRAD_ASSIGN(facts.config_text, ReadText(config));
+  TILEGRAD_ASSIGN(facts.config, ParseConfig(facts.config_text, config.string()));
+  TILEGRAD_ASSIGN(facts.log, ReadLog(run));
+  return facts;
+}
+
+// CurveData with {"camera": {...}, "generated", "models": [...]}.
+Json PageData(const ReportFacts& facts) {
+  const Showcase& show = facts.showcase;
+  Json out = CurveData(facts.run.log, facts.run.header.labels);
+  out["camera"] = {{"fov_y", show.fov_y},
+                   {"azimuth", show.azimuth},
+                   {"elevation", show.elevation},
+                   {"distance", show.distance}};
+  out["generated"] = show.generated;
+  out["models"] = Json::array();
+  for (const Example& example : show.examples) out["models"].push_back(ExampleJson(example));
+  return out;
+}
+
+Result<std::string> Page(const ReportFacts& facts) {
+  TILEGRAD_ASSIGN(const std::string models, ModelsHtml(facts));
+  const bool made = facts.showcase.generated;
+  return FillTemplate(
+      kReportHtml,
+      {{"name", EscapeHtml(facts.run.config.name)},
+       {"summary", SummaryHtml(facts)},
+       {"comparison", ComparisonHtml(facts)},
+       {"meshes_title", made ? "Generated meshes, interactive" : "Predicted meshes, interactive"},
+       {"models_title", made ? "Generated objects" : "Held-out models"},
+       {"models", models},
+       {"scores", ScoresHtml(facts)},
+       {"commands", CommandsHtml(facts)},
+       {"config", EscapeHtml(facts.run.config_text)},
+       {"machine", MachineHtml(facts)},
+       {"credits", CreditsHtml(facts)},
+       {"data", ScriptJson(PageData(facts))},
+       {"style", std::string(kReportCss)},
+       {"script", std::string(kPartsJs) + std::string(kReportJs)}});
+}
+
 }  // namespace
 
 Json MeshJson(const Mesh& mesh) {
@@ -208,56 +255,6 @@ Json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels) {
     out["charts"].push_back({{"key", name}, {"title", TitleOf(name, labels)}});
   return out;
 }
-
-Json PageData(const ReportFacts& facts) {
-  const Showcase& show = facts.showcase;
-  Json out = CurveData(facts.run.log, facts.run.header.labels);
-  out["camera"] = {{"fov_y", show.fov_y},
-                   {"azimuth", show.azimuth},
-                   {"elevation", show.elevation},
-                   {"distance", show.distance}};
-  out["generated"] = show.generated;
-  out["models"] = Json::array();
-  for (const Example& example : show.examples) out["models"].push_back(ExampleJson(example));
-  return out;
-}
-
-namespace {
-
-// run.json, config.toml, metrics.jsonl; errors name the file and the key or line.
-Result<RunFacts> ReadRun(const Path& run) {
-  RunFacts facts;
-  facts.folder = run;
-  TILEGRAD_ASSIGN(facts.header, ReadHeader(run));
-  const Path config = run / kTrainSettings;
-  TILEGRAD_ASSIGN(facts.config_text, ReadText(config));
-  TILEGRAD_ASSIGN(facts.config, ParseConfig(facts.config_text, config.string()));
-  TILEGRAD_ASSIGN(facts.log, ReadLog(run));
-  return facts;
-}
-
-Result<std::string> Page(const ReportFacts& facts) {
-  TILEGRAD_ASSIGN(const std::string models, ModelsHtml(facts));
-  const bool made = facts.showcase.generated;
-  return FillTemplate(
-      kReportHtml,
-      {{"name", EscapeHtml(facts.run.config.name)},
-       {"summary", SummaryHtml(facts)},
-       {"comparison", ComparisonHtml(facts)},
-       {"meshes_title", made ? "Generated meshes, interactive" : "Predicted meshes, interactive"},
-       {"models_title", made ? "Generated objects" : "Held-out models"},
-       {"models", models},
-       {"scores", ScoresHtml(facts)},
-       {"commands", CommandsHtml(facts)},
-       {"config", EscapeHtml(facts.run.config_text)},
-       {"machine", MachineHtml(facts)},
-       {"credits", CreditsHtml(facts)},
-       {"data", ScriptJson(PageData(facts))},
-       {"style", std::string(kReportCss)},
-       {"script", std::string(kPartsJs) + std::string(kReportJs)}});
-}
-
-}  // namespace
 
 Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
                                   const Watch& watch) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,9 +11,31 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "scene/mesh.h"
-#include "train/report/sections.h"
+#include "train/config.h"
+#include "train/run/log.h"
+#include "train/run/run_files.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::train {
+
+// The contents of a run's folder.
+struct RunFacts {
+  Path folder;
+  RunHeader header;
+  TrainConfig config;
+  std::string config_text;  // config.toml verbatim
+  std::vector<LogEntry> log;
+};
+
+// The contents of a report, gathered from the run and its task.
+struct ReportFacts {
+  RunFacts run;
+  std::string data;       // the dataset's folder, as given
+  std::string predictor;  // Predictor::description
+  std::int64_t step = 0;  // of the checkpoint shown
+  std::optional<Evaluation> evaluation;
+  Showcase showcase;
+};
 
 // {"low": [3], "high": [3], "positions", "colors", "faces": base64, "texture"}: positions as 16
 // bits an axis over the bounding box, colours as 8 bits a channel (white where the mesh has none),
@@ -30,12 +53,8 @@ std::vector<LogEntry> Thin(const std::vector<LogEntry>& log, std::size_t count);
 // value except the clock's.
 nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log, const TermLabels& labels);
 
-// The same, with {"camera": {...}, "generated", "models": [...]}.
-nlohmann::ordered_json PageData(const ReportFacts& facts);
-
 // A self-contained page about a run: what was trained, how good it is, curves, pictures, meshes to
 // turn, configuration, credits.
-
 struct ReportJob {
   Path run;        // with at least one complete checkpoint
   Path data;       // dataset folder
@@ -56,5 +75,14 @@ struct ReportSummary {
 // Page and sheet appear whole or not at all, the page first. The same run and dataset give the
 // same bytes. Errors name the file of the run or dataset that is missing or broken.
 Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers, const Watch& watch);
+
+// The parts of the page as HTML (sections.cc); all text from files is escaped.
+std::string SummaryHtml(const ReportFacts& facts);  // what was trained on what, and how good it is
+std::string ComparisonHtml(const ReportFacts& facts);      // the mean of each method as bars
+Result<std::string> ModelsHtml(const ReportFacts& facts);  // a row of pictures a model
+std::string ScoresHtml(const ReportFacts& facts);    // the table, or a note that there is none yet
+std::string CommandsHtml(const ReportFacts& facts);  // the commands that reproduce it
+std::string MachineHtml(const ReportFacts& facts);
+std::string CreditsHtml(const ReportFacts& facts);
 
 }  // namespace tilegrad::train

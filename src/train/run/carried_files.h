@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of a run's folder that say what its network was trained on. A file of weights
-// (checkpoint.h: WriteWeights) carries them as tensors of bytes, so that predict still warns of
-// other pictures, and eval still refuses models that were trained on.
+// Files of a run that say what it was trained on. Files of weights (checkpoint.h: WriteWeights)
+// carry them as tensors of bytes: predict warns of other pictures, eval refuses models trained on.
 #pragma once
 
 #include <optional>

@@ -60,36 +60,13 @@ std::map<std::string, std::string> MetadataOf(const CheckpointInfo& info) {
   return out;
 }
 
-}  // namespace
-
-Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
-                      std::vector<nn::NamedTensor> tensors) {
-  nn::TensorFile file{std::move(tensors), MetadataOf(info)};
-  file.metadata[kChecksum] = ChecksumOf(file);
-  return nn::WriteSafetensors(
-      Folder(run) / fmt::format("{}{:08}{}", kStepPrefix, info.step, kStepSuffix), file);
-}
-
-Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
-                    nn::StoredFloats floats) {
-  const nn::TensorFile whole{weights.tensors, MetadataOf(weights.info)};
-  TILEGRAD_ASSIGN(const Bytes bytes, nn::EncodeSafetensors(whole, floats));
-  // The checksum is that of what a reader gets.
-  TILEGRAD_ASSIGN(nn::TensorFile stored, nn::DecodeSafetensors(context, bytes));
-  stored.metadata[kChecksum] = ChecksumOf(stored);
-  return nn::WriteSafetensors(file, stored, floats);
-}
-
-namespace {
-
 Status CheckFormat(const std::map<std::string, std::string>& metadata, const Path& path) {
   const auto format = metadata.find("format");
   if (format != metadata.end() && format->second == kCheckpointFormat) return {};
-  if (format != metadata.end() && format->second.starts_with(kCheckpointFormatName)) {
+  if (format != metadata.end() && format->second.starts_with(kCheckpointFormatName))
     return DataLoss(
         "{}: was written by another version of tilegrad: its format is \"{}\", not \"{}\"",
         path.string(), format->second, kCheckpointFormat);
-  }
   return DataLoss(
       "{}: a safetensors file, but not a checkpoint of tilegrad: its metadata has no "
       "format of that name",
@@ -120,9 +97,8 @@ Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
   *damaged = false;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
   // First, since other versions may store tensors as this one cannot read them.
-  if (const auto metadata = nn::SafetensorsMetadata(bytes); metadata.ok()) {
+  if (const auto metadata = nn::SafetensorsMetadata(bytes); metadata.ok())
     TILEGRAD_TRY(CheckFormat(*metadata, path));
-  }
   auto file = WholeContents(context, bytes, path);
   *damaged = !file.ok();
   if (!file.ok()) return file.status();
@@ -130,11 +106,10 @@ Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
   const auto step = Number<std::int64_t>(m, "step"),
              image_size = Number<std::int64_t>(m, "image_size");
   const auto seconds = Number<double>(m, "seconds");
-  if (!step || !image_size || !seconds || m.count("config") == 0) {
+  if (!step || !image_size || !seconds || m.count("config") == 0)
     return DataLoss(
         "{}: not a checkpoint of tilegrad: its metadata lacks step, image_size, seconds or config",
         path.string());
-  }
   CheckpointInfo info{*step, *image_size, m.at("config"), *seconds};
   info.half_extent = Number<double>(m, "half_extent").value_or(info.half_extent);
   if (m.count(kCredits) > 0) info.credits = m.at(kCredits);
@@ -151,6 +126,24 @@ Result<std::vector<Path>> FindFiles(const Path& run) {
 
 }  // namespace
 
+Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
+                      std::vector<nn::NamedTensor> tensors) {
+  nn::TensorFile file{std::move(tensors), MetadataOf(info)};
+  file.metadata[kChecksum] = ChecksumOf(file);
+  return nn::WriteSafetensors(
+      Folder(run) / fmt::format("{}{:08}{}", kStepPrefix, info.step, kStepSuffix), file);
+}
+
+Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
+                    nn::StoredFloats floats) {
+  const nn::TensorFile whole{weights.tensors, MetadataOf(weights.info)};
+  TILEGRAD_ASSIGN(const Bytes bytes, nn::EncodeSafetensors(whole, floats));
+  // The checksum is that of what a reader gets.
+  TILEGRAD_ASSIGN(nn::TensorFile stored, nn::DecodeSafetensors(context, bytes));
+  stored.metadata[kChecksum] = ChecksumOf(stored);
+  return nn::WriteSafetensors(file, stored, floats);
+}
+
 Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& path) {
   bool damaged = false;
   return Load(context, path, &damaged);
@@ -163,10 +156,9 @@ std::vector<Path> ListCheckpoints(const Path& run) {
 
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
   TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
-  if (files.empty()) {
+  if (files.empty())
     return NotFound("{}: not the folder of a run: there is no checkpoint in {}", run.string(),
                     Folder(run).string());
-  }
   FoundCheckpoint found;
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     bool damaged = false;
@@ -177,12 +169,11 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
       return found;
     }
     const Status status = checkpoint.status();
-    if (!damaged) {
+    if (!damaged)
       return Status(status.code(),
                     status.message() +
                         "; nothing was changed: fix this to resume from here, or move this file "
                         "away to resume from the previous checkpoint");
-    }
     found.warnings.push_back(status.message());
     found.broken.push_back(*file);
   }

@@ -33,9 +33,8 @@ struct Checkpoint {
 // Whole or not at all.
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors);
-// One file of what predicts, for whatever takes a run: `weights` has the tensors that
-// Task::LoadModel reads. It is a checkpoint from which no training goes on. kHalf: as of
-// EncodeSafetensors.
+// One file of what predicts, a checkpoint that cannot be resumed: `weights` has the tensors that
+// Task::LoadModel reads. kHalf: as of EncodeSafetensors.
 Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
                     nn::StoredFloats floats);
 // Errors name the file: cut short, not a checkpoint of this program, another checksum, ...
@@ -47,17 +46,15 @@ struct FoundCheckpoint {
   std::vector<std::string> warnings;  // newer files that are damaged
   std::vector<Path> broken;           // these files
 };
-// The newest one that is whole. Passed over are only files that are damaged: cut short, or of
-// another checksum. One that cannot be read for another reason (another version's format,
-// permissions, memory) is an error, as going on from an older one would throw away what it holds.
-// NotFound if there is none, DataLoss naming the first reason if there are only damaged ones.
+// The newest whole one. Skips only damaged files (cut short, wrong checksum): any other reason
+// (another version's format, permissions, memory) is an error, because resuming from an older file
+// would lose steps. NotFound if there is none; DataLoss names the first reason if all are damaged.
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
 
 // The newest one of a run's folder, or the one file that `path` is or names (FindRun).
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path);
 
-// Renames files, "step_00000012.safetensors.broken", for whoever goes on from an older one: they
-// would count among those that are kept, and push out what is whole.
+// Renames files to "step_00000012.safetensors.broken": they must not count among those to keep.
 void SetAside(const std::vector<Path>& broken);
 
 // All checkpoint files of a run, oldest first: step_NUMBER.safetensors, nothing else.
@@ -67,10 +64,8 @@ void PruneCheckpoints(const Path& run, std::int64_t keep);
 // Removes half-written files that a killed run left in its folder.
 void RemoveHalfWritten(const Path& run);
 
-// Why a run cannot go on: what it was started with is kept as text, a line for each thing.
-
-// The first line in which two such texts differ: was "rate = 1", is "rate = 2"; "" if they are
-// equal. A line that one of them lacks is none.
+// The first line in which two texts differ: was "rate = 1", is "rate = 2" (none: no such line); ""
+// if they are equal.
 inline std::string FirstDifference(const std::string& was, const std::string& is) {
   std::istringstream old_lines(was), new_lines(is);
   for (std::string a, b;;) {

@@ -28,9 +28,9 @@ using ConfigFields = std::vector<ConfigField>;
 
 inline constexpr double kNoLimit = 1e12;
 
-// TOML into the targets; keys that are not there keep their values. An unknown key, a wrong type
-// or a value out of range is an error that names line and key, and the known keys that are near.
-// Keys of former versions may have the value that nothing depends on.
+// TOML into the targets; missing keys keep their values. An unknown key, a wrong type or a value
+// out of range is an error that names line, key and similar keys. A key of a former version may
+// have the value that this version behaves as.
 Status ReadFields(std::string_view toml, const ConfigFields& fields);
 // "schedule.steps=100" and the like, applied in order.
 Status OverrideFields(const std::vector<std::string>& assignments, const ConfigFields& fields);

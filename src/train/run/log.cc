@@ -96,10 +96,9 @@ Result<std::vector<LogEntry>> ReadLog(const Path& run) {
     const std::size_t end = text.find('\n', at);
     if (end == std::string::npos) break;  // cut by a crash
     LogEntry entry;
-    if (!Parse(std::string_view(text).substr(at, end - at), &entry)) {
+    if (!Parse(std::string_view(text).substr(at, end - at), &entry))
       return DataLoss("{}: line {} is not a JSON object with a step", MetricsFile(run).string(),
                       line_number);
-    }
     entries.push_back(std::move(entry));
     at = end + 1;
   }
@@ -174,9 +173,8 @@ std::string StepValues::ForConsole() const {
 
 std::string StepValues::DescribeTerms() const {
   std::string out;
-  for (const LossTerm& term : terms) {
+  for (const LossTerm& term : terms)
     out += fmt::format("{}{} {} x {}", out.empty() ? "" : ", ", term.name, term.value, term.weight);
-  }
   return out;
 }
 

@@ -36,10 +36,8 @@ class RunLog {
   Path run_;
 };
 
-// TensorBoard event files: TFRecord framing around protocol-buffer events that hold scalars. The
-// few fields needed are encoded by hand; TensorFlow's crc32c masking as in
-// tensorflow/core/lib/io/record_writer.
-
+// TensorBoard event files: TFRecord framing, with crc32c masked as in TensorFlow's record_writer,
+// around protocol-buffer events whose few fields are encoded by hand.
 // The bytes of one record; a file is a version record followed by any number of scalar records.
 std::string TensorboardVersionRecord(double wall_time);
 std::string TensorboardScalarsRecord(double wall_time, std::int64_t step, const Scalars& scalars);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch is cut into portions, a number of the configuration. Each is computed by itself, with
-// batch-norm statistics of its own, and what they give is summed in one binary tree. So the same
-// bits come out whoever computes them: one process one after the other, or many at once.
+// A batch is cut into portions, each computed by itself with batch-norm statistics of its own, and
+// their results are summed in one binary tree: the same bits from one process or many.
 #pragma once
 
 #include <bit>

@@ -49,20 +49,149 @@ class Session {
   Session(const RunPlan& plan, RunWork* work, nn::Context& context)
       : plan_(plan), work_(*work), context_(context) {}
 
-  Status Open();
-  Status Loop(const Watch& watch);
-  RunOutcome outcome() const;
+  Status Open() {
+    if (!plan_.locked) {
+      TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
+    }
+    TILEGRAD_TRY(CheckExistingRun(plan_, work_));
+    if (plan_.existing == ExistingRun::kReplace) TILEGRAD_TRY(RemoveRun(plan_.folder));
+    TILEGRAD_TRY(Restore());
+    RemoveHalfWritten(plan_.folder);
+    TILEGRAD_TRY(work_.Begin(first_step_));
+    PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
+    TILEGRAD_ASSIGN(log_, RunLog::Open(plan_.folder, first_step_));
+    return {};
+  }
+
+  Status Loop(const Watch& watch) {
+    loop_start_ = last_log_ = Clock::now();
+    process_seconds_ = ProcessSeconds();
+    if (done_ == 0) TILEGRAD_TRY(Draw());
+    while (done_ < End() && !watch.stopped() && !OutOfTime()) {
+      TILEGRAD_TRY(OneStep());
+      watch.Report({plan_.stage, static_cast<std::uint64_t>(done_),
+                    static_cast<std::uint64_t>(End()), note_});
+    }
+    TILEGRAD_TRY(Save());
+    TILEGRAD_TRY(AwaitSave());
+    if (!watch.stopped() || done_ >= End()) return {};
+    return Cancelled("stopped at step {} of {}; everything is saved", done_, End());
+  }
+
+  RunOutcome outcome() const { return {first_step_, done_, Seconds(), done_ >= End()}; }
 
  private:
-  Status Restore();
-  Status OneStep();
-  Status Draw();
-  Status Log();
-  void LogStream(LogEntry* entry);
-  void LogWait(double elapsed, LogEntry* entry);
-  Status Save();
-  Status AwaitSave();
-  std::vector<nn::NamedTensor> Snapshot();
+  Status Restore() {
+    auto found = LoadNewestCheckpoint(context_, plan_.folder);
+    if (!found.ok())
+      return found.status().code() == StatusCode::kNotFound ? Status() : found.status();
+    for (const auto& warning : found->warnings) {
+      if (plan_.warn) plan_.warn("skipped: " + warning);
+    }
+    const CheckpointInfo& info = found->checkpoint.info;
+    const std::string file = found->file.string();
+    // config.toml, which is written when a run is extended, was compared before: the newest
+    // checkpoint may be older than that.
+    const bool compared = PathExists(plan_.folder / kTrainSettings);
+    TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
+                               compared ? kStepsKey : plan_.may_differ));
+    if (info.step > plan_.schedule.steps)
+      return InvalidArgument("{}: has {} already, more than {}", file, Count(info.step, "step"),
+                             plan_.schedule.steps);
+    if (info.image_size != plan_.image_size)
+      return InvalidArgument("{}: its images had {} pixels a side, now there are {}", file,
+                             info.image_size, plan_.image_size);
+    TILEGRAD_TRY(work_.LoadState(found->checkpoint.tensors, info.step).Within(file));
+    SetAside(found->broken);
+    first_step_ = done_ = saved_ = info.step;
+    seconds_before_ = info.seconds;
+    return {};
+  }
+
+  Status OneStep() {
+    const Schedule& s = plan_.schedule;
+    values_.Clear();
+    TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
+    ++done_;
+    images_ += values_.images;
+    stream_seconds_ += values_.stream_seconds;
+    wait_seconds_ += values_.wait_seconds;
+    const bool last = done_ >= End();
+    if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
+    TILEGRAD_TRY(Draw());
+    if (done_ % s.checkpoint_every == 0 || last) TILEGRAD_TRY(Save());
+    return {};
+  }
+
+  Status Draw() {
+    if (!work_.HasPicture(done_)) return {};
+    TILEGRAD_ASSIGN(const ImageU8 picture, work_.Picture(done_));
+    if (picture.empty()) return {};
+    const Path file = PictureFile(plan_, done_);
+    TILEGRAD_TRY(io::SavePng(file, picture));
+    if (plan_.drawn) plan_.drawn(file);
+    const Mesh mesh = work_.PictureMesh();
+    return mesh.faces.empty() ? Status() : io::SaveGlb(Path(file).replace_extension(".glb"), mesh);
+  }
+
+  Status Log() {
+    const double elapsed = SecondsSince(last_log_);
+    const double rate = elapsed > 0 ? static_cast<double>(images_) / elapsed : 0;
+    last_log_ = Clock::now();
+    images_ = 0;
+    note_ = values_.ForConsole() + fmt::format("  {:.0f} images/s", rate);
+    LogEntry entry{done_, values_.ForLog()};
+    entry.values.emplace_back("images_per_second", rate);
+    entry.values.emplace_back("seconds", Seconds());
+    LogStream(&entry);
+    LogWait(elapsed, &entry);
+    return log_->Append(entry);
+  }
+
+  // The share of the processor time that went into streamed pictures.
+  void LogStream(LogEntry* entry) {
+    const double before = std::exchange(process_seconds_, ProcessSeconds());
+    const double streamed = std::exchange(stream_seconds_, 0);
+    if (streamed <= 0 || process_seconds_ <= before) return;
+    const double share = streamed / (process_seconds_ - before);
+    note_ += fmt::format("  streaming {:.0f} %", 100 * share);
+    entry->values.emplace_back("stream_share", share);
+  }
+
+  // The share of the time that this rank, done with its portions, waited for the sums of all, and
+  // how many these are in a step.
+  void LogWait(double elapsed, LogEntry* entry) {
+    const double waited = std::exchange(wait_seconds_, 0);
+    if (waited <= 0 || elapsed <= 0) return;
+    note_ += fmt::format("  waiting {:.1f} %", 100 * waited / elapsed);
+    entry->values.emplace_back("wait_share", waited / elapsed);
+    entry->values.emplace_back("summed_numbers", values_.summed_numbers);
+  }
+
+  Status Save() {
+    if (saved_ == done_) return {};
+    TILEGRAD_TRY(AwaitSave());
+    CheckpointInfo info{done_, plan_.image_size, plan_.settings, Seconds(), plan_.half_extent};
+    auto save = [this, info = std::move(info), state = Snapshot()]() mutable {
+      TILEGRAD_TRY(SaveCheckpoint(plan_.folder, info, std::move(state)));
+      PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
+      return Status();
+    };
+    // Deferred to AwaitSave where the system refuses a thread.
+    saving_ = std::async(std::launch::async | std::launch::deferred, std::move(save));
+    saved_ = done_;
+    return {};
+  }
+
+  Status AwaitSave() { return saving_.valid() ? saving_.get() : Status(); }
+
+  // What later steps do not change.
+  std::vector<nn::NamedTensor> Snapshot() {
+    std::vector<nn::NamedTensor> state = work_.State();
+    for (nn::NamedTensor& t : state) t.value = context_.Copy(t.value);
+    return state;
+  }
+
   std::int64_t End() const { return work_.End(plan_.schedule.steps); }
   double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
   bool OutOfTime() const {
@@ -86,150 +215,6 @@ class Session {
   std::string note_;
   std::future<Status> saving_;  // beside the steps
 };
-
-Status Session::Open() {
-  if (!plan_.locked) {
-    TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
-  }
-  TILEGRAD_TRY(CheckExistingRun(plan_, work_));
-  if (plan_.existing == ExistingRun::kReplace) TILEGRAD_TRY(RemoveRun(plan_.folder));
-  TILEGRAD_TRY(Restore());
-  RemoveHalfWritten(plan_.folder);
-  TILEGRAD_TRY(work_.Begin(first_step_));
-  PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
-  TILEGRAD_ASSIGN(log_, RunLog::Open(plan_.folder, first_step_));
-  return {};
-}
-
-Status Session::Restore() {
-  auto found = LoadNewestCheckpoint(context_, plan_.folder);
-  if (!found.ok())
-    return found.status().code() == StatusCode::kNotFound ? Status() : found.status();
-  for (const auto& warning : found->warnings) {
-    if (plan_.warn) plan_.warn("skipped: " + warning);
-  }
-  const CheckpointInfo& info = found->checkpoint.info;
-  const std::string file = found->file.string();
-  // config.toml, which is written when a run is extended, was compared before: the newest
-  // checkpoint may be older than that.
-  const bool compared = PathExists(plan_.folder / kTrainSettings);
-  TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
-                             compared ? kStepsKey : plan_.may_differ));
-  if (info.step > plan_.schedule.steps) {
-    return InvalidArgument("{}: has {} already, more than {}", file, Count(info.step, "step"),
-                           plan_.schedule.steps);
-  }
-  if (info.image_size != plan_.image_size) {
-    return InvalidArgument("{}: its images had {} pixels a side, now there are {}", file,
-                           info.image_size, plan_.image_size);
-  }
-  TILEGRAD_TRY(work_.LoadState(found->checkpoint.tensors, info.step).Within(file));
-  SetAside(found->broken);
-  first_step_ = done_ = saved_ = info.step;
-  seconds_before_ = info.seconds;
-  return {};
-}
-
-Status Session::Save() {
-  if (saved_ == done_) return {};
-  TILEGRAD_TRY(AwaitSave());
-  CheckpointInfo info{done_, plan_.image_size, plan_.settings, Seconds(), plan_.half_extent};
-  auto save = [this, info = std::move(info), state = Snapshot()]() mutable {
-    TILEGRAD_TRY(SaveCheckpoint(plan_.folder, info, std::move(state)));
-    PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
-    return Status();
-  };
-  // Deferred to AwaitSave where the system refuses a thread.
-  saving_ = std::async(std::launch::async | std::launch::deferred, std::move(save));
-  saved_ = done_;
-  return {};
-}
-
-Status Session::AwaitSave() { return saving_.valid() ? saving_.get() : Status(); }
-
-// What later steps do not change.
-std::vector<nn::NamedTensor> Session::Snapshot() {
-  std::vector<nn::NamedTensor> state = work_.State();
-  for (nn::NamedTensor& t : state) t.value = context_.Copy(t.value);
-  return state;
-}
-
-Status Session::Log() {
-  const double elapsed = SecondsSince(last_log_);
-  const double rate = elapsed > 0 ? static_cast<double>(images_) / elapsed : 0;
-  last_log_ = Clock::now();
-  images_ = 0;
-  note_ = values_.ForConsole() + fmt::format("  {:.0f} images/s", rate);
-  LogEntry entry{done_, values_.ForLog()};
-  entry.values.emplace_back("images_per_second", rate);
-  entry.values.emplace_back("seconds", Seconds());
-  LogStream(&entry);
-  LogWait(elapsed, &entry);
-  return log_->Append(entry);
-}
-
-// The share of the processor time that went into streamed pictures.
-void Session::LogStream(LogEntry* entry) {
-  const double before = std::exchange(process_seconds_, ProcessSeconds());
-  const double streamed = std::exchange(stream_seconds_, 0);
-  if (streamed <= 0 || process_seconds_ <= before) return;
-  const double share = streamed / (process_seconds_ - before);
-  note_ += fmt::format("  streaming {:.0f} %", 100 * share);
-  entry->values.emplace_back("stream_share", share);
-}
-
-// The share of the time that this rank, done with its portions, waited for the sums of all, and how
-// many these are in a step.
-void Session::LogWait(double elapsed, LogEntry* entry) {
-  const double waited = std::exchange(wait_seconds_, 0);
-  if (waited <= 0 || elapsed <= 0) return;
-  note_ += fmt::format("  waiting {:.1f} %", 100 * waited / elapsed);
-  entry->values.emplace_back("wait_share", waited / elapsed);
-  entry->values.emplace_back("summed_numbers", values_.summed_numbers);
-}
-
-Status Session::Draw() {
-  if (!work_.HasPicture(done_)) return {};
-  TILEGRAD_ASSIGN(const ImageU8 picture, work_.Picture(done_));
-  if (picture.empty()) return {};
-  const Path file = PictureFile(plan_, done_);
-  TILEGRAD_TRY(io::SavePng(file, picture));
-  if (plan_.drawn) plan_.drawn(file);
-  const Mesh mesh = work_.PictureMesh();
-  return mesh.faces.empty() ? Status() : io::SaveGlb(Path(file).replace_extension(".glb"), mesh);
-}
-
-Status Session::OneStep() {
-  const Schedule& s = plan_.schedule;
-  values_.Clear();
-  TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
-  ++done_;
-  images_ += values_.images;
-  stream_seconds_ += values_.stream_seconds;
-  wait_seconds_ += values_.wait_seconds;
-  const bool last = done_ >= End();
-  if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
-  TILEGRAD_TRY(Draw());
-  if (done_ % s.checkpoint_every == 0 || last) TILEGRAD_TRY(Save());
-  return {};
-}
-
-Status Session::Loop(const Watch& watch) {
-  loop_start_ = last_log_ = Clock::now();
-  process_seconds_ = ProcessSeconds();
-  if (done_ == 0) TILEGRAD_TRY(Draw());
-  while (done_ < End() && !watch.stopped() && !OutOfTime()) {
-    TILEGRAD_TRY(OneStep());
-    watch.Report(
-        {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(End()), note_});
-  }
-  TILEGRAD_TRY(Save());
-  TILEGRAD_TRY(AwaitSave());
-  if (!watch.stopped() || done_ >= End()) return {};
-  return Cancelled("stopped at step {} of {}; everything is saved", done_, End());
-}
-
-RunOutcome Session::outcome() const { return {first_step_, done_, Seconds(), done_ >= End()}; }
 
 }  // namespace
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run: a folder, and steps that are taken in it from the start, or from where they stopped, to
-// the end. This is all of a run's life that does not depend on what is computed: the lock, refusing
-// or continuing what is there, comparing configurations, restoring, logging, pictures, saving,
-// pruning, stopping. Training (train/trainer.h) and fitting (fit/run.h) are two kinds of work.
+// A run: a folder, and the steps taken in it. Holds whatever does not depend on what is computed:
+// lock, comparison with an earlier configuration, restoring, logging, pictures, saving, stopping.
+// Training (train/trainer.h) and fitting (fit/run.h) are the two kinds of work.
 //
 //   <run>/config.toml                    if the work writes one: what a run is continued with
 //   <run>/metrics.jsonl, tensorboard/    the curves
@@ -38,8 +37,8 @@ struct Schedule {
   std::int64_t keep_checkpoints = 3;  // the newest ones
 };
 
-// Whether a sample sheet is due after `steps` steps: every `sample_every`, at the end, and before
-// that after 10, 20, 40, ..., so that who waits for a slow task soon sees something, too.
+// Whether a sample sheet is due after `steps` steps: every `sample_every`, at the end, and earlier
+// after 10, 20, 40, ..., so that slow tasks show something soon.
 inline bool SampleIsDue(const Schedule& s, std::int64_t steps) {
   if (steps <= 0) return false;
   if (steps % s.sample_every == 0 || steps == s.steps) return true;
@@ -81,8 +80,7 @@ struct RunPlan {
   double half_extent = CheckpointInfo().half_extent;
   Schedule schedule{};
   ExistingRun existing = ExistingRun::kRefuse;
-  // The setting that may differ from the run's own: its number of steps, "schedule.steps". Empty:
-  // none.
+  // The setting that may differ from the run's own, "schedule.steps"; empty: none.
   std::string may_differ = {};
   bool locked = false;         // the caller holds the folder's lock already
   double max_minutes = 0;      // > 0: save and stop after this long
@@ -99,8 +97,7 @@ class RunWork {
   // that holds it, for errors.
   virtual Result<std::string> ResultSettings(const std::string& settings,
                                              const std::string& place) const = 0;
-  // Once, when it is certain that the run starts or continues, and after LoadState: files that
-  // stand beside the checkpoints. `first_step` steps are done.
+  // Once, after LoadState: writes the files beside the checkpoints. `first_step` steps are done.
   virtual Status Begin(std::int64_t first_step) = 0;
 
   // Step number `step`, from 0. An error leaves everything as it was before the step.
@@ -113,8 +110,7 @@ class RunWork {
   // The steps of the whole run, as it looks now: those of its schedule, or fewer.
   virtual std::int64_t End(std::int64_t scheduled) const { return scheduled; }
 
-  // Whether there is a picture after `steps` steps (0: before the first), and the picture. An empty
-  // one is not written.
+  // The picture after `steps` steps (0: before the first), if any; an empty one is not written.
   virtual bool HasPicture(std::int64_t steps) const = 0;
   virtual Result<ImageU8> Picture(std::int64_t steps) = 0;
   // The mesh as it is then, for pages that show it forming; without faces: none is written.
@@ -132,10 +128,9 @@ struct RunOutcome {
 Status CheckExistingRun(const Path& folder, ExistingRun existing);
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work);
 
-// Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled).
-// A run that was stopped or killed and continued ends in the bits of one that was not. Errors:
-// another process works in the folder; settings or image size are not those that the run was
-// started with, naming the first line that differs; what `work` returns.
+// Saves before it returns, also when stopped by time or by `stop` (then with kCancelled). A run
+// that was stopped or killed ends in the same bits when continued. Errors: another process works in
+// the folder; other settings (names the first line that differs) or image size; those of `work`.
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
                               const Watch& watch);
 

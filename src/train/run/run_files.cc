@@ -57,6 +57,24 @@ void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
   }
 }
 
+std::vector<std::pair<std::string, std::string>> TextsIn(const nlohmann::json& json,
+                                                         const char* key) {
+  std::vector<std::pair<std::string, std::string>> out;
+  if (!json.contains(key)) return out;
+  for (const auto& [name, value] : json[key].items())
+    out.emplace_back(name, value.is_string() ? value.get<std::string>() : DumpJson(value));
+  return out;
+}
+
+std::string CpuName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const auto begin = line.find_first_not_of(": \t", line.find(':'));
+    if (line.starts_with("model name") && begin != std::string::npos) return line.substr(begin);
+  }
+  return "unknown";
+}
+
 }  // namespace
 
 Result<std::map<std::int64_t, Path>> FilesOfSteps(const Path& folder, std::string_view beginning,
@@ -114,28 +132,6 @@ Status RemoveRun(const Path& folder) {
   std::ranges::reverse(files);
   return RemoveFiles(files);
 }
-
-namespace {
-
-std::vector<std::pair<std::string, std::string>> TextsIn(const nlohmann::json& json,
-                                                         const char* key) {
-  std::vector<std::pair<std::string, std::string>> out;
-  if (!json.contains(key)) return out;
-  for (const auto& [name, value] : json[key].items())
-    out.emplace_back(name, value.is_string() ? value.get<std::string>() : DumpJson(value));
-  return out;
-}
-
-std::string CpuName() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    const auto begin = line.find_first_not_of(": \t", line.find(':'));
-    if (line.starts_with("model name") && begin != std::string::npos) return line.substr(begin);
-  }
-  return "unknown";
-}
-
-}  // namespace
 
 Status WriteHeader(const Path& run, const RunHeader& header) {
   nlohmann::ordered_json json = {{"name", header.name},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands in a run's folder, by name: the run and commands that look at it write these without
-// asking, and a run that starts anew takes them away first.
+// The files of a run's folder, by name: written without asking, and removed by a run that starts
+// anew.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,8 @@ namespace tilegrad::train {
 inline constexpr const char* kTrainSettings = "config.toml";  // of a training
 inline constexpr const char* kFitSettings = "fit.txt";        // of a fit
 
-// Files BEGINNING00001500ENDING of a folder by their step; files that people put beside them are
-// not. An error where the folder is there and cannot be read: that is not a folder without such
-// files.
+// Files BEGINNING00001500ENDING of a folder by their step; ignores others. An error if the folder
+// exists and cannot be read.
 Result<std::map<std::int64_t, Path>> FilesOfSteps(const Path& folder, std::string_view beginning,
                                                   std::string_view ending);
 
@@ -56,8 +55,7 @@ Status WriteHeader(const Path& run, const RunHeader& header);
 // Errors name the file and the key or line.
 Result<RunHeader> ReadHeader(const Path& run);
 
-// What a result depends on besides configuration and data, as name and value: version, compiler,
-// CPU, cores, SIMD target.
+// Name and value of version, compiler, CPU, cores and SIMD target, on which results depend.
 std::vector<std::pair<std::string, std::string>> DescribeMachine();
 
 }  // namespace tilegrad::train

@@ -65,11 +65,10 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
   TILEGRAD_ASSIGN(const PenaltyPlace place, PenaltyPlaceOf(config.place));
   auto out = std::unique_ptr<Adversary>(new Adversary(context, config, place, schedule));
   if (config.perceptual == 0) return out;
-  if (config.network_file.empty()) {
+  if (config.network_file.empty())
     return InvalidArgument(
         "adversarial.perceptual needs adversarial.network_file, e.g. the folder of a run of "
         "configs/classify.toml");
-  }
   TILEGRAD_ASSIGN(out->perceptual_,
                   LoadPerceptualNetwork(context, {config.network, config.network_file}));
   return out;
@@ -79,14 +78,12 @@ void Adversary::AddLosses(const Pictures& pictures, LossSum* sum) {
   const auto& [rendered, truth, portion] = pictures;
   kept_[static_cast<std::size_t>(portion.index)] = {truth, rendered.value()};
   if (config_.weight > 0) critic_->AddGeneratorLoss(config_.weight, rendered, sum);
-  if (config_.features > 0) {
+  if (config_.features > 0)
     sum->Add("critic_features", "Features of the critic (L1)", config_.features,
              FeatureL1Loss(FeaturesOf(critic_->network()), rendered, truth));
-  }
-  if (config_.perceptual > 0) {
+  if (config_.perceptual > 0)
     sum->Add("perceptual", "Features of a trained network (L1)", config_.perceptual,
              FeatureL1Loss(perceptual_, rendered, truth));
-  }
 }
 
 Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep& at,

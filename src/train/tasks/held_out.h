@@ -45,12 +45,4 @@ std::vector<int> ChooseModels(const Dataset& dataset, int count);
 // circle, which sees models that face +z obliquely from the front; the others spread from there.
 std::vector<int> ShownViews(int views);
 
-// The examples of a report in one image.
-
-// Fills sheet and sheet_columns from examples that show, as ShowHeldOut makes them, ShownViews of
-// the dataset, each as truth and prediction. One row per example: what the network sees, its
-// prediction from there, its prediction from the second view, and the truth from there. Predictions
-// are drawn in detail, the dataset's pictures pixel by pixel. Does nothing without examples.
-Status AddSheet(int image_size, const Workers& workers, Showcase* showcase);
-
 }  // namespace tilegrad::train

@@ -90,12 +90,11 @@ Result<nn::StepVector<nn::Gradient>> LearnedCritic::Gradients(const Pair& pair,
   auto gradients = nn::Gradients(loss.total, weights_.adam().parameters(), listener);
   TILEGRAD_TRY(context_.TakeStatus());
   const double norm = nn::GlobalNorm(context_, gradients);
-  if (!std::isfinite(loss.total.item()) || !std::isfinite(norm)) {
+  if (!std::isfinite(loss.total.item()) || !std::isfinite(norm))
     return InternalError(
         "{}: the critic's loss is {}, its gradient's norm {}; a smaller {}.learning_rate or a "
         "larger {}.penalty may help",
         job_.role.distance.name, loss.total.item(), norm, job_.role.keys, job_.role.keys);
-  }
   if (values == nullptr) return gradients;
   NoteTerm(job_.role.distance, loss.wasserstein.item(), values);
   if (job_.game.penalty > 0) NoteTerm(job_.role.penalty, loss.penalty.item(), values);

@@ -30,9 +30,8 @@ Result<std::string> NetworkTask::Fingerprint(const Path& data, const Workers& wo
 }
 
 Result<nn::StepVector<nn::Gradient>> NetworkTask::Backward(const UpdateIndex& at, StepValues* out) {
-  if (at.update > 0) {
+  if (at.update > 0)
     return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener}, out);
-  }
   TILEGRAD_ASSIGN(const nn::Var loss, Loss(at, SlotsOf(at.step, lesson_.batch, at.portion), out));
   TILEGRAD_ASSIGN(auto gradients, weights().Gradients(loss, at.listener, *out));
   const auto seen = static_cast<double>((at.step + 1) * lesson_.batch);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prefetching: reads, renders and augments the pictures of a step during the step before
-// (base/side_loop.h), to keep workers busy for which that step's loops have no task. A batch
-// depends only on its place in the run: who makes it, and when, changes no bit. A lane of the
-// context has no idle workers and makes its own batches when it needs them.
+// Prefetching: makes the pictures of a step during the step before (base/side_loop.h), on workers
+// that would be idle. A batch depends only on its place in the run: who makes it, and when, changes
+// no bit. A lane of the context has no idle workers and makes its batches when it needs them.
 #pragma once
 
 #include <functional>

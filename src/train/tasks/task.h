@@ -52,8 +52,7 @@ struct BatchIndex {
   bool operator==(const BatchIndex&) const = default;
 };
 
-// A step is one or more updates, each of some parameters: a task with an adversary takes several of
-// its critic and one of its generator.
+// A step is one or more updates: with an adversary several of its critic and one of its generator.
 struct UpdateIndex {
   std::int64_t step = 0;                     // from 0
   int update = 0;                            // of the step, from 0

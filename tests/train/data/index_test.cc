@@ -9,7 +9,7 @@
 #include "io/npz.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/data/few_models.h"
+#include "train/data/dataset.h"
 #include "train/data/split.h"
 
 namespace tilegrad::train::index_test {

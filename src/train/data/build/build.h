@@ -50,28 +50,13 @@ struct BuildSummary {
   std::uint64_t bytes = 0;             // of the dataset's files
 };
 
-// Writes the files of dataset.h to `folder`. Keeps readable model files of the same recipe, so that
-// an interrupted build resumes where it stopped and gives the same bytes as an uninterrupted one,
-// with any number of workers and ranks. Lists models that fail in rejected.jsonl and omits them.
-// `stop` ends it between models with kCancelled. Errors: a folder that holds a dataset of another
-// recipe, options out of range, no usable model, too many broken ones of a published set, a full
-// disk. With a group every rank calls it and rank 0 gets the summary, without warnings of models
-// that others read.
+// Writes the files of dataset.h to `folder`. Keeps readable model files of the same recipe: an
+// interrupted build resumes and gives the same bytes, with any number of workers and ranks. Lists
+// models that fail in rejected.jsonl and omits them. `stop` ends it between models with kCancelled.
+// Errors: a folder with a dataset of another recipe, options out of range, no usable model, too
+// many broken ones of a published set, a full disk. With a group every rank calls it; rank 0 gets
+// the summary, without warnings of models that others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers, const Watch& watch);
-
-// Chooses the models of a source for a dataset.
-
-// Selects entries by classes, per_class, liveries and limit; ascending. Takes the first by a hash,
-// first of shapes, then of the models of each, so that a part of a set is as varied as the whole.
-std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
-                                       const BuildOptions& options);
-
-// InvalidArgument names a class that no entry has.
-Status CheckClasses(const std::vector<SourceEntry>& entries,
-                    const std::vector<std::string>& classes);
-
-// InvalidArgument names an option out of its range.
-Status CheckOptions(const BuildOptions& options);
 
 }  // namespace tilegrad::train

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "train/data/build/glass.h"
 #include "train/data/build/truth_mesh.h"
 #include "train/data/split.h"
 #include "train/metrics/metrics.h"
@@ -14,6 +13,7 @@ namespace {
 
 // Counts up when the rules change: light, supersampling, glass, clustering, voxels, families.
 constexpr int kRulesVersion = 3;
+constexpr float kGlassAlpha = 0.2f;  // materials with less are glass
 
 Result<MadeModel> FromMesh(const SourceEntry& entry, Mesh mesh, const DatasetInfo& info,
                            LitRenderer& renderer) {
@@ -45,6 +45,17 @@ Status CheckVisible(const ModelData& data, int size) {
 }
 
 }  // namespace
+
+void RemoveGlass(Mesh* mesh) {
+  if (mesh->materials.empty()) return;
+  std::vector<char> keep(mesh->faces.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) {
+    const auto m =
+        mesh->face_materials.empty() ? 0 : static_cast<std::size_t>(mesh->face_materials[f]);
+    keep[f] = mesh->materials[m].base_color.a >= kGlassAlpha;
+  }
+  KeepFaces(keep, mesh);
+}
 
 Status PrepareMesh(const DatasetInfo& info, Mesh* mesh) {
   TILEGRAD_TRY(Validate(*mesh));

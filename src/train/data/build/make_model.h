@@ -21,7 +21,11 @@ struct MadeModel {
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
                             LitRenderer& renderer);
 
-// A source's mesh as the dataset shows it: without glass (glass.h), upright, centred and scaled to
+// Removes faces of glass, because people see what is behind them, unless nothing would be left.
+// Everything else counts as opaque.
+void RemoveGlass(Mesh* mesh);
+
+// A source's mesh as the dataset shows it: without glass, upright, centred and scaled to
 // the rule's half-extent.
 Status PrepareMesh(const DatasetInfo& info, Mesh* mesh);
 

@@ -94,9 +94,8 @@ void DropUnused(Mesh* mesh) {
 
 std::uint64_t Cell(glm::vec3 p, const Bounds& bounds, float cell) {
   std::uint64_t key = 0;
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i)
     key = key << 12 | static_cast<std::uint64_t>((p[i] - bounds.low[i]) / cell);
-  }
   return key;
 }
 

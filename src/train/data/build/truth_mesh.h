@@ -8,11 +8,10 @@
 
 namespace tilegrad::train {
 
-// Positions, faces and per-vertex unlit colours. Vertices are shared per (vertex, material); their
-// colour is the mean over their corners. If there are more than `max_faces` faces: vertex
-// clustering on a grid over the bounding box, with the finest of 160, 128, 102, ... cells along
-// the longest side (each four fifths of the one before) that leaves at most that many; each cluster
-// moves to its mean, and collapsed or duplicate faces are dropped.
+// Positions, faces and per-vertex unlit colours. Vertices are shared per (vertex, material), in the
+// mean colour of their corners. More than `max_faces` faces are clustered on the finest grid of
+// 160, 128, 102, ... cells along the longest side (each four fifths of the one before) that leaves
+// no more; each cluster moves to its mean; collapsed and duplicate faces are dropped.
 Mesh MakeTruthMesh(const Mesh& mesh, std::size_t max_faces);
 
 // The same clustering, but each corner keeps its texture coordinates and material. Stops before

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/data/photographs/cmr_writer.h"
-
 #include <algorithm>
 
 #include "base/error.h"
 #include "io/mat_file.h"
 #include "scene/weak_perspective_ref.h"
+#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 namespace {

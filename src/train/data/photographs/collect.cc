@@ -6,8 +6,8 @@
 #include "base/read_budget.h"
 #include "base/try_all.h"
 #include "io/image_file.h"
-#include "train/data/photographs/cmr_writer.h"
 #include "train/data/photographs/pascal3d.h"
+#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 namespace {

@@ -15,211 +15,19 @@ namespace {
 
 using points3::Cross, points3::Dot, points3::Point, points3::Unit, points3::operator+,
     points3::operator-, points3::operator*;
+using Views = std::vector<std::vector<Keypoint>>;  // [view][keypoint]
+
 constexpr int kStarts = 6;
 constexpr std::size_t kFewestViews = 8, kFewestKeypoints = 4;
-
-// How much nearer visible keypoints are than hidden ones, summed over the views.
-double Nearer(const RigidMotion& rigid, const KeypointRows& views) {
-  double sum = 0;
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    double depth[2] = {}, count[2] = {};
-    for (std::size_t k = 0; k < rigid.shape.size(); ++k) {
-      depth[views[v][k].visible] += ProjectWeakly(rigid.cameras[v], rigid.shape[k])[2];
-      count[views[v][k].visible] += 1;
-    }
-    if (count[0] > 0 && count[1] > 0) sum += depth[0] / count[0] - depth[1] / count[1];
-  }
-  return sum;
-}
-
-// The same pictures of the shape with its depth turned around.
-void TurnDepthAround(RigidMotion* rigid) {
-  for (Point& p : rigid->shape) p[2] = -p[2];
-  for (WeakPerspective& c : rigid->cameras) {
-    const auto& [w, x, y, z] = c.quaternion;
-    c.quaternion = {w, -x, -y, z};
-  }
-}
-
-Point MeanDirection(const std::vector<Point>& shape,
-                    const std::vector<std::pair<int, int>>& pairs) {
-  Point sum = {};
-  for (const auto& [from, to] : pairs)
-    sum = sum + Unit(shape[static_cast<std::size_t>(to)] - shape[static_cast<std::size_t>(from)]);
-  return sum;
-}
-
-// Without names for up and front: along the longest way through the shape across x.
-Point LongestAcross(const std::vector<Point>& shape, const Point& x) {
-  Point best = {}, mean = {};
-  for (const Point& p : shape) mean = mean + (1.0 / static_cast<double>(shape.size())) * p;
-  for (const Point& p : shape) {
-    const Point across = (p - mean) - Dot(p - mean, x) * x;
-    if (Dot(across, across) > Dot(best, best)) best = across;
-  }
-  return best;
-}
-
-// Rows: the object's axes in the shape's coordinates, right-handed. The front counts before what is
-// up: it is farther away.
-std::array<Point, 3> Axes(const std::vector<Point>& shape, const KeypointViews& job) {
-  const Point x = Unit(MeanDirection(shape, job.left));
-  const auto across = [&](const Point& d) { return Unit(d - Dot(d, x) * x); };
-  if (job.front.empty() && !job.up.empty()) {
-    const Point y = across(MeanDirection(shape, job.up));
-    return {x, y, Cross(x, y)};
-  }
-  const Point z =
-      across(job.front.empty() ? LongestAcross(shape, x) : MeanDirection(shape, job.front));
-  return {x, Cross(z, x), z};
-}
-
-// Left, up and front together say which of the two shapes it is; else what hides what does.
-bool IsTurnedAround(const RigidMotion& rigid, const KeypointViews& job, const KeypointRows& views) {
-  if (job.up.empty() || job.front.empty()) return Nearer(rigid, views) < 0;
-  return Dot(Axes(rigid.shape, job)[1], MeanDirection(rigid.shape, job.up)) < 0;
-}
-
-double LargestDistance(const std::vector<Point>& shape) {
-  double largest = 0;
-  for (const Point& a : shape)
-    for (const Point& b : shape) largest = std::max(largest, Dot(a - b, a - b));
-  return std::sqrt(largest);
-}
-
-// To the object's axes, symmetric at x = 0, of largest distance 2. Cameras are to be fitted again.
-void Align(const KeypointViews& job, RigidMotion* rigid) {
-  const std::array<Point, 3> axes = Axes(rigid->shape, job);
-  std::vector<Point> turned, shape;
-  Point centre = {};
-  for (const Point& p : rigid->shape)
-    turned.push_back({Dot(axes[0], p), Dot(axes[1], p), Dot(axes[2], p)});
-  for (const Point& p : turned) centre = centre + (1.0 / static_cast<double>(turned.size())) * p;
-  for (std::size_t k = 0; k < turned.size(); ++k) {
-    const Point p = turned[k] - centre;
-    const Point m = turned[static_cast<std::size_t>(job.mirror[k])] - centre;
-    shape.push_back({0.5 * (p[0] - m[0]), 0.5 * (p[1] + m[1]), 0.5 * (p[2] + m[2])});
-  }
-  const double factor = 2 / std::max(LargestDistance(shape), 1e-12);
-  for (Point& p : shape) p = factor * p;
-  for (WeakPerspective& camera : rigid->cameras) {
-    const Mat3Array r = RotationOf(camera.quaternion);
-    Mat3Array product;
-    Point at = {};  // where the new origin is seen
-    for (std::size_t c = 0; c < 3; ++c) at = at + centre[c] * axes[c];
-    const Point seen = ProjectWeakly(camera, at);
-    for (std::size_t i = 0; i < 9; ++i)
-      product[i] = Dot({r[i / 3 * 3], r[i / 3 * 3 + 1], r[i / 3 * 3 + 2]}, axes[i % 3]);
-    camera = {camera.scale / factor, {seen[0], seen[1]}, QuaternionOf(product)};
-  }
-  rigid->shape = std::move(shape);
-}
-
-// Keypoints about their mean in units of the view's extent, so that all views have equal weight.
-struct Normalization {
-  double x = 0, y = 0, extent = 1;
-};
-
-Normalization NormalizationOf(const std::vector<Keypoint>& view) {
-  double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
-  for (const Keypoint& k : view) {
-    if (!k.visible) continue;
-    low[0] = std::min(low[0], k.x);
-    high[0] = std::max(high[0], k.x);
-    low[1] = std::min(low[1], k.y);
-    high[1] = std::max(high[1], k.y);
-  }
-  return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2,
-          std::max({high[0] - low[0], high[1] - low[1], 1e-9})};
-}
-
-std::vector<Keypoint> Normalized(std::vector<Keypoint> view, const Normalization& n) {
-  for (Keypoint& k : view) {
-    k.x = (k.x - n.x) / n.extent;
-    k.y = (k.y - n.y) / n.extent;
-  }
-  return view;
-}
-
-std::vector<Keypoint> MirroredView(const std::vector<Keypoint>& view,
-                                   const std::vector<int>& mirror) {
-  std::vector<Keypoint> out;
-  for (const int m : mirror) {
-    Keypoint k = view[static_cast<std::size_t>(m)];
-    k.x = -k.x;
-    out.push_back(k);
-  }
-  return out;
-}
-
-Status Check(const KeypointViews& job) {
-  if (job.views.size() < kFewestViews)
-    return InvalidArgument("cameras from keypoints need at least {} photographs, there are {}",
-                           kFewestViews, job.views.size());
-  if (job.left.empty())
-    return InvalidArgument("cameras from keypoints need a pair of left and right keypoints");
-  for (std::size_t v = 0; v < job.views.size(); ++v) {
-    const auto visible = std::ranges::count_if(job.views[v], &Keypoint::visible);
-    if (job.views[v].size() != job.mirror.size() ||
-        visible < static_cast<std::ptrdiff_t>(kFewestKeypoints))
-      return InvalidArgument(
-          "photograph {}: a camera needs at least {} visible keypoints, there "
-          "are {}",
-          v, kFewestKeypoints, visible);
-  }
-  return {};
-}
-
-}  // namespace
-
-std::vector<Point> LocateKeypoints(const KeypointRows& views,
-                                   const std::vector<WeakPerspective>& cameras) {
-  std::vector<Point> out(views.empty() ? 0 : views[0].size());
-  for (std::size_t k = 0; k < out.size(); ++k) out[k] = LocateKeypoint(views, cameras, k);
-  return out;
-}
-
-Result<Structure> FactorizeKeypoints(const KeypointViews& job) {
-  TILEGRAD_TRY(Check(job));
-  KeypointRows views;
-  std::vector<Normalization> normals;
-  for (const auto& view : job.views) {
-    normals.push_back(NormalizationOf(view));
-    views.push_back(Normalized(view, normals.back()));
-  }
-  for (std::size_t v = 0; v < job.views.size(); ++v)
-    views.push_back(MirroredView(views[v], job.mirror));
-  std::optional<RigidMotion> best;
-  for (int start = 0; start < kStarts; ++start) {
-    RigidMotion rigid = FindRigidMotion(views, static_cast<std::uint64_t>(start));
-    if (!best || rigid.squares < best->squares) best = std::move(rigid);
-  }
-  if (IsTurnedAround(*best, job, views)) TurnDepthAround(&*best);
-  Align(job, &*best);
-  Structure out{best->shape, {}, 0};
-  double squares = 0;
-  for (std::size_t v = 0; v < job.views.size(); ++v) {
-    const WeakPerspective camera = FitWeakCamera(out.shape, views[v], best->cameras[v]);
-    const double error = WeakCameraError(out.shape, views[v], camera);
-    squares += error * error;
-    const Normalization& n = normals[v];
-    out.cameras.push_back(
-        {camera.scale * n.extent,
-         {camera.translation[0] * n.extent + n.x, camera.translation[1] * n.extent + n.y},
-         camera.quaternion});
-  }
-  out.error = std::sqrt(squares / static_cast<double>(job.views.size()));
-  return out;
-}
-
-namespace {
-
-using points3::Cross, points3::Dot, points3::Point, points3::Unit, points3::operator+,
-    points3::operator*;
-using Views = KeypointRows;
-
 constexpr int kAffineRounds = 60, kRigidRounds = 40;
 constexpr double kRidge = 1e-3;  // of motions, relative to a view's weight
+
+// Before shapes are turned to an object's axes.
+struct RigidMotion {
+  std::vector<WeakPerspective> cameras;  // of the views
+  std::vector<Point> shape;
+  double squares = 0;  // of the residuals
+};
 
 // Two rows of a 3 x 3 map, and a shift.
 struct Motion {
@@ -384,9 +192,8 @@ RigidMotion MakeRigid(const Affine& affine, const Views& views) {
   std::vector<Motion> motions;
   for (const Motion& m : affine.motions) {
     Motion upgraded{{}, m.shift};
-    for (std::size_t r = 0; r < 2; ++r) {
+    for (std::size_t r = 0; r < 2; ++r)
       upgraded.rows[r] = {Dot(a[0], m.rows[r]), Dot(a[1], m.rows[r]), Dot(a[2], m.rows[r])};
-    }
     out.cameras.push_back(NearestCamera(upgraded));
     motions.push_back(MotionOf(out.cameras.back()));
   }
@@ -402,18 +209,205 @@ RigidMotion MakeRigid(const Affine& affine, const Views& views) {
   return out;
 }
 
-}  // namespace
-
+// Alternates least squares for each view's rows and shift and for the points, from a random start;
+// then finds the map that makes each view's rows orthogonal and of equal length; then alternates
+// cameras and points. Views should have about unit extent.
 RigidMotion FindRigidMotion(const Views& views, std::uint64_t seed) {
   return MakeRigid(Alternate(views, seed), views);
 }
 
-Point LocateKeypoint(const Views& views, const std::vector<WeakPerspective>& cameras,
-                     std::size_t k) {
+// How much nearer visible keypoints are than hidden ones, summed over the views.
+double Nearer(const RigidMotion& rigid, const Views& views) {
+  double sum = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    double depth[2] = {}, count[2] = {};
+    for (std::size_t k = 0; k < rigid.shape.size(); ++k) {
+      depth[views[v][k].visible] += ProjectWeakly(rigid.cameras[v], rigid.shape[k])[2];
+      count[views[v][k].visible] += 1;
+    }
+    if (count[0] > 0 && count[1] > 0) sum += depth[0] / count[0] - depth[1] / count[1];
+  }
+  return sum;
+}
+
+// The same pictures of the shape with its depth turned around.
+void TurnDepthAround(RigidMotion* rigid) {
+  for (Point& p : rigid->shape) p[2] = -p[2];
+  for (WeakPerspective& c : rigid->cameras) {
+    const auto& [w, x, y, z] = c.quaternion;
+    c.quaternion = {w, -x, -y, z};
+  }
+}
+
+Point MeanDirection(const std::vector<Point>& shape,
+                    const std::vector<std::pair<int, int>>& pairs) {
+  Point sum = {};
+  for (const auto& [from, to] : pairs)
+    sum = sum + Unit(shape[static_cast<std::size_t>(to)] - shape[static_cast<std::size_t>(from)]);
+  return sum;
+}
+
+// Without names for up and front: along the longest way through the shape across x.
+Point LongestAcross(const std::vector<Point>& shape, const Point& x) {
+  Point best = {}, mean = {};
+  for (const Point& p : shape) mean = mean + (1.0 / static_cast<double>(shape.size())) * p;
+  for (const Point& p : shape) {
+    const Point across = (p - mean) - Dot(p - mean, x) * x;
+    if (Dot(across, across) > Dot(best, best)) best = across;
+  }
+  return best;
+}
+
+// Rows: the object's axes in the shape's coordinates, right-handed. The front counts before what is
+// up: it is farther away.
+std::array<Point, 3> Axes(const std::vector<Point>& shape, const KeypointViews& job) {
+  const Point x = Unit(MeanDirection(shape, job.left));
+  const auto across = [&](const Point& d) { return Unit(d - Dot(d, x) * x); };
+  if (job.front.empty() && !job.up.empty()) {
+    const Point y = across(MeanDirection(shape, job.up));
+    return {x, y, Cross(x, y)};
+  }
+  const Point z =
+      across(job.front.empty() ? LongestAcross(shape, x) : MeanDirection(shape, job.front));
+  return {x, Cross(z, x), z};
+}
+
+// Left, up and front together say which of the two shapes it is; else what hides what does.
+bool IsTurnedAround(const RigidMotion& rigid, const KeypointViews& job, const Views& views) {
+  if (job.up.empty() || job.front.empty()) return Nearer(rigid, views) < 0;
+  return Dot(Axes(rigid.shape, job)[1], MeanDirection(rigid.shape, job.up)) < 0;
+}
+
+double LargestDistance(const std::vector<Point>& shape) {
+  double largest = 0;
+  for (const Point& a : shape)
+    for (const Point& b : shape) largest = std::max(largest, Dot(a - b, a - b));
+  return std::sqrt(largest);
+}
+
+// To the object's axes, symmetric at x = 0, of largest distance 2. Cameras are to be fitted again.
+void Align(const KeypointViews& job, RigidMotion* rigid) {
+  const std::array<Point, 3> axes = Axes(rigid->shape, job);
+  std::vector<Point> turned, shape;
+  Point centre = {};
+  for (const Point& p : rigid->shape)
+    turned.push_back({Dot(axes[0], p), Dot(axes[1], p), Dot(axes[2], p)});
+  for (const Point& p : turned) centre = centre + (1.0 / static_cast<double>(turned.size())) * p;
+  for (std::size_t k = 0; k < turned.size(); ++k) {
+    const Point p = turned[k] - centre;
+    const Point m = turned[static_cast<std::size_t>(job.mirror[k])] - centre;
+    shape.push_back({0.5 * (p[0] - m[0]), 0.5 * (p[1] + m[1]), 0.5 * (p[2] + m[2])});
+  }
+  const double factor = 2 / std::max(LargestDistance(shape), 1e-12);
+  for (Point& p : shape) p = factor * p;
+  for (WeakPerspective& camera : rigid->cameras) {
+    const Mat3Array r = RotationOf(camera.quaternion);
+    Mat3Array product;
+    Point at = {};  // where the new origin is seen
+    for (std::size_t c = 0; c < 3; ++c) at = at + centre[c] * axes[c];
+    const Point seen = ProjectWeakly(camera, at);
+    for (std::size_t i = 0; i < 9; ++i)
+      product[i] = Dot({r[i / 3 * 3], r[i / 3 * 3 + 1], r[i / 3 * 3 + 2]}, axes[i % 3]);
+    camera = {camera.scale / factor, {seen[0], seen[1]}, QuaternionOf(product)};
+  }
+  rigid->shape = std::move(shape);
+}
+
+// Keypoints about their mean in units of the view's extent, so that all views have equal weight.
+struct Normalization {
+  double x = 0, y = 0, extent = 1;
+};
+
+Normalization NormalizationOf(const std::vector<Keypoint>& view) {
+  double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
+  for (const Keypoint& k : view) {
+    if (!k.visible) continue;
+    low[0] = std::min(low[0], k.x);
+    high[0] = std::max(high[0], k.x);
+    low[1] = std::min(low[1], k.y);
+    high[1] = std::max(high[1], k.y);
+  }
+  return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2,
+          std::max({high[0] - low[0], high[1] - low[1], 1e-9})};
+}
+
+std::vector<Keypoint> Normalized(std::vector<Keypoint> view, const Normalization& n) {
+  for (Keypoint& k : view) {
+    k.x = (k.x - n.x) / n.extent;
+    k.y = (k.y - n.y) / n.extent;
+  }
+  return view;
+}
+
+std::vector<Keypoint> MirroredView(const std::vector<Keypoint>& view,
+                                   const std::vector<int>& mirror) {
+  std::vector<Keypoint> out;
+  for (const int m : mirror) {
+    Keypoint k = view[static_cast<std::size_t>(m)];
+    k.x = -k.x;
+    out.push_back(k);
+  }
+  return out;
+}
+
+Status Check(const KeypointViews& job) {
+  if (job.views.size() < kFewestViews)
+    return InvalidArgument("cameras from keypoints need at least {} photographs, there are {}",
+                           kFewestViews, job.views.size());
+  if (job.left.empty())
+    return InvalidArgument("cameras from keypoints need a pair of left and right keypoints");
+  for (std::size_t v = 0; v < job.views.size(); ++v) {
+    const auto visible = std::ranges::count_if(job.views[v], &Keypoint::visible);
+    if (job.views[v].size() != job.mirror.size() ||
+        visible < static_cast<std::ptrdiff_t>(kFewestKeypoints))
+      return InvalidArgument(
+          "photograph {}: a camera needs at least {} visible keypoints, there are {}", v,
+          kFewestKeypoints, visible);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<Point> LocateKeypoints(const std::vector<std::vector<Keypoint>>& views,
+                                   const std::vector<WeakPerspective>& cameras) {
   std::vector<Motion> motions;
   for (const WeakPerspective& camera : cameras) motions.push_back(MotionOf(camera));
-  Point out = {};
-  FitPoint(motions, views, k, &out);
+  std::vector<Point> out(views.empty() ? 0 : views[0].size());
+  for (std::size_t k = 0; k < out.size(); ++k) FitPoint(motions, views, k, &out[k]);
+  return out;
+}
+
+Result<Structure> FactorizeKeypoints(const KeypointViews& job) {
+  TILEGRAD_TRY(Check(job));
+  Views views;
+  std::vector<Normalization> normals;
+  for (const auto& view : job.views) {
+    normals.push_back(NormalizationOf(view));
+    views.push_back(Normalized(view, normals.back()));
+  }
+  for (std::size_t v = 0; v < job.views.size(); ++v)
+    views.push_back(MirroredView(views[v], job.mirror));
+  std::optional<RigidMotion> best;
+  for (int start = 0; start < kStarts; ++start) {
+    RigidMotion rigid = FindRigidMotion(views, static_cast<std::uint64_t>(start));
+    if (!best || rigid.squares < best->squares) best = std::move(rigid);
+  }
+  if (IsTurnedAround(*best, job, views)) TurnDepthAround(&*best);
+  Align(job, &*best);
+  Structure out{best->shape, {}, 0};
+  double squares = 0;
+  for (std::size_t v = 0; v < job.views.size(); ++v) {
+    const WeakPerspective camera = FitWeakCamera(out.shape, views[v], best->cameras[v]);
+    const double error = WeakCameraError(out.shape, views[v], camera);
+    squares += error * error;
+    const Normalization& n = normals[v];
+    out.cameras.push_back(
+        {camera.scale * n.extent,
+         {camera.translation[0] * n.extent + n.x, camera.translation[1] * n.extent + n.y},
+         camera.quaternion});
+  }
+  out.error = std::sqrt(squares / static_cast<double>(job.views.size()));
   return out;
 }
 

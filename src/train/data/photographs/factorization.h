@@ -31,9 +31,8 @@ struct Structure {
   double error = 0;  // root mean square over visible keypoints, in units of a view's extent
 };
 
-// Orthographic positions cannot distinguish a shape from its reflection in depth: without all three
-// axes, visible keypoints are taken to be nearer than hidden ones. InvalidArgument where there are
-// too few views or keypoints.
+// Orthographic positions cannot tell a shape from its reflection in depth: without all three axes,
+// visible keypoints count as nearer than hidden ones. InvalidArgument: too few views or keypoints.
 Result<Structure> FactorizeKeypoints(const KeypointViews& job);
 
 // Triangulates the keypoints from known cameras, by least squares over all views; the origin for a
@@ -48,25 +47,5 @@ WeakPerspective FitWeakCamera(const std::vector<std::array<double, 3>>& shape,
 // Root mean square of the distances in pixels.
 double WeakCameraError(const std::vector<std::array<double, 3>>& shape,
                        const std::vector<Keypoint>& keypoints, const WeakPerspective& camera);
-
-// The alternation behind FactorizeKeypoints, before shapes are rotated to an object's axes.
-
-using KeypointRows = std::vector<std::vector<Keypoint>>;  // [view][keypoint]
-
-struct RigidMotion {
-  std::vector<WeakPerspective> cameras;  // of the views
-  std::vector<std::array<double, 3>> shape;
-  double squares = 0;  // of the residuals
-};
-
-// Alternates least squares for each view's rows and shift and for the points, from a random start;
-// then finds the map that makes each view's rows orthogonal and of equal length; then alternates
-// cameras and points. Views should have about unit extent.
-RigidMotion FindRigidMotion(const KeypointRows& views, std::uint64_t seed);
-
-// Triangulates one keypoint from known cameras, by least squares over the views that see it; the
-// origin if none does.
-std::array<double, 3> LocateKeypoint(const KeypointRows& views,
-                                     const std::vector<WeakPerspective>& cameras, std::size_t k);
 
 }  // namespace tilegrad::train

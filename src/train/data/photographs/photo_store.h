@@ -48,10 +48,10 @@ struct CropDraw {
 
 class PhotoStore {
  public:
-  // Reads and crops the pictures of `photographs` (indices into set.photographs, whose store they
-  // share). A pixel beyond a picture's edge is white, as CMR's. Memory: 1.44 size^2 * 4 bytes a
-  // photograph, on disk where they are many (aligned.h). Errors name the file: one that
-  // cannot be read, or whose size is not its mask's.
+  // Reads and crops the pictures of `photographs` (indices into set.photographs, which outlives
+  // it). Pixels beyond an edge are white, as CMR's. Memory: 1.44 size^2 * 4 bytes a photograph, on
+  // disk where they are many (aligned.h). Errors name a file that is unreadable or not of its
+  // mask's size.
   static Result<PhotoStore> Load(const PhotographSet& set, const std::vector<int>& photographs,
                                  const CropRule& rule, int size, const Workers& workers,
                                  const Watch& watch);

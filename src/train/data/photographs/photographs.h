@@ -92,6 +92,12 @@ Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder,
                                                    BrokenMembers* broken = nullptr);
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder);
 
+// Annotations in CMR's layout, which OpenCmrLayout reads: <folder>/data and <folder>/sfm. `set`: of
+// source "cub" (fifteen keypoints) or "pascal3d" with its class, with a mask and a camera for every
+// photograph. Photographs are those of their split, in their order; their ids are the paths below
+// the folder of pictures. The caller writes the pictures.
+Status WriteCmrLayout(const Path& folder, const PhotographSet& set);
+
 // CUB's fifteen keypoints.
 extern const std::array<const char*, 15> kCubKeypoints;
 std::vector<int> CubMirror();

@@ -2,8 +2,11 @@
 #include "train/data/photographs/rendered_set.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <memory>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/try_all.h"
@@ -13,14 +16,47 @@
 #include "render/picture/picture.h"
 #include "scene/shapes.h"
 #include "scene/shrink_image.h"
-#include "train/data/photographs/cmr_writer.h"
-#include "train/data/photographs/extreme_points.h"
+#include "train/data/photographs/distance_barrier.h"
 #include "train/data/photographs/factorization.h"
+#include "train/data/photographs/photographs.h"
 #include "train/points3.h"
 #include "train/similarity.h"
 
 namespace tilegrad::train {
 namespace {
+
+// A sum of waves, of unit variance.
+class SmoothNoise {
+ public:
+  explicit SmoothNoise(Rng& rng) {
+    for (Wave& wave : waves_) {
+      const double turn = rng.Uniform(0, 2 * std::numbers::pi), length = rng.Uniform(12, 50);
+      wave = {2 * std::numbers::pi * std::cos(turn) / length,
+              2 * std::numbers::pi * std::sin(turn) / length, rng.Uniform(0, 2 * std::numbers::pi)};
+    }
+  }
+  double At(int x, int y) const {
+    double sum = 0;
+    for (const Wave& wave : waves_) sum += std::cos(wave.x * x + wave.y * y + wave.phase);
+    return sum * std::sqrt(2.0 / static_cast<double>(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    double x, y, phase;
+  };
+  std::array<Wave, 8> waves_;
+};
+
+// Distances are of squares: the mask in the upper left corner of one.
+std::vector<float> InSquare(const PhotoMask& mask, int side) {
+  std::vector<float> out(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), 0.0f);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x)
+      out[static_cast<std::size_t>(y * side + x)] = mask.at(x, y) ? 1.0f : 0.0f;
+  }
+  return out;
+}
 
 using points3::Point, points3::operator+, points3::operator*;
 
@@ -225,6 +261,70 @@ void TellTruth(PhotographSet* set) {
 }
 
 }  // namespace
+
+PhotoMask DisturbedMask(const PhotoMask& mask, double deviation, Rng& rng) {
+  const int side = std::max(mask.width, mask.height);
+  const std::vector<float> square = InSquare(mask, side);
+  const auto to_object = SquaredDistances(square, side, true),
+             to_rest = SquaredDistances(square, side, false);
+  const double shift = deviation * rng.Normal() / 2;
+  const SmoothNoise noise(rng);
+  PhotoMask out = mask;
+  bool any = false;
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      const auto i = static_cast<std::size_t>(y * side + x);
+      const double outside = std::sqrt(to_object[i]) - std::sqrt(to_rest[i]);
+      const bool inside = outside < shift + deviation * noise.At(x, y);
+      out.inside[static_cast<std::size_t>(y) * static_cast<std::size_t>(mask.width) +
+                 static_cast<std::size_t>(x)] = inside;
+      any = any || inside;
+    }
+  }
+  return any ? out : mask;
+}
+
+const std::array<ExtremePoint, 12> kExtremePoints = {{{"left front bumper", {1, -1, 1}},
+                                                      {"right front bumper", {-1, -1, 1}},
+                                                      {"left back bumper", {1, -1, -1}},
+                                                      {"right back bumper", {-1, -1, -1}},
+                                                      {"left front light", {1, 0.2f, 1.5f}},
+                                                      {"right front light", {-1, 0.2f, 1.5f}},
+                                                      {"left trunk", {1, 0.2f, -1.5f}},
+                                                      {"right trunk", {-1, 0.2f, -1.5f}},
+                                                      {"left windshield", {0.6f, 1.5f, 0.4f}},
+                                                      {"right windshield", {-0.6f, 1.5f, 0.4f}},
+                                                      {"left rear window", {0.6f, 1.5f, -0.4f}},
+                                                      {"right rear window", {-0.6f, 1.5f, -0.4f}}}};
+
+std::vector<int> ExtremeMirror() {
+  std::vector<int> out;
+  for (int k = 0; k < static_cast<int>(kExtremePoints.size()); ++k) out.push_back(k ^ 1);
+  return out;
+}
+
+std::vector<glm::vec3> FindExtremePoints(const Mesh& mesh) {
+  const Bounds bounds = MeshBounds(mesh);
+  const glm::vec3 centre = 0.5f * (bounds.low + bounds.high);
+  const glm::vec3 half = glm::max(0.5f * (bounds.high - bounds.low), glm::vec3(1e-6f));
+  std::vector<glm::vec3> out;
+  for (const ExtremePoint& point : kExtremePoints) {
+    const glm::vec3 along =
+        glm::vec3(point.direction[0], point.direction[1], point.direction[2]) / half;
+    float farthest = -1e30f;
+    for (const glm::vec3& p : mesh.positions)
+      farthest = std::max(farthest, glm::dot(along, p - centre));
+    glm::vec3 sum(0);
+    float count = 0;
+    for (const glm::vec3& p : mesh.positions) {
+      if (glm::dot(along, p - centre) < farthest - 0.01f) continue;
+      sum += p;
+      count += 1;
+    }
+    out.push_back(sum / count);
+  }
+  return out;
+}
 
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const Watch& watch) {

@@ -84,14 +84,8 @@ class FolderList {
 
   void Add(const Path& class_folder, const Path& file) {
     const std::string stem = file.stem().string();
-    entries.push_back({SafeFileName(class_folder.filename().string()),
-                       SafeFileName(stem),
-                       stem,
-                       "",
-                       "",
-                       file.string(),
-                       {},
-                       {}});
+    entries.push_back({SafeFileName(class_folder.filename().string()), SafeFileName(stem), stem, "",
+                       "", file.string()});
   }
 };
 

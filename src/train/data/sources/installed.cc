@@ -19,13 +19,8 @@ std::vector<std::string> NamesIn(const std::string& name) {
     for (const InstalledSource& source : kSources) names.emplace_back(source.name);
     return names;
   }
-  std::string_view rest = name;
-  while (true) {
-    const std::size_t end = rest.find('+');
-    names.emplace_back(rest.substr(0, end));
-    if (end == std::string_view::npos) return names;
-    rest.remove_prefix(end + 1);
-  }
+  for (const std::string_view one : SplitText(name, '+')) names.emplace_back(one);
+  return names;
 }
 
 // Reports wrong names before missing packages.

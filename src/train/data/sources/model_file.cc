@@ -33,9 +33,8 @@ bool Matches(const ArrayShape& shape, const ArrayShape& wanted) {
 template <class T>
 Result<std::vector<T>> Take(const NpyArray& array, const std::string& name,
                             const ArrayShape& wanted) {
-  if (!Matches(array.shape, wanted)) {
+  if (!Matches(array.shape, wanted))
     return DataLoss("array \"{}\" does not have the shape that dataset.json declares", name);
-  }
   auto values = array.As<T>();
   if (!values.ok()) return values.status().Within(fmt::format("array \"{}\"", name));
   return values;
@@ -53,9 +52,8 @@ template <class Vector>
 Status TakeVectors(const NpzArrays& arrays, const std::string& name, std::vector<Vector>* out) {
   const std::size_t width = sizeof(Vector) / sizeof(float);
   TILEGRAD_ASSIGN(const std::vector<float> values, Take<float>(arrays, name, {kAny, width}));
-  if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
+  if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); }))
     return DataLoss("array \"{}\" holds a number that is not finite", name);
-  }
   out->resize(values.size() / width);
   std::copy(values.begin(), values.end(), reinterpret_cast<float*>(out->data()));
   return {};
@@ -63,18 +61,16 @@ Status TakeVectors(const NpzArrays& arrays, const std::string& name, std::vector
 
 Status TakeFaces(const NpzArrays& arrays, std::vector<Face>* out) {
   TILEGRAD_ASSIGN(const auto values, Take<std::int32_t>(arrays, "mesh_faces", {kAny, 3}));
-  for (std::size_t i = 0; i < values.size(); i += 3) {
+  for (std::size_t i = 0; i < values.size(); i += 3)
     out->push_back({values[i], values[i + 1], values[i + 2]});
-  }
   return {};
 }
 
 Status TakeOccupancy(const NpzArrays& arrays, std::vector<std::uint8_t>* out) {
   const std::size_t n = kOccupancyResolution;
   TILEGRAD_ASSIGN(*out, Take<std::uint8_t>(arrays, "occupancy", {n, n, n}));
-  if (std::any_of(out->begin(), out->end(), [](std::uint8_t v) { return v > 1; })) {
+  if (std::any_of(out->begin(), out->end(), [](std::uint8_t v) { return v > 1; }))
     return DataLoss("array \"occupancy\" holds a value other than 0 and 1");
-  }
   return {};
 }
 

@@ -28,9 +28,8 @@ Result<std::vector<Path>> ListFolder(const Path& folder) {
   std::error_code error;
   std::vector<Path> out;
   std::filesystem::directory_iterator at(folder, error);
-  for (; !error && at != std::filesystem::directory_iterator(); at.increment(error)) {
+  for (; !error && at != std::filesystem::directory_iterator(); at.increment(error))
     out.push_back(at->path());
-  }
   if (error) return NotFound("{}: cannot list the folder: {}", folder.string(), error.message());
   std::sort(out.begin(), out.end());
   return out;
@@ -46,6 +45,16 @@ std::string SafeFileName(const std::string& text) {
   return hidden ? "_" + out : out;
 }
 
+std::vector<std::string_view> SplitText(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t end; (end = text.find(separator)) != std::string_view::npos;) {
+    parts.push_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  parts.push_back(text);
+  return parts;
+}
+
 void ModelSource::ForgetEntries() {
   files_.reserve(entries_.size());
   for (SourceEntry& entry : entries_) files_.push_back(std::move(entry.file));
@@ -59,9 +68,8 @@ void SortEntries(std::vector<SourceEntry>* entries) {
   std::set<std::pair<std::string, std::string>> taken;
   for (SourceEntry& entry : *entries) {
     const std::string base = entry.id;
-    for (int n = 2; !taken.emplace(entry.class_name, entry.id).second; ++n) {
+    for (int n = 2; !taken.emplace(entry.class_name, entry.id).second; ++n)
       entry.id = base + "-" + std::to_string(n);
-    }
   }
   std::sort(entries->begin(), entries->end(),
             [&](const SourceEntry& a, const SourceEntry& b) { return key(a) < key(b); });

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -21,8 +22,8 @@ struct SourceEntry {
   std::string class_name;  // safe as a file name
   std::string id;          // unique in its class, safe as a file name
   std::string name, license, creator;
-  std::string file;            // for reports
-  std::optional<Split> split;  // where the source fixes it
+  std::string file;                 // for reports
+  std::optional<Split> split = {};  // where the source fixes it
   // The same for all entries of a class that are one shape with other textures; empty: its own.
   std::string shape = {};
 };
@@ -78,8 +79,14 @@ class ModelSource {
   std::vector<std::string> files_;  // of entries that are forgotten
 };
 
-// Parametric furniture, lamps, cars and planes (procedural.h), `per_class` of each.
+// Parametric coloured models from a few families, `per_class` of each, so that tests and demos need
+// no files.
 std::unique_ptr<ModelSource> ProceduralSource(int per_class, std::uint64_t seed);
+const std::vector<std::string>& ProceduralClasses();  // car, chair, lamp, plane, table
+// The `index`-th model of a class: a pure function of (class_index, index, seed). y up, front
+// towards +z, about one unit tall, vertex colours, a soup of closed overlapping parts as modelled
+// furniture is.
+Mesh ProceduralModel(int class_index, std::uint64_t index, std::uint64_t seed);
 
 // The eleven classes of data/sweethome3d_classes.tsv from the libraries LIBRARY.sh3f in `folder`.
 // Errors: no library there (names the package), or one cannot be opened.
@@ -133,6 +140,9 @@ Result<std::vector<Path>> ListFolder(const Path& folder);
 
 // Turns any text into a file name: letters, digits, '.', '-' and '_' stay, the rest becomes '_'.
 std::string SafeFileName(const std::string& text);
+
+// The parts of `text` between separators; views of it, one more than there are separators.
+std::vector<std::string_view> SplitText(std::string_view text, char separator);
 
 // Sorts by class, then id, and makes ids unique in their class by appending "-2", "-3", ...
 void SortEntries(std::vector<SourceEntry>* entries);

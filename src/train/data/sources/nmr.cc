@@ -28,9 +28,8 @@ struct NmrPart {
 // The one array of a file, whatever its name; [N] + `item` in shape.
 Result<io::NpyArray> LoadOnlyArray(const Path& path, const std::vector<std::size_t>& item) {
   TILEGRAD_ASSIGN(io::NpzArrays arrays, io::LoadNpz(path));
-  if (arrays.size() != 1) {
+  if (arrays.size() != 1)
     return DataLoss("{}: expected one array, got {}", path.string(), arrays.size());
-  }
   io::NpyArray array = std::move(arrays.begin()->second);
   const bool bytes = io::NpyTypeSize(array.type) == 1;
   if (!bytes || array.shape.size() != item.size() + 1 ||
@@ -50,9 +49,8 @@ std::vector<std::uint8_t> ToOurFrame(const std::uint8_t* grid) {
   out.reserve(kVoxelSide * kVoxelSide * kVoxelSide);
   for (std::size_t x = 0; x < kVoxelSide; ++x) {
     for (std::size_t y = 0; y < kVoxelSide; ++y) {
-      for (std::size_t z = 0; z < kVoxelSide; ++z) {
+      for (std::size_t z = 0; z < kVoxelSide; ++z)
         out.push_back(grid[(y * kVoxelSide + (kVoxelSide - 1 - z)) * kVoxelSide + x] != 0);
-      }
     }
   }
   return out;
@@ -72,8 +70,7 @@ class Nmr : public ModelSource {
     for (std::size_t i = 0; i < voxels.shape[0]; ++i) {
       const std::string id = fmt::format("{}-{:05}", SplitName(part.split), i);
       const std::string file = fmt::format("{}: [{}]", part.images.string(), i);
-      entries_.push_back(
-          {part.class_name, id, id, "ShapeNet terms of use", "", file, part.split, {}});
+      entries_.push_back({part.class_name, id, id, "ShapeNet terms of use", "", file, part.split});
       places_[file] = {parts_.size(), i};
     }
     parts_.push_back(std::move(part));
@@ -93,10 +90,9 @@ class Nmr : public ModelSource {
   Result<SourceModel> Load(std::size_t entry) const override {
     const auto& [part, row] = places_.at(FileOf(entry));
     TILEGRAD_ASSIGN(const auto arrays, Fetch(part));
-    if (row >= arrays->images.shape[0]) {
+    if (row >= arrays->images.shape[0])
       return DataLoss("{}: {} models, but its voxels are {}", parts_[part].images.string(),
                       arrays->images.shape[0], arrays->voxels.shape[0]);
-    }
     constexpr std::size_t kImageBytes = kNmrViews * 4 * kSize * kSize;
     const auto* images = arrays->images.data.data() + row * kImageBytes;
     ModelData data;
@@ -177,10 +173,9 @@ Result<std::unique_ptr<ModelSource>> NmrSource(const Path& folder) {
   for (const Path& file : files) {
     if (auto part = ParsePart(file)) TILEGRAD_TRY(source->Add(std::move(*part)));
   }
-  if (source->entries().empty()) {
+  if (source->entries().empty())
     return NotFound("{}: expected <class>_<train|val|test>_images.npz and _voxels.npz",
                     folder.string());
-  }
   source->Sort();
   return std::unique_ptr<ModelSource>(std::move(source));
 }

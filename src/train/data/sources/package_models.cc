@@ -5,22 +5,87 @@
 #include <array>
 #include <glm/geometric.hpp>
 #include <map>
+#include <span>
 #include <string_view>
 #include <vector>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "base/text.h"
+#include "io/image_file.h"
+#include "io/mesh_file.h"
 #include "io/sh3f.h"
 #include "io/text_scan.h"
 #include "scene/mesh.h"
 #include "scene/shapes.h"
-#include "train/data/sources/package_textures.h"
-#include "train/data/sources/split_text.h"
 #include "train/data/split.h"
 
 namespace tilegrad::train {
 namespace {
+
+// Images of `folder` stand in for those of the same name elsewhere.
+class WithTextures : public io::FileSource {
+ public:
+  WithTextures(const io::FileSource& files, const std::string& folder)
+      : files_(files), folder_(folder) {}
+  Result<Bytes> Read(const std::string& name) const override { return files_.Read(Find(name)); }
+  bool Exists(const std::string& name) const override { return files_.Exists(Find(name)); }
+  std::string Describe(const std::string& name) const override {
+    return files_.Describe(Find(name));
+  }
+
+ private:
+  std::string Find(const std::string& name) const {
+    const std::string here = (Path(folder_) / Path(name).filename()).string();
+    return files_.Exists(here) ? here : name;
+  }
+
+  const io::FileSource& files_;
+  const std::string& folder_;
+};
+
+// Replaces the file's materials, and drops warnings about them.
+Status Paint(const io::FileSource& files, const std::string& image, io::LoadedMesh* loaded) {
+  TILEGRAD_ASSIGN(const Bytes bytes, files.Read(image));
+  TILEGRAD_ASSIGN(ImageU8 pixels, io::DecodeImage(bytes, files.Describe(image)));
+  Mesh& mesh = loaded->mesh;
+  if (mesh.corner_uvs.empty()) return DataLoss("{}: has no uv", files.Describe(image));
+  mesh.textures = {{image, io::ToColor(std::move(pixels))}};
+  mesh.materials.assign(1, {});
+  mesh.materials[0].base_color = glm::vec4(1);
+  mesh.materials[0].base_color_texture = 0;
+  mesh.face_materials.clear();
+  loaded->warnings.clear();
+  return {};
+}
+
+// Folders of the archive that match the parts of a pattern, named by what its stars match.
+void Match(const Path& archive, const Path& at, std::span<const Path> parts,
+           const std::string& name, std::vector<TextureSet>* out) {
+  if (parts.empty()) return;
+  const Path& part = parts.front();
+  if (part != "*") {
+    if (parts.size() > 1) return Match(archive, at / part, parts.subspan(1), name, out);
+    if (PathExists(archive / at / part)) out->push_back({name, at.string(), ""});
+    return;
+  }
+  const auto folders = ListFolder(archive / at);
+  if (!folders.ok()) return;
+  for (const Path& folder : *folders) {
+    if (!IsFolder(folder)) continue;
+    const std::string own = folder.filename().string();
+    Match(archive, at / own, parts.subspan(1), name.empty() ? own : name + "-" + own, out);
+  }
+}
+
+// Loads a mesh with one of its sets of textures.
+Result<io::LoadedMesh> LoadWithTextures(const io::FileSource& files, const std::string& model,
+                                        const TextureSet& textures) {
+  if (!textures.folder.empty()) return io::LoadMesh(WithTextures(files, textures.folder), model);
+  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(files, model));
+  if (!textures.image.empty()) TILEGRAD_TRY(Paint(files, textures.image, &loaded));
+  return loaded;
+}
 
 struct Wheel {
   glm::vec3 centre;  // in the file's frame and units
@@ -41,10 +106,9 @@ Mesh Disc(float radius, float width, glm::vec4 color) {
 
 // "x y z radius width", several separated by '|'.
 Result<std::vector<Wheel>> ReadWheels(std::string_view text) {
-  std::vector<Wheel> wheels;
-  while (!text.empty()) {
-    std::string_view part = text.substr(0, text.find('|'));
-    text.remove_prefix(std::min(text.size(), part.size() + 1));
+  std::vector<Wheel> wheels = {};
+  if (text.empty()) return wheels;
+  for (std::string_view part : SplitText(text, '|')) {
     Wheel wheel;
     for (float* value :
          {&wheel.centre.x, &wheel.centre.y, &wheel.centre.z, &wheel.radius, &wheel.width}) {
@@ -90,11 +154,11 @@ using WordList = std::vector<std::string_view>;
 // A line of a list.
 struct PackageRow {
   std::string class_name, shape, name, package, license, model;
-  std::string_view front, up;     // axes of the file: "-x", "z", ...
-  std::vector<std::string> with;  // other files of the same model
-  WordList without;               // as PackageList::without
-  std::string_view textures;      // package_textures.h
-  std::vector<Wheel> wheels;
+  std::string_view front, up;          // axes of the file: "-x", "z", ...
+  std::vector<std::string> with = {};  // other files of the same model
+  WordList without = {};               // as PackageList::without
+  std::string_view textures;           // FindTextureSets
+  std::vector<Wheel> wheels = {};
 };
 
 Result<std::vector<PackageRow>> ReadPackageRows(const PackageList& list) {
@@ -114,10 +178,7 @@ Result<std::vector<PackageRow>> ReadPackageRows(const PackageList& list) {
                    .model = std::string(part[5]),
                    .front = part[6],
                    .up = part[7],
-                   .with = {},
-                   .without = {},
-                   .textures = part[10],
-                   .wheels = {}};
+                   .textures = part[10]};
     TILEGRAD_ASSIGN(row.wheels, ReadWheels(part[11]));
     if (!part[8].empty()) {
       for (const auto file : SplitText(part[8], '|')) row.with.emplace_back(file);
@@ -225,12 +286,11 @@ class Models : public ModelSource {
       found = found || files->Exists(row.model);
       Add(row, folder ? archive : Path());
     }
-    if (!found) {
+    if (!found)
       return NotFound(
           "{}: models not found; install them with `sudo apt-get install --no-install-recommends "
           "{}`",
           archive.string(), package.name);
-    }
     facts_.credits.emplace_back(package.credit);
     return {};
   }
@@ -245,9 +305,8 @@ class Models : public ModelSource {
                         set.empty() ? row.name : row.name + ", " + set,
                         row.license,
                         "",
-                        file,
-                        {},
-                        row.shape};
+                        file};
+      entry.shape = row.shape;
       entries_.push_back(std::move(entry));
       items_[file] = {row, std::move(textures)};
     }
@@ -283,6 +342,24 @@ Result<std::unique_ptr<ModelSource>> ShipsSource(const Path& games) {
 
 Result<std::unique_ptr<ModelSource>> CarsSource(const Path& games) {
   return PackageModels({"cars", CarsList(), {}}, games);
+}
+
+std::vector<TextureSet> FindTextureSets(std::string_view column, const Path& archive) {
+  std::vector<TextureSet> sets;
+  if (column.empty()) return {TextureSet()};
+  for (const std::string_view text : SplitText(column, '|')) {
+    const std::string part(text);
+    if (part == ".") {
+      sets.emplace_back();
+    } else if (part.starts_with('=')) {
+      sets.push_back({Path(part).stem().string(), "", part.substr(1)});
+    } else {
+      const Path path(part);
+      const std::vector<Path> parts(path.begin(), path.end());
+      Match(archive, "", parts, "", &sets);
+    }
+  }
+  return sets;
 }
 
 }  // namespace tilegrad::train

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/data/sources/procedural.h"
 
 #include <algorithm>
 #include <cmath>
@@ -176,15 +175,13 @@ Mesh Table(Dice& dice) {
   if (kind == 0) {
     Pedestal(dice, out, round ? w : d, height, legs);
   } else if (kind == 1 && !round) {  // two side panels
-    for (float side : {-1.0f, 1.0f}) {
+    for (float side : {-1.0f, 1.0f})
       out.Box({side * (w - 0.06f), height / 2, 0}, {0.04f, height, 1.8f * d}, legs);
-    }
   } else {
     Legs(dice, out, reach, reach_z, height, legs);
   }
-  if (kind != 0 && dice.Chance(0.35)) {
+  if (kind != 0 && dice.Chance(0.35))
     out.Box({0, height * dice.Between(0.2, 0.5), 0}, {1.9f * reach, 0.02f, 1.9f * reach_z}, top);
-  }
   if (round) {
     out.Rod({0, height, 0}, {0, height + thick, 0}, w, w, top);
   } else {
@@ -326,7 +323,7 @@ class Procedural : public ModelSource {
     for (const std::string& name : ProceduralClasses()) {
       for (int i = 0; i < per_class; ++i) {
         const std::string id = fmt::format("{}-{:05}", name, i);
-        entries_.push_back({name, id, id, "Apache-2.0", "tilegrad", "built in", {}, {}});
+        entries_.push_back({name, id, id, "Apache-2.0", "tilegrad", "built in"});
       }
     }
   }

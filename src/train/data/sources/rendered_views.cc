@@ -27,10 +27,9 @@ Result<std::vector<std::uint8_t>> LoadRenderedView(const RenderedView& view, int
     TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(view.mask));
     TILEGRAD_ASSIGN(image, WithMask(image, HardMask(mask)));
   }
-  if (image.width != image.height || image.width < size) {
+  if (image.width != image.height || image.width < size)
     return InvalidArgument("{} x {} pixels, not a square of --size {} or more", image.width,
                            image.height, size);
-  }
   return PrepareCutout(image, size, Framing::kKeep);
 }
 
@@ -93,8 +92,7 @@ Status CheckTogether(const ModelData& data, double half_extent, int size) {
   if (mask.IsNear(voxels, kVoxelsApart * per_voxel)) return {};
   return DataLoss(
       "the voxels are elsewhere than the first picture shows, or of another size: columns {:.0f} "
-      "to "
-      "{:.0f} and rows {:.0f} to {:.0f} of {}, the picture has {:.0f} to {:.0f} and {:.0f} to "
+      "to {:.0f} and rows {:.0f} to {:.0f} of {}, the picture has {:.0f} to {:.0f} and {:.0f} to "
       "{:.0f}",
       voxels.low[0], voxels.high[0], voxels.low[1], voxels.high[1], size, mask.low[0], mask.high[0],
       mask.low[1], mask.high[1]);
@@ -115,11 +113,10 @@ class RenderedViews : public ModelSource {
     if (entries_.empty())
       return NotFound("{}: no models{}; expected {}", set_.models.string(),
                       list.empty() ? "" : " that the list names", set_.expected);
-    if (entries_.size() < list.size()) {
+    if (entries_.size() < list.size())
       ignored_.push_back(
           {set_.models.string(), fmt::format("{} of {} models of the list are missing",
                                              list.size() - entries_.size(), list.size())});
-    }
     SortEntries(&entries_);
     return {};
   }
@@ -162,14 +159,8 @@ class RenderedViews : public ModelSource {
       if (!listing.used) continue;
       if (!listing.split && set_.train_portion > 0)
         listing.split = i < training ? Split::kTrain : Split::kTest;
-      entries_.push_back({SafeFileName(SynsetName(id)),
-                          SafeFileName(model),
-                          model,
-                          "ShapeNet terms of use",
-                          "",
-                          models[i].string(),
-                          listing.split,
-                          {}});
+      entries_.push_back({SafeFileName(SynsetName(id)), SafeFileName(model), model,
+                          "ShapeNet terms of use", "", models[i].string(), listing.split});
     }
     return {};
   }

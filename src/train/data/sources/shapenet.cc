@@ -69,14 +69,8 @@ class ShapeNet : public ModelSource {
       const Listing listing = list.Of(id, name);
       if (!listing.used || !IsFolder(model)) continue;
       const Path v1 = model / kFileOfV1;
-      entries_.push_back({SynsetName(id),
-                          SafeFileName(name),
-                          name,
-                          "ShapeNet terms of use",
-                          "",
-                          (PathExists(v1) ? v1 : model / kFileOfV2).string(),
-                          listing.split,
-                          {}});
+      entries_.push_back({SynsetName(id), SafeFileName(name), name, "ShapeNet terms of use", "",
+                          (PathExists(v1) ? v1 : model / kFileOfV2).string(), listing.split});
     }
     return {};
   }

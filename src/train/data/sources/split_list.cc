@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
-#include "train/data/sources/split_text.h"
+#include "train/data/sources/model_source.h"
 
 namespace tilegrad::train {
 namespace {

@@ -6,8 +6,7 @@
 #include "io/mesh_file.h"
 #include "io/sh3f.h"
 #include "train/data/sources/model_source.h"
-#include "train/data/sources/split_text.h"
-#include "train/data/sources/sweethome3d_list.h"
+#include "train/data/sources/package_models.h"
 
 namespace tilegrad::train {
 namespace {
@@ -70,26 +69,19 @@ class SweetHome3d : public ModelSource {
   Status Add(const Path& folder, const FurnitureRow& row) {
     if (libraries_.count(row.furniture_library) == 0) {
       auto library = OpenLibrary(folder / (row.furniture_library + ".sh3f"));
-      if (!library.ok() && library.status().code() == StatusCode::kNotFound) {
+      if (!library.ok() && library.status().code() == StatusCode::kNotFound)
         return NotFound(
             "{}; install the models with `sudo apt-get install --no-install-recommends "
             "sweethome3d-furniture`, or use --source procedural",
             library.status().message());
-      }
       if (!library.ok()) return library.status();
       libraries_.emplace(row.furniture_library, std::move(*library));
     }
     const std::string stem = Path(row.model).stem().string();
     const std::string file = fmt::format("{}.sh3f: {}", row.furniture_library, row.model);
     models_[file] = {row.furniture_library, row.model};
-    entries_.push_back({row.class_name,
-                        SafeFileName(row.furniture_library + "-" + stem),
-                        row.name,
-                        row.license,
-                        row.creator,
-                        file,
-                        {},
-                        {}});
+    entries_.push_back({row.class_name, SafeFileName(row.furniture_library + "-" + stem), row.name,
+                        row.license, row.creator, file});
     return {};
   }
 

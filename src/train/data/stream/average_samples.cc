@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/data/stream/average_samples.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "train/data/stream/textured_stream.h"
 
 namespace tilegrad::train {
 namespace {

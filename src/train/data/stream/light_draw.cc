@@ -87,15 +87,13 @@ ConfigFields FieldsOf(LightConfig* c) {
 }
 
 Status CheckConfig(const LightConfig& c) {
-  if (Find(c.model) == nullptr) {
+  if (Find(c.model) == nullptr)
     return InvalidArgument(
         "light.model is \"{}\", but must be \"none\", \"lambert\", \"phong\" or \"harmonics\"",
         c.model);
-  }
-  if (c.from != kHemisphere && c.from != kFront && c.from != kAbove) {
+  if (c.from != kHemisphere && c.from != kFront && c.from != kAbove)
     return InvalidArgument(
         "light.from is \"{}\", but must be \"hemisphere\", \"front\" or \"above\"", c.from);
-  }
   if (c.shininess_low > c.shininess_high)
     return InvalidArgument("light.shininess_low is above light.shininess_high");
   if (c.sky_low > c.sky_high) return InvalidArgument("light.sky_low is above light.sky_high");

@@ -15,10 +15,9 @@ namespace tilegrad::train {
 
 struct LightConfig {
   std::string model = "lambert";  // or "none", "phong", "harmonics"
-  // Where from. "hemisphere": spread evenly over the cap of half angle `spread` around the camera's
-  // axis. "front": as the paper's authors draw lights in their test code, (x, y, z) with x and y
-  // from [-1, 1] and z from [1, 3]. "above": as in the paper's figure of light, from [26, 64]
-  // degrees off the axis, all above it.
+  // "hemisphere": evenly over the cap of half angle `spread` around the camera's axis. "front": as
+  // in the authors' test code, (x, y, z) with x and y from [-1, 1] and z from [1, 3]. "above": as
+  // in the paper's figure, [26, 64] degrees off the axis, all above it.
   std::string from = "hemisphere";
   double spread = 90;  // degrees; 90: the hemisphere that faces the camera
   double ambient = 0;  // of Lambert and Phong surfaces, beside the light; the paper has none
@@ -46,8 +45,8 @@ struct DrawnLight {
   std::array<float, 9> sh = {};                // harmonics: sky + clamped cosine about `direction`
 };
 DrawnLight DrawLight(const LightConfig& config, Rng& rng);
-// The mean of many that are drawn; its direction is unit, too. No other one is nearer to those that
-// are drawn, in the mean angle, by more than a tenth of a degree.
+// The mean of many draws, with a unit direction: up to a tenth of a degree the one whose mean angle
+// to them is least.
 DrawnLight MeanLight(const LightConfig& config);
 
 // sky + (1 - sky) max(0, n . direction), by its first three bands.

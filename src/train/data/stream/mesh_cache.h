@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textured meshes, of which as many stay in memory as fit into a stated number of bytes. What comes
-// out depends on the index alone, never on what was in memory or on time.
+// Textured meshes, as many in memory as fit into a number of bytes. Results depend on the index
+// alone.
 #pragma once
 
 #include <functional>

@@ -23,8 +23,8 @@ struct StreamConfig {
 
   // The camera: any azimuth, and all else as the dataset's rule has it ...
   bool fixed_camera = false;
-  // ... or else of the others any value of the range. Views from below that only
-  // the losses see show undersides: silhouettes from above leave room for a cone beneath an object.
+  // ... or else any value of these ranges. Views from below, which only the losses see, show
+  // undersides: silhouettes from above leave room for a cone beneath an object.
   double elevation_low = 5, elevation_high = 45;  // degrees; of the view that the network sees
   double around_low = -45, around_high = 60;      // degrees; of the others
   double fov_low = 30,

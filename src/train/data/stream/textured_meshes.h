@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The textured meshes behind a dataset. A dataset keeps coloured meshes only, so they are read
-// again from where it was made from.
+// The textured meshes behind a dataset, which itself keeps coloured ones only: read from its
+// source.
 #pragma once
 
 #include <string>
@@ -28,10 +28,9 @@ struct TexturedMeshRequest {
   std::string cache = "4G";  // of memory, as ParseByteCount reads it
 };
 
-// Of these models, in their order; `dataset` outlives them. As many are read at once as the cache
-// has room for. Errors, of others when they are read: a model that cannot be read, that is not
-// there any more, or whose shape is another than when the dataset was made. kCancelled when `stop`
-// is set.
+// Of these models, in their order; `dataset` outlives them. Reads as many at once as the cache has
+// room for; the others report their errors when they are read: a model that is unreadable, missing,
+// or of another shape than when the dataset was made. kCancelled when `stop` is set.
 Result<MeshCache> OpenTexturedMeshes(const Dataset& dataset, const std::vector<int>& models,
                                      const TexturedMeshRequest& request, const Workers& workers,
                                      const Watch& watch);

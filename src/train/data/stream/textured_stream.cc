@@ -14,10 +14,7 @@
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
 #include "scene/light_frame.h"
-#include "train/data/stream/average_samples.h"
 #include "train/data/stream/object_draw.h"
-#include "train/data/stream/recolor.h"
-#include "train/data/stream/view_draw.h"
 
 namespace tilegrad::train {
 namespace {
@@ -272,9 +269,8 @@ Result<ImageU8> TexturedStream::Sheet(int objects, int views) {
   for (std::size_t i = 0; i < count; ++i) {
     const auto model = static_cast<int>(i * meshes_.size() / count);
     TILEGRAD_ASSIGN(const auto rgba, Render(model, i, 0, drawn));
-    for (std::size_t v = 0; v < drawn.size(); ++v) {
+    for (std::size_t v = 0; v < drawn.size(); ++v)
       pictures.push_back(OnPaper(rgba.subspan(4 * plane * v, 4 * plane), job_.size));
-    }
   }
   return TileImages(pictures, views);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures that training renders itself, while it trains: each object is a deformed, recoloured
-// copy of a training model, seen by random cameras. Each view is under a light of its own, or all
-// are under that of datasets. A pure function of (seed, position of the object in the run): nothing
-// has to be saved, and a resumed run goes on as if it had never stopped.
+// Pictures rendered during training: each object is a deformed, recoloured copy of a training
+// model, seen by random cameras, each view under its own light or all under that of datasets. A
+// pure function of (seed, position of the object in the run), so that checkpoints store nothing of
+// it.
 #pragma once
 
 #include <memory>
@@ -45,6 +45,11 @@ inline Outputs OutputsOf(Appearance appearance) {
   const bool normals = appearance == Appearance::kNormals;
   return {.color = !normals, .alpha = false, .attributes = false, .normals = normals};
 }
+
+// Image n of a square frame, samples x samples of its pixels to one of [4][size][size]: the mean of
+// colours, cut to [0, 1], over black, and the covered share. Of a frame without colours unit means
+// of normals, 0 where nothing is.
+void AverageSamples(const Images& images, std::size_t n, int samples, std::span<float> to);
 
 class TexturedStream {
  public:

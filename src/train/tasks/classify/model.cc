@@ -21,74 +21,6 @@ namespace {
 
 constexpr const char* kClasses = "classes";  // their names, a line each
 
-}  // namespace
-
-nn::NamedTensor ClassNames(nn::Context& context, const std::vector<std::string>& classes) {
-  std::string text;
-  for (const std::string& name : classes) text += name + "\n";
-  nn::Tensor bytes = context.Empty({static_cast<std::int64_t>(text.size())}, nn::DType::kU8);
-  std::memcpy(bytes.raw(), text.data(), text.size());
-  return {kClasses, bytes};
-}
-
-Result<std::vector<std::string>> ReadClassNames(const std::vector<nn::NamedTensor>& state) {
-  const nn::Tensor* bytes = nn::Find(state, kClasses);
-  if (bytes == nullptr || bytes->dtype() != nn::DType::kU8)
-    return DataLoss("no tensor \"{}\" of bytes with the names of its classes", kClasses);
-  std::vector<std::string> out(1);
-  for (std::size_t i = 0; i < bytes->bytes(); ++i) {
-    const char c = static_cast<char>(bytes->raw()[i]);
-    if (c == '\n')
-      out.emplace_back();
-    else
-      out.back() += c;
-  }
-  out.pop_back();
-  if (out.size() < 2) return DataLoss("tensor \"{}\" names {} classes", kClasses, out.size());
-  return out;
-}
-
-std::vector<int> MostLikely(const nn::Tensor& scores) {
-  const auto classes = static_cast<std::ptrdiff_t>(scores.shape()[1]);
-  std::vector<int> out;
-  nn::WithFloatType(scores.dtype(), [&]<class T>(T) {
-    for (std::int64_t i = 0; i < scores.shape()[0]; ++i) {
-      const T* row = scores.data<T>() + i * classes;
-      out.push_back(static_cast<int>(std::max_element(row, row + classes) - row));
-    }
-  });
-  return out;
-}
-
-ClassifierModel::ClassifierModel(nn::Context& context, const ClassifierConfig& config,
-                                 std::vector<std::string> classes, int image_size)
-    : context_(context),
-      classes_(std::move(classes)),
-      image_size_(image_size),
-      network_(context, config, static_cast<std::int64_t>(classes_.size()), /*seed=*/0) {}
-
-Result<std::unique_ptr<ClassifierModel>> ClassifierModel::Load(nn::Context& context,
-                                                               const ClassifierConfig& config,
-                                                               const Checkpoint& checkpoint) {
-  TILEGRAD_ASSIGN(std::vector<std::string> classes, ReadClassNames(checkpoint.tensors));
-  std::unique_ptr<ClassifierModel> model(new ClassifierModel(
-      context, config, std::move(classes), static_cast<int>(checkpoint.info.image_size)));
-  TILEGRAD_TRY(context.TakeStatus());
-  TILEGRAD_TRY(model->LoadWeights(model->network_, checkpoint.tensors));
-  model->weights_.push_back(ClassNames(context, model->classes_));
-  return model;
-}
-
-Result<std::vector<int>> ClassifierModel::Classify(std::span<const std::uint8_t> images) {
-  const nn::NoGrad off(context_);
-  const nn::Var scores = network_.Forward(
-      nn::Constant(context_, ColorsOf(context_, images, image_size_)), nn::Mode::kEval);
-  TILEGRAD_TRY(context_.TakeStatus());
-  return MostLikely(scores.value());
-}
-
-namespace {
-
 constexpr std::size_t kSearched = 1000;  // training models whose pictures are searched, at most
 
 Status CheckClasses(const Dataset& dataset, const ClassifierModel& model) {
@@ -121,10 +53,9 @@ class Examiner {
   Result<Evaluation> Run() {
     const Split split = job_.split;
     const std::vector<int> models = data_.Select(split);
-    if (models.empty()) {
+    if (models.empty())
       return InvalidArgument("{}: its {} split has no models; `tilegrad dataset` makes the splits",
                              data_.folder().string(), SplitName(split));
-    }
     TILEGRAD_TRY(LearnBaselines());
     for (auto* scores : {&frequent_, &retrieved_, &said_}) scores->resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
@@ -223,40 +154,6 @@ Result<Example> ExampleOf(const Dataset& dataset, int model, ClassifierModel& cl
   return out;
 }
 
-}  // namespace
-
-Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
-                                      const Workers& workers, const Watch& watch) {
-  if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
-  if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
-  if (job.oracle_steps > 0)
-    return InvalidArgument("--oracle fits meshes; a classifier predicts none");
-  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(job));
-  TILEGRAD_TRY(CheckClasses(dataset, model));
-  return Examiner(dataset, job, model, workers, watch).Run();
-}
-
-Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
-                                const Watch& watch) {
-  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
-  TILEGRAD_TRY(CheckClasses(dataset, model));
-  Showcase out = AboutDataset(dataset, request.header);
-  out.purpose = "to classify an object from one image";
-  out.note =
-      "The network saw none of these in training. The predicted class stands below each picture. "
-      "The models are spread over the classes in the dataset's order, not picked by hand.";
-  const std::vector<int> chosen = ChooseModels(dataset, request.examples);
-  for (const int m : chosen) {
-    TILEGRAD_TRY(
-        watch.At({"classifying", out.examples.size(), chosen.size(), ""}, kNothingWritten));
-    TILEGRAD_ASSIGN(Example example, ExampleOf(dataset, m, model));
-    out.examples.push_back(std::move(example));
-  }
-  return out;
-}
-
-namespace {
-
 constexpr std::uint64_t kShiftStream = 0x7368696674;
 constexpr int kPictureChannels = 3;
 
@@ -306,6 +203,100 @@ struct Gathering {
 
 }  // namespace
 
+nn::NamedTensor ClassNames(nn::Context& context, const std::vector<std::string>& classes) {
+  std::string text;
+  for (const std::string& name : classes) text += name + "\n";
+  nn::Tensor bytes = context.Empty({static_cast<std::int64_t>(text.size())}, nn::DType::kU8);
+  std::memcpy(bytes.raw(), text.data(), text.size());
+  return {kClasses, bytes};
+}
+
+Result<std::vector<std::string>> ReadClassNames(const std::vector<nn::NamedTensor>& state) {
+  const nn::Tensor* bytes = nn::Find(state, kClasses);
+  if (bytes == nullptr || bytes->dtype() != nn::DType::kU8)
+    return DataLoss("no tensor \"{}\" of bytes with the names of its classes", kClasses);
+  std::vector<std::string> out(1);
+  for (std::size_t i = 0; i < bytes->bytes(); ++i) {
+    const char c = static_cast<char>(bytes->raw()[i]);
+    if (c == '\n')
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  out.pop_back();
+  if (out.size() < 2) return DataLoss("tensor \"{}\" names {} classes", kClasses, out.size());
+  return out;
+}
+
+std::vector<int> MostLikely(const nn::Tensor& scores) {
+  const auto classes = static_cast<std::ptrdiff_t>(scores.shape()[1]);
+  std::vector<int> out;
+  nn::WithFloatType(scores.dtype(), [&]<class T>(T) {
+    for (std::int64_t i = 0; i < scores.shape()[0]; ++i) {
+      const T* row = scores.data<T>() + i * classes;
+      out.push_back(static_cast<int>(std::max_element(row, row + classes) - row));
+    }
+  });
+  return out;
+}
+
+ClassifierModel::ClassifierModel(nn::Context& context, const ClassifierConfig& config,
+                                 std::vector<std::string> classes, int image_size)
+    : context_(context),
+      classes_(std::move(classes)),
+      image_size_(image_size),
+      network_(context, config, static_cast<std::int64_t>(classes_.size()), /*seed=*/0) {}
+
+Result<std::unique_ptr<ClassifierModel>> ClassifierModel::Load(nn::Context& context,
+                                                               const ClassifierConfig& config,
+                                                               const Checkpoint& checkpoint) {
+  TILEGRAD_ASSIGN(std::vector<std::string> classes, ReadClassNames(checkpoint.tensors));
+  std::unique_ptr<ClassifierModel> model(new ClassifierModel(
+      context, config, std::move(classes), static_cast<int>(checkpoint.info.image_size)));
+  TILEGRAD_TRY(context.TakeStatus());
+  TILEGRAD_TRY(model->LoadWeights(model->network_, checkpoint.tensors));
+  model->weights_.push_back(ClassNames(context, model->classes_));
+  return model;
+}
+
+Result<std::vector<int>> ClassifierModel::Classify(std::span<const std::uint8_t> images) {
+  const nn::NoGrad off(context_);
+  const nn::Var scores = network_.Forward(
+      nn::Constant(context_, ColorsOf(context_, images, image_size_)), nn::Mode::kEval);
+  TILEGRAD_TRY(context_.TakeStatus());
+  return MostLikely(scores.value());
+}
+
+Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
+                                      const Workers& workers, const Watch& watch) {
+  if (job.change) return InvalidArgument("a classifier predicts no meshes to refine");
+  if (job.voxels) return InvalidArgument("--voxels: classes are scored without shapes");
+  if (job.oracle_steps > 0)
+    return InvalidArgument("--oracle fits meshes; a classifier predicts none");
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(job));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  return Examiner(dataset, job, model, workers, watch).Run();
+}
+
+Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
+                                const Watch& watch) {
+  TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  Showcase out = AboutDataset(dataset, request.header);
+  out.purpose = "to classify an object from one image";
+  out.note =
+      "The network saw none of these in training. The predicted class stands below each picture. "
+      "The models are spread over the classes in the dataset's order, not picked by hand.";
+  const std::vector<int> chosen = ChooseModels(dataset, request.examples);
+  for (const int m : chosen) {
+    TILEGRAD_TRY(
+        watch.At({"classifying", out.examples.size(), chosen.size(), ""}, kNothingWritten));
+    TILEGRAD_ASSIGN(Example example, ExampleOf(dataset, m, model));
+    out.examples.push_back(std::move(example));
+  }
+  return out;
+}
+
 Result<LabelledImages> LoadLabelled(const Dataset& dataset, const std::vector<int>& models,
                                     const Workers& workers, const Watch& watch) {
   LabelledImages out;
@@ -349,10 +340,9 @@ nn::Tensor ColorsOf(nn::Context& context, std::span<const std::uint8_t> images, 
   const std::size_t count = images.size() / (4 * plane);
   nn::Tensor out = context.Empty({static_cast<std::int64_t>(count), kPictureChannels, size, size});
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < count; ++i)
       Placement{size, false, {}}.Read(images.subspan(4 * plane * i, 4 * plane),
                                       out.data<T>() + kPictureChannels * plane * i);
-    }
   });
   return out;
 }

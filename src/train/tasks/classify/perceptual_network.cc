@@ -16,11 +16,10 @@ Result<FeatureFunction> LoadClassifier(nn::Context& context, const PerceptualSou
   const std::string place = source.file.string();
   TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(context, source.file));
   TILEGRAD_ASSIGN(const TrainConfig config, ParseConfig(found.checkpoint.info.config, place));
-  if (config.kind != "classify") {
+  if (config.kind != "classify")
     return InvalidArgument(
         "{}: its task.kind is \"{}\"; a perceptual loss takes a run of task.kind = \"classify\"",
         place, config.kind);
-  }
   auto loaded = config.task->LoadModel(context, found.checkpoint);
   if (!loaded.ok()) return loaded.status().Within(place);
   std::shared_ptr<Model> model = std::move(*loaded);
@@ -44,10 +43,9 @@ Result<Path> PerceptualWeights(nn::Context& context, const PerceptualSource& sou
 Result<FeatureFunction> LoadPerceptualNetwork(nn::Context& context,
                                               const PerceptualSource& source) {
   if (source.kind == "classify") return LoadClassifier(context, source);
-  if (source.kind != "vgg16") {
+  if (source.kind != "vgg16")
     return InvalidArgument(
         "the perceptual network is \"{}\", but must be \"classify\" or \"vgg16\"", source.kind);
-  }
   TILEGRAD_ASSIGN(const nn::TensorFile file, nn::ReadSafetensors(context, source.file));
   auto network = nn::Vgg16::Load(context, file.tensors);
   if (!network.ok()) return network.status().Within(source.file.string());

@@ -52,12 +52,11 @@ Status CheckConfig(const GanConfig& config) {
   if (config.score_count < 8)
     return InvalidArgument("score.count is {}, but must be at least 8", config.score_count);
   const bool textures = config.schedule.steps > config.shape_steps;
-  if (textures && config.textures.run.empty()) {
+  if (textures && config.textures.run.empty())
     return InvalidArgument(
         "stages.shape ends at step {} of {}: textures then need textures.run, the folder of a run "
         "of configs/texture_quick.toml on the same dataset",
         config.shape_steps, config.schedule.steps);
-  }
   if (config.shape_steps > 0 || !config.start.empty()) return {};
   return InvalidArgument(
       "stages.shape = 0 trains no shapes: start.run must name a run that has them");

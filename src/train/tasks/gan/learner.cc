@@ -25,6 +25,9 @@ void CopyState(nn::Module& from, nn::Module& to) {
   (void)nn::LoadState(to, nn::State(from));
 }
 
+// Of the checkpointed state.
+const std::string kShapePrefix = "shape.", kTexturePrefix = "texture.", kScoresName = "scores";
+
 }  // namespace
 
 GanLearner::GanLearner(nn::Context& context, const Job& job, const Sources& sources)
@@ -219,12 +222,11 @@ Status GanLearner::Score(std::int64_t steps) {
   });
   const bool textures = stage == GanStage::kTexture;
   const double spread = textures ? seen.colors : seen.shapes;
-  if (warn_ && 2 * StageStep(steps - 1) > Weights(stage).steps() && spread < kCollapsed) {
+  if (warn_ && 2 * StageStep(steps - 1) > Weights(stage).steps() && spread < kCollapsed)
     warn_(
         fmt::format("step {}: the generator collapses: the spread of its {} is {:.0f} % of the "
                     "data's; a smaller optimizer.learning_rate or more critic.updates may help",
                     steps, textures ? "colours" : "shapes", 100 * spread));
-  }
   return {};
 }
 
@@ -256,14 +258,6 @@ Status GanLearner::StartAs(const std::vector<nn::NamedTensor>& state) {
   CopyState(kept_.shape(), generator_.shape());
   return {};
 }
-
-// The checkpointed state of a GanLearner.
-
-namespace {
-
-const std::string kShapePrefix = "shape.", kTexturePrefix = "texture.", kScoresName = "scores";
-
-}  // namespace
 
 std::vector<nn::NamedTensor> GanLearner::State() {
   std::vector<nn::NamedTensor> out = WithPrefix(kShapePrefix, shape_.State());

@@ -20,6 +20,9 @@ namespace {
 const std::string kShape = "best.shape.", kTexture = "best.texture.";
 constexpr std::uint64_t kCodeStream = 0x73616d706c65;
 
+constexpr double kFromFront = 50, kFromBehind = 230, kElevation = 20;  // degrees
+constexpr double kNearer = 0.8;                                        // than cameras of datasets
+
 }  // namespace
 
 Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGenerator& generator,
@@ -106,13 +109,6 @@ Status LoadKept(ShapeTextureGenerator& generator, const std::vector<nn::NamedTen
 Status LoadKeptShape(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state) {
   return nn::LoadState(generator.shape(), OfPrefix(kShape, state));
 }
-
-namespace {
-
-constexpr double kFromFront = 50, kFromBehind = 230, kElevation = 20;  // degrees
-constexpr double kNearer = 0.8;                                        // than cameras of datasets
-
-}  // namespace
 
 Camera SheetCamera(int size, double azimuth) {
   const CameraRule rule;

@@ -32,6 +32,79 @@ std::array<double, 2> BoxOf(std::span<const T> plane, std::size_t side) {
   return {static_cast<double>(right - left), static_cast<double>(bottom - top)};
 }
 
+constexpr std::uint64_t kPictureStream = 0x62616e6b, kDrawStream = 0x6d617073;
+
+// The part of a texture that a map has, planar.
+void AppendMap(const ImageU8& texture, const GeneratorConfig& maps,
+               std::vector<std::uint8_t>* bytes) {
+  const auto first = static_cast<int>(ShapeTextureGenerator::FirstColumn(maps));
+  const auto width = static_cast<int>(ShapeTextureGenerator::MapWidth(maps));
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < texture.height; ++y) {
+      for (int x = first; x < first + width; ++x) bytes->push_back(texture.at(x, y)[c]);
+    }
+  }
+}
+
+class Extraction {
+ public:
+  Extraction(const TextureBank::Job& job, const TextureBank::Data& data, TexturedModel& model,
+             const Workers& workers)
+      : job_(job),
+        model_(model),
+        stream_({StreamOf(job, model), model.config().light, data.dataset.info().camera,
+                 data.dataset.info().image_size, job.seed ^ kPictureStream},
+                data.meshes, workers),
+        models_(data.meshes.size()) {}
+
+  Status Append(std::size_t begin, std::size_t end, std::vector<std::uint8_t>* bytes) {
+    std::vector<std::uint8_t> pictures;
+    TexturedView view;
+    for (std::size_t i = begin; i < end; ++i) {
+      TILEGRAD_ASSIGN(const auto rgba,
+                      stream_.Render(static_cast<int>(i % models_), i, 0, {&view, 1}));
+      const auto picture = ToBytes(rgba);
+      pictures.insert(pictures.end(), picture.begin(), picture.end());
+    }
+    TILEGRAD_ASSIGN(const auto objects, model_.PredictObjects(pictures));
+    for (const PredictedObject& object : objects) {
+      const ImageU8& texture = object.mesh.textures[0].image;
+      const auto size = static_cast<int>(job_.maps.texture_size);
+      if (texture.width % size != 0)
+        return InvalidArgument(
+            "its textures are {} texels a side; network.texture_size = {} does not divide that",
+            texture.width, size);
+      AppendMap(ShrunkImage(texture, size), job_.maps, bytes);
+    }
+    return {};
+  }
+
+ private:
+  // The cameras that the network knows.
+  static TexturedStreamConfig StreamOf(const TextureBank::Job& job, const TexturedModel& model) {
+    TexturedStreamConfig out = model.config().stream;
+    out.draw.stretch = job.stream.draw.stretch;
+    out.draw.taper = job.stream.draw.taper;
+    out.draw.recolor = job.stream.draw.recolor;
+    out.draw.brightness = job.stream.draw.brightness;
+    out.mirrored = job.stream.mirrored;
+    return out;
+  }
+
+  const TextureBank::Job& job_;
+  TexturedModel& model_;
+  TexturedStream stream_;
+  std::size_t models_;
+};
+
+Result<TexturedModel*> TexturedModelOf(const Predictor& predictor, const Dataset& dataset) {
+  auto* const model = predictor.model().textured();
+  if (model == nullptr)
+    return InvalidArgument("it extracts no textures: train one with --config texture_quick");
+  TILEGRAD_TRY(predictor.CheckImageSize(dataset));
+  return model;
+}
+
 }  // namespace
 
 std::vector<Camera> PrimaryCameras(const CameraRule& rule, std::int64_t count) {
@@ -132,84 +205,6 @@ Result<std::span<const float>> RealPictures::DrawOne(int model, std::uint64_t po
   TILEGRAD_TRY(stream_.SetUp(model, position, lane, views_));
   return stream_.Again(lane, Appearance::kTexture);
 }
-
-namespace {
-
-constexpr std::uint64_t kPictureStream = 0x62616e6b, kDrawStream = 0x6d617073;
-
-// The part of a texture that a map has, planar.
-void AppendMap(const ImageU8& texture, const GeneratorConfig& maps,
-               std::vector<std::uint8_t>* bytes) {
-  const auto first = static_cast<int>(ShapeTextureGenerator::FirstColumn(maps));
-  const auto width = static_cast<int>(ShapeTextureGenerator::MapWidth(maps));
-  for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < texture.height; ++y) {
-      for (int x = first; x < first + width; ++x) bytes->push_back(texture.at(x, y)[c]);
-    }
-  }
-}
-
-class Extraction {
- public:
-  Extraction(const TextureBank::Job& job, const TextureBank::Data& data, TexturedModel& model,
-             const Workers& workers)
-      : job_(job),
-        model_(model),
-        stream_({StreamOf(job, model), model.config().light, data.dataset.info().camera,
-                 data.dataset.info().image_size, job.seed ^ kPictureStream},
-                data.meshes, workers),
-        models_(data.meshes.size()) {}
-
-  Status Append(std::size_t begin, std::size_t end, std::vector<std::uint8_t>* bytes) {
-    std::vector<std::uint8_t> pictures;
-    TexturedView view;
-    for (std::size_t i = begin; i < end; ++i) {
-      TILEGRAD_ASSIGN(const auto rgba,
-                      stream_.Render(static_cast<int>(i % models_), i, 0, {&view, 1}));
-      const auto picture = ToBytes(rgba);
-      pictures.insert(pictures.end(), picture.begin(), picture.end());
-    }
-    TILEGRAD_ASSIGN(const auto objects, model_.PredictObjects(pictures));
-    for (const PredictedObject& object : objects) {
-      const ImageU8& texture = object.mesh.textures[0].image;
-      const auto size = static_cast<int>(job_.maps.texture_size);
-      if (texture.width % size != 0) {
-        return InvalidArgument(
-            "its textures are {} texels a side; network.texture_size = {} does not divide that",
-            texture.width, size);
-      }
-      AppendMap(ShrunkImage(texture, size), job_.maps, bytes);
-    }
-    return {};
-  }
-
- private:
-  // The cameras that the network knows.
-  static TexturedStreamConfig StreamOf(const TextureBank::Job& job, const TexturedModel& model) {
-    TexturedStreamConfig out = model.config().stream;
-    out.draw.stretch = job.stream.draw.stretch;
-    out.draw.taper = job.stream.draw.taper;
-    out.draw.recolor = job.stream.draw.recolor;
-    out.draw.brightness = job.stream.draw.brightness;
-    out.mirrored = job.stream.mirrored;
-    return out;
-  }
-
-  const TextureBank::Job& job_;
-  TexturedModel& model_;
-  TexturedStream stream_;
-  std::size_t models_;
-};
-
-Result<TexturedModel*> TexturedModelOf(const Predictor& predictor, const Dataset& dataset) {
-  auto* const model = predictor.model().textured();
-  if (model == nullptr)
-    return InvalidArgument("it extracts no textures: train one with --config texture_quick");
-  TILEGRAD_TRY(predictor.CheckImageSize(dataset));
-  return model;
-}
-
-}  // namespace
 
 Result<TextureBank> TextureBank::Extract(const Job& job, const Data& data, const Workers& workers,
                                          const Watch& watch) {

@@ -9,10 +9,91 @@
 #include "nn/nn.h"
 #include "render/picture/composite.h"
 #include "train/data/trained_models.h"
+#include "train/losses/l1.h"
 #include "train/tasks/classify/perceptual_network.h"
 
 namespace tilegrad::train {
 namespace {
+
+constexpr std::int64_t kJudgedAtOnce = 16;  // objects
+constexpr std::int64_t kColorCells = 4;     // to a plane: Frechet distances of wide rows take long
+constexpr double kLeastDeviation = 0.05;
+constexpr int kFirstLevel = 3;  // of the classifier: what lies before compares little but pixels
+
+// 1 for columns that vary within the truth. The others are cells at the edge of what any object
+// covers: standardised, they would dominate all distances.
+std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth) {
+  std::vector<std::uint8_t> out(truth.width);
+  const auto n = static_cast<double>(truth.rows());
+  for (std::size_t c = 0; c < truth.width; ++c) {
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < truth.rows(); ++i) {
+      const double x = truth.Row(i)[c];
+      sum += x;
+      squares += x * x;
+    }
+    out[c] = squares / n - (sum / n) * (sum / n) > kLeastDeviation * kLeastDeviation;
+  }
+  return out;
+}
+
+// Sets all other columns to 0.
+FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns) {
+  for (std::size_t i = 0; i < rows.values.size(); ++i) {
+    if (columns[i % rows.width] == 0) rows.values[i] = 0;
+  }
+  return rows;
+}
+
+// Features of pictures: the cells of each view, or the levels of a classifier, averaged over the
+// pixels of all views.
+class GanJudge {
+ public:
+  // `run`: of task.kind = "classify"; empty: cells.
+  static Result<GanJudge> Make(nn::Context& context, const Path& run) {
+    GanJudge out(context);
+    if (run.empty()) return out;
+    TILEGRAD_ASSIGN(out.network_, LoadPerceptualNetwork(context, {"classify", run, kFirstLevel}));
+    return out;
+  }
+
+  // In words.
+  std::string name() const {
+    return network_ ? "the levels of a classifier"
+                    : "mean and deviation of colours in 4 x 4 cells of each view";
+  }
+
+  Result<FeatureRows> Pictures(const ObjectViews& set) const {
+    if (network_) return Levels(set);
+    return ColorFeatures(set, kColorCells);
+  }
+
+ private:
+  explicit GanJudge(nn::Context& context) : context_(context) {}
+
+  Result<FeatureRows> Levels(const ObjectViews& set) const {
+    const nn::NoGrad off(context_);
+    const nn::Shape& shape = set.colors.shape();
+    FeatureRows out;
+    const nn::Var all = nn::Constant(context_, set.colors);
+    for (std::int64_t i = 0; i < shape[0]; i += kJudgedAtOnce) {
+      const std::int64_t end = std::min(shape[0], i + kJudgedAtOnce);
+      const nn::Var some = nn::Reshape(nn::Slice(all, 0, i, end), {-1, 3, shape[2], shape[3]});
+      std::vector<nn::Var> means;
+      for (const nn::Var& level : network_(some)) means.push_back(nn::Mean(level, {2, 3}));
+      const nn::Var rows = nn::Reshape(nn::Concat(means, 1), {end - i, shape[1] / 3, -1});
+      const nn::Var mean = nn::Mean(rows, {1});  // over the views
+      TILEGRAD_TRY(context_.TakeStatus());
+      out.width = static_cast<std::size_t>(mean.shape()[1]);
+      const auto numbers = mean.value().span<float>();
+      out.values.insert(out.values.end(), numbers.begin(), numbers.end());
+    }
+    return out;
+  }
+
+  nn::Context& context_;
+  FeatureFunction network_;
+};
 
 constexpr std::int64_t kAtOnce = 16;
 constexpr std::size_t kShown = 8;
@@ -32,8 +113,8 @@ class Scorer {
   Result<GanScores> Run(const Watch& watch) {
     TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job_.data));
     TILEGRAD_TRY(CheckHeldOut(job_.run, dataset));
-    TILEGRAD_ASSIGN(Judge judge, Judge::Make(context_, job_.judge));
-    judge_ = std::make_unique<Judge>(std::move(judge));
+    TILEGRAD_ASSIGN(GanJudge judge, GanJudge::Make(context_, job_.judge));
+    judge_ = std::make_unique<GanJudge>(std::move(judge));
     TILEGRAD_ASSIGN(const ObjectViews train, True(dataset, Split::kTrain, watch));
     TILEGRAD_ASSIGN(const ObjectViews test, True(dataset, Split::kTest, watch));
     step_.emplace(context_, model_.config(), dataset.info().camera);
@@ -161,7 +242,7 @@ class Scorer {
   nn::Context& context_;
   GeneratorModel& model_;
   const GanScoreJob& job_;
-  std::unique_ptr<Judge> judge_;
+  std::unique_ptr<GanJudge> judge_;
   std::optional<GanStep> step_;
   GanScores out_;
 };
@@ -184,13 +265,12 @@ nlohmann::ordered_json JsonOf(const SetScore& score) {
 
 nlohmann::ordered_json JsonOf(const std::vector<GanScoreRow>& rows) {
   auto out = nlohmann::ordered_json::array();
-  for (const GanScoreRow& row : rows) {
+  for (const GanScoreRow& row : rows)
     out.push_back({{"method", row.method},
                    {"pictures", JsonOf(row.pictures)},
                    {"shapes", JsonOf(row.shapes)},
                    {"spread_shapes", row.spread.shapes},
                    {"spread_colors", row.spread.colors}});
-  }
   return out;
 }
 
@@ -218,8 +298,7 @@ std::string FormatScores(const GanScores& scores) {
   const Memorisation& m = scores.memorisation;
   out += fmt::format(
       "\nDistance to the nearest training picture, median: samples {:.3g}, held-out objects "
-      "{:.3g}; "
-      "a sample is the nearer one of the two with probability {:.2f}.\n",
+      "{:.3g}; a sample is the nearer one of the two with probability {:.2f}.\n",
       m.sample_median, m.held_out_median, m.nearer);
   return out;
 }
@@ -236,74 +315,6 @@ nlohmann::ordered_json ScoresJson(const GanScores& scores) {
        {{"sample_median", m.sample_median},
         {"held_out_median", m.held_out_median},
         {"nearer", m.nearer}}}};
-}
-
-namespace {
-
-constexpr std::int64_t kJudgedAtOnce = 16;  // objects
-constexpr std::int64_t kColorCells = 4;     // to a plane: Frechet distances of wide rows take long
-constexpr double kLeastDeviation = 0.05;
-constexpr int kFirstLevel = 3;  // of the classifier: what lies before compares little but pixels
-
-}  // namespace
-
-std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth) {
-  std::vector<std::uint8_t> out(truth.width);
-  const auto n = static_cast<double>(truth.rows());
-  for (std::size_t c = 0; c < truth.width; ++c) {
-    double sum = 0, squares = 0;
-    for (std::size_t i = 0; i < truth.rows(); ++i) {
-      const double x = truth.Row(i)[c];
-      sum += x;
-      squares += x * x;
-    }
-    out[c] = squares / n - (sum / n) * (sum / n) > kLeastDeviation * kLeastDeviation;
-  }
-  return out;
-}
-
-FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns) {
-  for (std::size_t i = 0; i < rows.values.size(); ++i) {
-    if (columns[i % rows.width] == 0) rows.values[i] = 0;
-  }
-  return rows;
-}
-
-Result<Judge> Judge::Make(nn::Context& context, const Path& run) {
-  Judge out(context);
-  if (run.empty()) return out;
-  TILEGRAD_ASSIGN(out.network_, LoadPerceptualNetwork(context, {"classify", run, kFirstLevel}));
-  return out;
-}
-
-std::string Judge::name() const {
-  return network_ ? "the levels of a classifier"
-                  : "mean and deviation of colours in 4 x 4 cells of each view";
-}
-
-Result<FeatureRows> Judge::Pictures(const ObjectViews& set) const {
-  if (network_) return Levels(set);
-  return ColorFeatures(set, kColorCells);
-}
-
-Result<FeatureRows> Judge::Levels(const ObjectViews& set) const {
-  const nn::NoGrad off(context_);
-  const nn::Shape& shape = set.colors.shape();
-  FeatureRows out;
-  const nn::Var all = nn::Constant(context_, set.colors);
-  for (std::int64_t i = 0; i < shape[0]; i += kJudgedAtOnce) {
-    const std::int64_t end = std::min(shape[0], i + kJudgedAtOnce);
-    const nn::Var some = nn::Reshape(nn::Slice(all, 0, i, end), {-1, 3, shape[2], shape[3]});
-    std::vector<nn::Var> means;
-    for (const nn::Var& level : network_(some)) means.push_back(nn::Mean(level, {2, 3}));
-    const nn::Var rows = nn::Reshape(nn::Concat(means, 1), {end - i, shape[1] / 3, -1});
-    const nn::Var mean = nn::Mean(rows, {1});  // over the views
-    TILEGRAD_TRY(context_.TakeStatus());
-    out.width = static_cast<std::size_t>(mean.shape()[1]);
-    const auto numbers = mean.value().span<float>();
-    out.values.insert(out.values.end(), numbers.begin(), numbers.end());
-  }
-  return out;
 }
 
 }  // namespace tilegrad::train

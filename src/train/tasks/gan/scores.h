@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/file.h"
-#include "train/losses/l1.h"
 #include "train/metrics/set_scores.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/real_samples.h"
@@ -44,29 +43,5 @@ struct GanScores {
 Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job, const Watch& watch);
 std::string FormatScores(const GanScores& scores);  // Markdown tables
 nlohmann::ordered_json ScoresJson(const GanScores& scores);
-
-// The features by which sets of generated and true objects are compared.
-
-// 1 for columns that vary within the truth. The others are cells at the edge of what any object
-// covers: standardised, they would dominate all distances.
-std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth);
-// Sets all other columns to 0.
-FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns);
-
-// Features of pictures: the cells of each view, or the levels of a classifier, averaged over the
-// pixels of all views.
-class Judge {
- public:
-  // `run`: of task.kind = "classify"; empty: cells.
-  static Result<Judge> Make(nn::Context& context, const Path& run);
-  std::string name() const;  // in words
-  Result<FeatureRows> Pictures(const ObjectViews& set) const;
-
- private:
-  explicit Judge(nn::Context& context) : context_(context) {}
-  Result<FeatureRows> Levels(const ObjectViews& set) const;
-  nn::Context& context_;
-  FeatureFunction network_;
-};
 
 }  // namespace tilegrad::train

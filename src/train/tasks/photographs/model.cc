@@ -81,75 +81,6 @@ std::size_t KeypointsIn(const Checkpoint& checkpoint) {
   return keypoints == nullptr ? 0 : static_cast<std::size_t>(keypoints->shape()[0]);
 }
 
-}  // namespace
-
-PhotographModel::PhotographModel(nn::Context& context, const PhotographsConfig& config,
-                                 const Checkpoint& checkpoint)
-    : context_(context),
-      config_(config),
-      network_(context, config.network, {.count = KeypointsIn(checkpoint)},
-               static_cast<int>(config.size), /*seed=*/0) {}
-
-Status PhotographModel::Load(const std::vector<nn::NamedTensor>& state) {
-  TILEGRAD_TRY(context_.TakeStatus());
-  TILEGRAD_TRY(LoadWeights(network_.module(), state));
-  const nn::NoGrad off(context_);
-  const nn::Var mean = network_.MeanShape();
-  TILEGRAD_TRY(context_.TakeStatus());
-  TILEGRAD_ASSIGN(const Mesh shape, MeshOf(network_.sphere(), {.positions = mean}, 0));
-  return SetTemplate(shape, kPredictionHalfExtent);
-}
-
-Status PhotographModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
-  const auto size = static_cast<std::size_t>(config_.size);
-  const std::size_t bytes = 4 * size * size, count = images.size() / bytes;
-  nn::Tensor pictures =
-      context_.Empty({static_cast<std::int64_t>(count), 3, config_.size, config_.size});
-  for (std::size_t i = 0; i < count; ++i)
-    CutoutCrop(images.subspan(i * bytes, bytes), static_cast<int>(size), config_.crop)
-        .Write(pictures.data<float>() + 3 * size * size * i);
-  TILEGRAD_ASSIGN(auto predicted, PredictPhotographs(context_, network_, pictures));
-  for (PredictedPhotograph& photo : predicted) {
-    TILEGRAD_TRY(NormalizeToBox(photo.mesh, kPredictionHalfExtent));
-    meshes->push_back(std::move(photo.mesh));
-  }
-  return {};
-}
-
-Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context,
-                                                            PhotographNetwork& network,
-                                                            const nn::Tensor& pictures) {
-  const nn::NoGrad off(context);
-  const Prediction all = network.Forward(nn::Constant(context, pictures), nn::Mode::kEval);
-  TILEGRAD_TRY(context.TakeStatus());
-  const auto count = static_cast<std::size_t>(pictures.shape()[0]);
-  std::vector<PredictedPhotograph> out(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    TILEGRAD_ASSIGN(out[i].mesh, MeshOf(network.sphere(), all, i));
-    const auto c = ItemOf(all.cameras, i);
-    out[i].camera = {c[0], {c[1], c[2]}, {c[3], c[4], c[5], c[6]}};
-    if (!all.keypoints.valid()) continue;
-    const auto k = ItemOf(all.keypoints, i);
-    for (std::size_t at = 0; at < k.size(); at += 3)
-      out[i].keypoints.push_back({k[at], k[at + 1], k[at + 2]});
-  }
-  return out;
-}
-
-Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
-                                                   const PhotographsConfig& config,
-                                                   const Checkpoint& checkpoint) {
-  TILEGRAD_TRY(CheckConfig(config));
-  if (checkpoint.info.image_size != config.size)
-    return DataLoss("photographs of {} pixels a side, but its configuration says {}",
-                    checkpoint.info.image_size, config.size);
-  auto model = std::make_unique<PhotographModel>(context, config, checkpoint);
-  TILEGRAD_TRY(model->Load(checkpoint.tensors));
-  return std::unique_ptr<Model>(std::move(model));
-}
-
-namespace {
-
 constexpr double kPckThreshold = 0.1;
 enum CameraMethod { kCeiling, kMean, kOwnCamera, kOurs, kMethods };
 constexpr const char* kRowNames[kMethods] = {"true keypoints", "mean shape", "predicted camera",
@@ -349,7 +280,102 @@ class PhotographJudge {
   std::vector<std::array<double, 3>> mean_keypoints_;
 };
 
+constexpr int kPixelSamples = 3, kPictureZoom = 4;
+constexpr std::uint8_t kSeen[3] = {255, 60, 30}, kPredicted[3] = {40, 200, 255};
+
+// Looks at the object from the side (azimuth 90), or obliquely from in front.
+WeakPerspective LookAround(double azimuth, double scale) {
+  const double half = azimuth * std::numbers::pi / 360, tilt = 0.96 * std::numbers::pi / 2;
+  const double c = std::cos(half), s = std::sin(half);
+  const double w = std::cos(tilt), x = std::sin(tilt);
+  return {scale, {0, 0}, {w * c, x * c, w * s, x * s}};
+}
+
+void Dot(double x, double y, const std::uint8_t (&color)[3], bool ring, ImageU8* image) {
+  const double u = (x + 1) / 2 * image->width, v = (y + 1) / 2 * image->height;
+  const double radius = image->width / 40.0;
+  for (int j = 0; j < image->height; ++j) {
+    for (int i = 0; i < image->width; ++i) {
+      const double d = std::hypot(i + 0.5 - u, j + 0.5 - v);
+      if (ring ? std::abs(d - radius) < radius / 3 : d < radius / 2)
+        std::copy_n(color, 3, image->at(i, j));
+    }
+  }
+}
+
+ImageU8 PhotoImage(std::span<const float> rgb, int size) {
+  ImageU8 out(size, size, 3);
+  const std::size_t plane = rgb.size() / 3;
+  for (std::size_t i = 0; i < rgb.size(); ++i) out.pixels[i] = ToByte(rgb[i % 3 * plane + i / 3]);
+  return out;
+}
+
 }  // namespace
+
+PhotographModel::PhotographModel(nn::Context& context, const PhotographsConfig& config,
+                                 const Checkpoint& checkpoint)
+    : context_(context),
+      config_(config),
+      network_(context, config.network, {.count = KeypointsIn(checkpoint)},
+               static_cast<int>(config.size), /*seed=*/0) {}
+
+Status PhotographModel::Load(const std::vector<nn::NamedTensor>& state) {
+  TILEGRAD_TRY(context_.TakeStatus());
+  TILEGRAD_TRY(LoadWeights(network_.module(), state));
+  const nn::NoGrad off(context_);
+  const nn::Var mean = network_.MeanShape();
+  TILEGRAD_TRY(context_.TakeStatus());
+  TILEGRAD_ASSIGN(const Mesh shape, MeshOf(network_.sphere(), {.positions = mean}, 0));
+  return SetTemplate(shape, kPredictionHalfExtent);
+}
+
+Status PhotographModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
+  const auto size = static_cast<std::size_t>(config_.size);
+  const std::size_t bytes = 4 * size * size, count = images.size() / bytes;
+  nn::Tensor pictures =
+      context_.Empty({static_cast<std::int64_t>(count), 3, config_.size, config_.size});
+  for (std::size_t i = 0; i < count; ++i)
+    CutoutCrop(images.subspan(i * bytes, bytes), static_cast<int>(size), config_.crop)
+        .Write(pictures.data<float>() + 3 * size * size * i);
+  TILEGRAD_ASSIGN(auto predicted, PredictPhotographs(context_, network_, pictures));
+  for (PredictedPhotograph& photo : predicted) {
+    TILEGRAD_TRY(NormalizeToBox(photo.mesh, kPredictionHalfExtent));
+    meshes->push_back(std::move(photo.mesh));
+  }
+  return {};
+}
+
+Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context,
+                                                            PhotographNetwork& network,
+                                                            const nn::Tensor& pictures) {
+  const nn::NoGrad off(context);
+  const Prediction all = network.Forward(nn::Constant(context, pictures), nn::Mode::kEval);
+  TILEGRAD_TRY(context.TakeStatus());
+  const auto count = static_cast<std::size_t>(pictures.shape()[0]);
+  std::vector<PredictedPhotograph> out(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    TILEGRAD_ASSIGN(out[i].mesh, MeshOf(network.sphere(), all, i));
+    const auto c = ItemOf(all.cameras, i);
+    out[i].camera = {c[0], {c[1], c[2]}, {c[3], c[4], c[5], c[6]}};
+    if (!all.keypoints.valid()) continue;
+    const auto k = ItemOf(all.keypoints, i);
+    for (std::size_t at = 0; at < k.size(); at += 3)
+      out[i].keypoints.push_back({k[at], k[at + 1], k[at + 2]});
+  }
+  return out;
+}
+
+Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
+                                                   const PhotographsConfig& config,
+                                                   const Checkpoint& checkpoint) {
+  TILEGRAD_TRY(CheckConfig(config));
+  if (checkpoint.info.image_size != config.size)
+    return DataLoss("photographs of {} pixels a side, but its configuration says {}",
+                    checkpoint.info.image_size, config.size);
+  auto model = std::make_unique<PhotographModel>(context, config, checkpoint);
+  TILEGRAD_TRY(model->Load(checkpoint.tensors));
+  return std::unique_ptr<Model>(std::move(model));
+}
 
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
   const std::string now = TextOf(set);
@@ -401,40 +427,6 @@ Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers&
                            set.keypoint_names.size(), learned);
   return PhotographJudge(job, set).Run(workers, watch);
 }
-
-namespace {
-
-constexpr int kPixelSamples = 3, kPictureZoom = 4;
-constexpr std::uint8_t kSeen[3] = {255, 60, 30}, kPredicted[3] = {40, 200, 255};
-
-// Looks at the object from the side (azimuth 90), or obliquely from in front.
-WeakPerspective LookAround(double azimuth, double scale) {
-  const double half = azimuth * std::numbers::pi / 360, tilt = 0.96 * std::numbers::pi / 2;
-  const double c = std::cos(half), s = std::sin(half);
-  const double w = std::cos(tilt), x = std::sin(tilt);
-  return {scale, {0, 0}, {w * c, x * c, w * s, x * s}};
-}
-
-void Dot(double x, double y, const std::uint8_t (&color)[3], bool ring, ImageU8* image) {
-  const double u = (x + 1) / 2 * image->width, v = (y + 1) / 2 * image->height;
-  const double radius = image->width / 40.0;
-  for (int j = 0; j < image->height; ++j) {
-    for (int i = 0; i < image->width; ++i) {
-      const double d = std::hypot(i + 0.5 - u, j + 0.5 - v);
-      if (ring ? std::abs(d - radius) < radius / 3 : d < radius / 2)
-        std::copy_n(color, 3, image->at(i, j));
-    }
-  }
-}
-
-ImageU8 PhotoImage(std::span<const float> rgb, int size) {
-  ImageU8 out(size, size, 3);
-  const std::size_t plane = rgb.size() / 3;
-  for (std::size_t i = 0; i < rgb.size(); ++i) out.pixels[i] = ToByte(rgb[i % 3 * plane + i / 3]);
-  return out;
-}
-
-}  // namespace
 
 PhotographPictures::PhotographPictures(int size)
     : size_(size), pictures_(NoLight(), size, kPixelSamples) {}

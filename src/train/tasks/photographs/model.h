@@ -48,11 +48,11 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
 // Table 3 of the paper.
 
 // On the photographs of job.split, without random crops. Rows: "mean shape" (with the predicted
-// texture), "predicted camera", "tilegrad" through the annotated cameras, which is the table's. Of
-// each: texture L1, mean |difference| over all pixels of the crop and the channels between the
-// prediction and the photograph's object, both over black; 2D IoU loss, 1 - IoU of their covers;
-// PCK at 0.1 (metrics/metrics.h), where there are keypoints. Errors: a set without cameras, one
-// whose photographs were trained on, a job with a change or an oracle.
+// texture), "predicted camera", and the table's "tilegrad", through the annotated cameras. Of each:
+// texture L1, mean |difference| of prediction and object, both over black, over all pixels and
+// channels of the crop; 2D IoU loss, 1 - IoU of their covers; PCK at 0.1 (metrics/metrics.h).
+// Errors: a set without cameras, photographs that were trained on, a job with a change or an
+// oracle.
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
                                        const Watch& watch);
 

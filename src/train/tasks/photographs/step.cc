@@ -137,13 +137,10 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step, St
           nn::Mean(nn::Square(images.alpha - nn::Constant(context_, batch.mask))));
   AddIou(w.iou, images.alpha, batch.mask, &sum);
   AddColor(w.color, ColorL1Loss(Masked(images.colors, batch), batch.colors), &sum);
-  if (predicted.flow.valid()) {
+  if (predicted.flow.valid())
     sum.Add("flow_distance", "Distance of the texture flow from the object", w.flow_distance,
             FlowLoss(predicted.flow, batch));
-  }
-  if (config_.camera == "given") {
-    AddCamera(predicted, batch, &sum);
-  }
+  if (config_.camera == "given") AddCamera(predicted, batch, &sum);
   sum.Add("deformation", "Mean displacement", w.deformation,
           nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
   sum.Add("laplacian", "Cotangent Laplacian", w.laplacian,

@@ -40,26 +40,6 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
   };
 }
 
-}  // namespace
-
-Status CheckConfig(const SingleImageConfig& config) {
-  const SphereConfig& n = config.network.sphere;
-  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
-    return InvalidArgument(
-        "network.n3mr_vertices has no offsets to smooth or mirror: network.smoothing must be 0 and "
-        "network.symmetric false");
-  }
-  return RivalOptions(config.render.rule, config.rivals).status();
-}
-
-ConfigFields FieldsOf(SingleImageConfig* c) {
-  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render),
-                 FieldsOf(&c->optimizer), ScheduleFields(c), FieldsOf(&c->rivals),
-                 FieldsOf(&c->stream)});
-}
-
-namespace {
-
 template <class Value>
 using Words = std::initializer_list<std::pair<const char*, Value>>;
 
@@ -75,6 +55,21 @@ Result<Value> ValueOfWord(const char* key, const std::string& word, const Words<
 }
 
 }  // namespace
+
+Status CheckConfig(const SingleImageConfig& config) {
+  const SphereConfig& n = config.network.sphere;
+  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric))
+    return InvalidArgument(
+        "network.n3mr_vertices has no offsets to smooth or mirror: network.smoothing must be 0 and "
+        "network.symmetric false");
+  return RivalOptions(config.render.rule, config.rivals).status();
+}
+
+ConfigFields FieldsOf(SingleImageConfig* c) {
+  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render),
+                 FieldsOf(&c->optimizer), ScheduleFields(c), FieldsOf(&c->rivals),
+                 FieldsOf(&c->stream)});
+}
 
 ConfigFields FieldsOf(RivalConfig* c) {
   return {

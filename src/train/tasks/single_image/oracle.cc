@@ -48,7 +48,21 @@ class TemplateFitter {
         context_(workers),
         shape_(context_, config.network.sphere),
         losses_(context_, config, shape_, info.image_size) {}
-  Result<Mesh> Fit(const ModelData& data);
+
+  Result<Mesh> Fit(const ModelData& data) {
+    const ImageStore store = StoreOf(data, info_);
+    const Unknowns x = {nn::Parameter(context_, context_.Zeros({1, shape_.numbers()})),
+                        nn::Parameter(context_, context_.Full({1, shape_.vertices(), 3}, 0.5))};
+    nn::Adam shape_adam(context_, {{"shape", x.raw}}, {}),
+        color_adam(context_, {{"color", x.colors}}, {});
+    nn::Adam* const optimizers[] = {&shape_adam, &color_adam};
+    for (int step = 0; step < config_.schedule.steps; ++step)
+      TILEGRAD_TRY(Step(store, x, step, optimizers));
+    const nn::NoGrad off(context_);
+    const Prediction meshes = MeshesOf(x);
+    TILEGRAD_TRY(context_.TakeStatus());
+    return MeshOf(shape_, meshes, 0);
+  }
 
  private:
   Prediction MeshesOf(const Unknowns& x) const {
@@ -58,8 +72,25 @@ class TemplateFitter {
     meshes.colors = x.colors;
     return meshes;
   }
+
   Status Step(const ImageStore& store, const Unknowns& x, int step,
-              std::span<nn::Adam* const> optimizers);
+              std::span<nn::Adam* const> optimizers) {
+    const BatchTensors batch = GatherBatch(context_, store, {{0, ViewsAt(step, store.views)}});
+    StepValues values;
+    const nn::Var loss = losses_.Total(MeshesOf(x), batch, step, &values);
+    const nn::Var unknowns[] = {x.raw, x.colors};
+    const auto gradients = nn::Gradients(loss, unknowns);
+    TILEGRAD_TRY(context_.TakeStatus());
+    if (!std::isfinite(values.loss) || !nn::IsFinite(context_, gradients))
+      return InternalError("fitting the template: the loss is {}", values.loss);
+    const nn::CosineSchedule cosine{config_.schedule.steps, kFinalFactor};
+    for (std::size_t i = 0; i < optimizers.size(); ++i) {
+      optimizers[i]->options().learning_rate =
+          nn::CosineRate(i == 0 ? kShapeRate : kColorRate, cosine, step);
+      TILEGRAD_TRY(optimizers[i]->Step(std::span<const nn::Gradient>(gradients).subspan(i, 1)));
+    }
+    return {};
+  }
 
   SingleImageConfig config_;
   DatasetInfo info_;
@@ -67,40 +98,6 @@ class TemplateFitter {
   SphereModel shape_;
   ImageLosses losses_;
 };
-
-Status TemplateFitter::Step(const ImageStore& store, const Unknowns& x, int step,
-                            std::span<nn::Adam* const> optimizers) {
-  const BatchTensors batch = GatherBatch(context_, store, {{0, ViewsAt(step, store.views)}});
-  StepValues values;
-  const nn::Var loss = losses_.Total(MeshesOf(x), batch, step, &values);
-  const nn::Var unknowns[] = {x.raw, x.colors};
-  const auto gradients = nn::Gradients(loss, unknowns);
-  TILEGRAD_TRY(context_.TakeStatus());
-  if (!std::isfinite(values.loss) || !nn::IsFinite(context_, gradients))
-    return InternalError("fitting the template: the loss is {}", values.loss);
-  const nn::CosineSchedule cosine{config_.schedule.steps, kFinalFactor};
-  for (std::size_t i = 0; i < optimizers.size(); ++i) {
-    optimizers[i]->options().learning_rate =
-        nn::CosineRate(i == 0 ? kShapeRate : kColorRate, cosine, step);
-    TILEGRAD_TRY(optimizers[i]->Step(std::span<const nn::Gradient>(gradients).subspan(i, 1)));
-  }
-  return {};
-}
-
-Result<Mesh> TemplateFitter::Fit(const ModelData& data) {
-  const ImageStore store = StoreOf(data, info_);
-  const Unknowns x = {nn::Parameter(context_, context_.Zeros({1, shape_.numbers()})),
-                      nn::Parameter(context_, context_.Full({1, shape_.vertices(), 3}, 0.5))};
-  nn::Adam shape_adam(context_, {{"shape", x.raw}}, {}),
-      color_adam(context_, {{"color", x.colors}}, {});
-  nn::Adam* const optimizers[] = {&shape_adam, &color_adam};
-  for (int step = 0; step < config_.schedule.steps; ++step)
-    TILEGRAD_TRY(Step(store, x, step, optimizers));
-  const nn::NoGrad off(context_);
-  const Prediction meshes = MeshesOf(x);
-  TILEGRAD_TRY(context_.TakeStatus());
-  return MeshOf(shape_, meshes, 0);
-}
 
 }  // namespace
 

@@ -47,10 +47,9 @@ ConfigFields FieldsOf(ColorRule* c) {
 Status CheckConfig(const TexturedImageConfig& config) {
   TILEGRAD_TRY(CheckConfig(config.light));
   const std::string& rule = config.render.rule;
-  if (rule != "dibr" && rule != "n3mr") {
+  if (rule != "dibr" && rule != "n3mr")
     return InvalidArgument("render.rule is \"{}\", but must be \"dibr\" or \"n3mr\" for textures",
                            rule);
-  }
   const Lighting lighting = LightingOf(config.light);
   if (rule == "dibr" || lighting == Lighting::kNone || lighting == Lighting::kLambert) return {};
   return InvalidArgument("N3MR has no light.model = \"{}\"; use \"none\" or \"lambert\"",

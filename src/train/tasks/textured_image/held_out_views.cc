@@ -27,58 +27,6 @@ std::vector<float> Copied(std::span<const float> pictures) {
   return {pictures.begin(), pictures.end()};
 }
 
-}  // namespace
-
-Result<HeldOutViews> HeldOutViews::Load(const Request& request, const Workers& workers,
-                                        const Watch& watch) {
-  HeldOutViews out;
-  out.models_ = request.models;
-  TILEGRAD_ASSIGN(MeshCache meshes,
-                  OpenTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
-                                     workers, watch));
-  const DatasetInfo& info = request.dataset.info();
-  out.stream_.emplace(
-      TexturedStream::Job{WithoutChanges(request.config.stream), request.config.light, info.camera,
-                          info.image_size, kHeldOutSeed},
-      std::move(meshes), workers);
-  return out;
-}
-
-Result<HeldOutViews::Views> HeldOutViews::Draw(std::size_t i, int count) {
-  Views out;
-  out.views.resize(static_cast<std::size_t>(count));
-  const auto position = static_cast<std::uint64_t>(models_[i]);
-  TILEGRAD_TRY(stream_->Render(static_cast<int>(i), position, 0, out.views).status());
-  TILEGRAD_TRY(Fill(&out));
-  return out;
-}
-
-Result<HeldOutViews::Views> HeldOutViews::Show(std::size_t i, std::vector<TexturedView> views) {
-  Views out;
-  out.views = views;
-  const auto position = static_cast<std::uint64_t>(models_[i]);
-  TILEGRAD_TRY(stream_->Render(static_cast<int>(i), position, 0, out.views).status());
-  out.views = std::move(views);
-  TILEGRAD_TRY(stream_->Change(0, out.views));
-  TILEGRAD_TRY(Fill(&out));
-  return out;
-}
-
-// The pictures of the object as it was set up last.
-Status HeldOutViews::Fill(Views* out) {
-  TILEGRAD_ASSIGN(auto pictures, stream_->Again(0, Appearance::kLit));
-  out->lit = Copied(pictures);
-  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kTexture));
-  out->texture = Copied(pictures);
-  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kLight));
-  out->light = Copied(pictures);
-  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kNormals));
-  out->normals = Copied(pictures);
-  return {};
-}
-
-namespace {
-
 // The light search's rows: what it is given besides the picture. Truths come first.
 struct SearchMethod {
   const char* name;
@@ -211,10 +159,9 @@ class TexturedEvaluator {
   Result<Evaluation> Run(const Watch& watch) {
     const std::vector<int> models = dataset_.Select(job_.split);
     out_.split = SplitName(job_.split);
-    if (models.empty()) {
+    if (models.empty())
       return InvalidArgument("{}: its {} split has no models", dataset_.folder().string(),
                              out_.split);
-    }
     TILEGRAD_ASSIGN(HeldOutViews views,
                     HeldOutViews::Load({config_, dataset_, models}, workers_, watch));
     scores_.resize(models.size());
@@ -302,6 +249,54 @@ class TexturedEvaluator {
 };
 
 }  // namespace
+
+Result<HeldOutViews> HeldOutViews::Load(const Request& request, const Workers& workers,
+                                        const Watch& watch) {
+  HeldOutViews out;
+  out.models_ = request.models;
+  TILEGRAD_ASSIGN(MeshCache meshes,
+                  OpenTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
+                                     workers, watch));
+  const DatasetInfo& info = request.dataset.info();
+  out.stream_.emplace(
+      TexturedStream::Job{WithoutChanges(request.config.stream), request.config.light, info.camera,
+                          info.image_size, kHeldOutSeed},
+      std::move(meshes), workers);
+  return out;
+}
+
+Result<HeldOutViews::Views> HeldOutViews::Draw(std::size_t i, int count) {
+  Views out;
+  out.views.resize(static_cast<std::size_t>(count));
+  const auto position = static_cast<std::uint64_t>(models_[i]);
+  TILEGRAD_TRY(stream_->Render(static_cast<int>(i), position, 0, out.views).status());
+  TILEGRAD_TRY(Fill(&out));
+  return out;
+}
+
+Result<HeldOutViews::Views> HeldOutViews::Show(std::size_t i, std::vector<TexturedView> views) {
+  Views out;
+  out.views = views;
+  const auto position = static_cast<std::uint64_t>(models_[i]);
+  TILEGRAD_TRY(stream_->Render(static_cast<int>(i), position, 0, out.views).status());
+  out.views = std::move(views);
+  TILEGRAD_TRY(stream_->Change(0, out.views));
+  TILEGRAD_TRY(Fill(&out));
+  return out;
+}
+
+// The pictures of the object as it was set up last.
+Status HeldOutViews::Fill(Views* out) {
+  TILEGRAD_ASSIGN(auto pictures, stream_->Again(0, Appearance::kLit));
+  out->lit = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kTexture));
+  out->texture = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kLight));
+  out->light = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kNormals));
+  out->normals = Copied(pictures);
+  return {};
+}
 
 Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
                                     const Workers& workers, const Watch& watch) {

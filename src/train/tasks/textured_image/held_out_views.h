@@ -45,13 +45,12 @@ class HeldOutViews {
 
 // Table 2 of the paper, with baselines that ignore the light.
 
-// On held-out models in views_per_model views each (HeldOutViews), whose cameras the renders of
-// predictions share. Of each view: texture L1, angle of the light, texture + light L1 as
-// evaluation.h says (means over the whole image), and the scores of the shape. Rows with the
-// predicted shape and texture: "without light", "mean light" (of training: what a constant scores),
-// "tilegrad". The four before the last use the light that LightSearch finds in the same picture,
-// given the predicted or the true shape and the predicted or the true texture: they attribute the
-// light's error to shape and texture. Without a light model only the last row. Errors: as
+// On held-out models in views_per_model views each (HeldOutViews), with the true cameras. Of each
+// view: texture L1, angle of the light, texture + light L1 (evaluation.h; over the whole image),
+// and the scores of the shape. Rows with the predicted shape and texture: "without light", "mean
+// light" (of training: what a constant scores), "tilegrad". The four before the last use
+// LightSearch's light of the same picture, given the predicted or true shape and texture: they
+// attribute the light's error to these. Without a light model only the last row. Errors: as
 // CheckHeldOut and OpenTexturedMeshes; a job with a change.
 Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
                                     const Workers& workers, const Watch& watch);

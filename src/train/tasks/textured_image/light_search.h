@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The best-fitting light of a picture, given an estimate of the object: a search over many
-// directions. The colour error of a light that is far from the right one has little gradient
-// (unlit surfaces stay black when it moves a little), so a network that follows the gradient
-// learns lights slowly; the direction found here is a target for it. Directional light is compared
-// by Lambert's law (Phong highlights remain as error), light of a sky and a direction by
-// SkyAndLight.
+// directions, whose result is a target for the network. Far from the right light the colour error
+// has little gradient (unlit surfaces stay black), so that a network which follows it learns
+// slowly. Directional light is compared by Lambert's law (Phong highlights remain as error), light
+// of a sky and a direction by SkyAndLight.
 #pragma once
 
 #include <array>

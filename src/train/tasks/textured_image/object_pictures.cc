@@ -9,7 +9,7 @@
 #include "scene/camera_conventions.h"
 #include "scene/light_frame.h"
 #include "scene/shrink_image.h"
-#include "train/data/stream/average_samples.h"
+#include "train/data/stream/textured_stream.h"
 
 namespace tilegrad::train {
 namespace {
@@ -26,52 +26,6 @@ MeshSceneOptions SceneOptions(const Surface& surface) {
   options.blend = false;
   return options;
 }
-
-}  // namespace
-
-ObjectPictures::ObjectPictures(const LightConfig& light, int size, int samples)
-    : light_(light),
-      size_(size),
-      samples_(samples),
-      alone_(std::make_unique<Workers>(1)),
-      renderer_(RendererOn(*alone_)) {}
-
-Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const TexturedView& view,
-                                                Appearance appearance) {
-  Surface surface = SurfaceUnder(light_);
-  surface.shininess = view.light.shininess;
-  const MeshScene made(mesh, SceneOptions(surface));
-  Scene scene = made.scene();
-  scene.camera = ScaledCamera(view.camera, static_cast<float>(samples_));
-  const Lighting lighting = IsLit(appearance) ? LightingOf(light_) : Lighting::kNone;
-  scene.shading.lighting = lighting;
-  scene.shading.clamp = true;
-  Light light;
-  light.direction = DirectionToWorld(view.light.direction, view.camera);
-  const std::array<float, 9> sh = HarmonicsToWorld(view.light.sh, view.camera);
-  if (lighting == Lighting::kLambert || lighting == Lighting::kPhong) scene.lights = {&light, 1};
-  if (lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
-  if (appearance == Appearance::kLight) {
-    scene.textures = {};
-    scene.uvs = {};
-    scene.colors = {};
-    scene.surfaces = {&surface, 1};
-    scene.face_surfaces = {};
-  }
-  const RenderOptions options{.width = samples_ * size_, .height = samples_ * size_};
-  TILEGRAD_TRY(renderer_.Render({&scene, 1}, options, OutputsOf(appearance), &frame_));
-  std::vector<float> out(4 * static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_));
-  AverageSamples(frame_.images(), 0, samples_, out);
-  return out;
-}
-
-std::vector<std::uint8_t> ToBytes(std::span<const float> rgba) {
-  std::vector<std::uint8_t> out(rgba.size());
-  std::ranges::transform(rgba, out.begin(), ToByte);
-  return out;
-}
-
-namespace {
 
 class PictureRow {
  public:
@@ -117,6 +71,48 @@ class PictureRow {
 };
 
 }  // namespace
+
+ObjectPictures::ObjectPictures(const LightConfig& light, int size, int samples)
+    : light_(light),
+      size_(size),
+      samples_(samples),
+      alone_(std::make_unique<Workers>(1)),
+      renderer_(RendererOn(*alone_)) {}
+
+Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const TexturedView& view,
+                                                Appearance appearance) {
+  Surface surface = SurfaceUnder(light_);
+  surface.shininess = view.light.shininess;
+  const MeshScene made(mesh, SceneOptions(surface));
+  Scene scene = made.scene();
+  scene.camera = ScaledCamera(view.camera, static_cast<float>(samples_));
+  const Lighting lighting = IsLit(appearance) ? LightingOf(light_) : Lighting::kNone;
+  scene.shading.lighting = lighting;
+  scene.shading.clamp = true;
+  Light light;
+  light.direction = DirectionToWorld(view.light.direction, view.camera);
+  const std::array<float, 9> sh = HarmonicsToWorld(view.light.sh, view.camera);
+  if (lighting == Lighting::kLambert || lighting == Lighting::kPhong) scene.lights = {&light, 1};
+  if (lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
+  if (appearance == Appearance::kLight) {
+    scene.textures = {};
+    scene.uvs = {};
+    scene.colors = {};
+    scene.surfaces = {&surface, 1};
+    scene.face_surfaces = {};
+  }
+  const RenderOptions options{.width = samples_ * size_, .height = samples_ * size_};
+  TILEGRAD_TRY(renderer_.Render({&scene, 1}, options, OutputsOf(appearance), &frame_));
+  std::vector<float> out(4 * static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_));
+  AverageSamples(frame_.images(), 0, samples_, out);
+  return out;
+}
+
+std::vector<std::uint8_t> ToBytes(std::span<const float> rgba) {
+  std::vector<std::uint8_t> out(rgba.size());
+  std::ranges::transform(rgba, out.begin(), ToByte);
+  return out;
+}
 
 Result<std::vector<ShownPicture>> PicturesOf(const ShownObject& shown, ObjectPictures& pictures,
                                              int size) {

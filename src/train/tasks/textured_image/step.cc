@@ -39,6 +39,74 @@ void ReadRow(const nn::Var& rows, std::size_t row, std::array<float, N>* out) {
   });
 }
 
+template <class T>
+void Copy(std::span<const float> from, T* to) {
+  std::transform(from.begin(), from.end(), to, [](float x) { return static_cast<T>(x); });
+}
+
+// View `m` of the batch, [4][size][size], to where it is seen.
+template <class T>
+void Place(std::span<const float> rgba, std::size_t m, TexturedBatch* batch) {
+  const std::size_t plane = rgba.size() / 4;
+  Copy(rgba, batch->input.data<T>() + m * rgba.size());
+  for (const std::size_t n : {2 * m, 2 * (m ^ 1) + 1}) {
+    Copy(rgba.first(3 * plane), batch->truth_colors.data<T>() + n * 3 * plane);
+    Copy(rgba.subspan(3 * plane), batch->truth_alpha.data<T>() + n * plane);
+    batch->cameras[n] = batch->views[m].camera;
+  }
+}
+
+// A batch under construction.
+struct Rendering {
+  TexturedStream& stream;
+  std::vector<Sample> models;
+  std::uint64_t first;
+  TexturedBatch batch;
+  std::vector<Status> failures = std::vector<Status>(models.size());
+
+  void Run(std::size_t b, std::size_t lane) {
+    const auto rgba =
+        stream.Render(models[b].model, first + b, lane, std::span(batch.views).subspan(2 * b, 2));
+    failures[b] = rgba.status();
+    if (!rgba.ok()) return;
+    const std::size_t image = rgba->size() / 2;
+    nn::WithFloatType(batch.input.dtype(), [&]<class T>(T) {
+      Place<T>(rgba->first(image), 2 * b, &batch);
+      Place<T>(rgba->subspan(image), 2 * b + 1, &batch);
+    });
+  }
+  Result<TexturedBatch> Finish() {
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    batch.stream_seconds = stream.TakeSeconds();
+    return std::move(batch);
+  }
+};
+
+// The image of input m's view with the prediction from the object's other input: see TexturedBatch.
+constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
+static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
+
+template <class T>
+struct TargetRow {
+  const T* said;
+  T* out;
+  std::size_t numbers;  // 3: a direction, 9: harmonics
+};
+
+template <class T>
+void Write(const FoundLight& found, const TargetRow<T>& row) {
+  const auto& d = found.direction;
+  if (d == std::array<double, 3>{}) {
+    std::copy_n(row.said, row.numbers, row.out);
+  } else if (row.numbers == 3) {
+    std::ranges::transform(d, row.out, [](double x) { return static_cast<T>(x); });
+  } else {
+    const auto sh = SkyAndLight(
+        found.sky, {static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])});
+    std::ranges::transform(sh, row.out, [](float x) { return static_cast<T>(x); });
+  }
+}
+
 }  // namespace
 
 double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b) {
@@ -188,11 +256,10 @@ nn::Var TexturedStep::LightLoss(const Prediction& objects, const TexturedBatch& 
 double TexturedStep::LightAngle(const Prediction& objects, const TexturedBatch& batch) const {
   const Lighting lighting = LightingOf(config_.light);
   double mean = 0;
-  for (std::size_t m = 0; m < batch.views.size(); ++m) {
+  for (std::size_t m = 0; m < batch.views.size(); ++m)
     mean += AngleBetween(DirectionOf(LightOf(objects, m), lighting),
                          DirectionOf(batch.views[m].light, lighting)) /
             static_cast<double>(batch.views.size());
-  }
   return mean;
 }
 
@@ -208,69 +275,19 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   AddRegularizers(config_.loss,
                   {sphere.mesh().faces, sphere.topology(), objects.positions, objects.movement},
                   &sum);
-  if (objects.pose.valid()) {
+  if (objects.pose.valid())
     sum.Add("pose", "Camera (mean square error of its numbers)", config_.color.pose,
             PoseLoss(objects.pose, batch));
-  }
   const bool lit = LightingOf(config_.light) != Lighting::kNone;
-  if (lit && colored && config_.color.light > 0) {
+  if (lit && colored && config_.color.light > 0)
     sum.Add("light", "Light (mean square distance to the best-fitting one)", config_.color.light,
             LightLoss(objects, batch));
-  }
   if (adversary_ != nullptr) AddAdversary(renders.images, batch, &sum);
-  if (lit) {
+  if (lit)
     sum.Watch("light_angle", "Angle of the light (degrees, not part of the loss)",
               LightAngle(objects, batch));
-  }
   return sum.total();
 }
-
-namespace {
-
-template <class T>
-void Copy(std::span<const float> from, T* to) {
-  std::transform(from.begin(), from.end(), to, [](float x) { return static_cast<T>(x); });
-}
-
-// View `m` of the batch, [4][size][size], to where it is seen.
-template <class T>
-void Place(std::span<const float> rgba, std::size_t m, TexturedBatch* batch) {
-  const std::size_t plane = rgba.size() / 4;
-  Copy(rgba, batch->input.data<T>() + m * rgba.size());
-  for (const std::size_t n : {2 * m, 2 * (m ^ 1) + 1}) {
-    Copy(rgba.first(3 * plane), batch->truth_colors.data<T>() + n * 3 * plane);
-    Copy(rgba.subspan(3 * plane), batch->truth_alpha.data<T>() + n * plane);
-    batch->cameras[n] = batch->views[m].camera;
-  }
-}
-
-// A batch under construction.
-struct Rendering {
-  TexturedStream& stream;
-  std::vector<Sample> models;
-  std::uint64_t first;
-  TexturedBatch batch;
-  std::vector<Status> failures = std::vector<Status>(models.size());
-
-  void Run(std::size_t b, std::size_t lane) {
-    const auto rgba =
-        stream.Render(models[b].model, first + b, lane, std::span(batch.views).subspan(2 * b, 2));
-    failures[b] = rgba.status();
-    if (!rgba.ok()) return;
-    const std::size_t image = rgba->size() / 2;
-    nn::WithFloatType(batch.input.dtype(), [&]<class T>(T) {
-      Place<T>(rgba->first(image), 2 * b, &batch);
-      Place<T>(rgba->subspan(image), 2 * b + 1, &batch);
-    });
-  }
-  Result<TexturedBatch> Finish() {
-    for (const Status& failure : failures) TILEGRAD_TRY(failure);
-    batch.stream_seconds = stream.TakeSeconds();
-    return std::move(batch);
-  }
-};
-
-}  // namespace
 
 BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream, int size,
                                     std::vector<Sample> models, std::int64_t first) {
@@ -289,35 +306,6 @@ Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, 
                                   const std::vector<Sample>& models, std::int64_t first) {
   return MakeNow(RenderWork(context, stream, size, models, first), context);
 }
-
-namespace {
-
-// The image of input m's view with the prediction from the object's other input: see TexturedBatch.
-constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
-static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
-
-template <class T>
-struct TargetRow {
-  const T* said;
-  T* out;
-  std::size_t numbers;  // 3: a direction, 9: harmonics
-};
-
-template <class T>
-void Write(const FoundLight& found, const TargetRow<T>& row) {
-  const auto& d = found.direction;
-  if (d == std::array<double, 3>{}) {
-    std::copy_n(row.said, row.numbers, row.out);
-  } else if (row.numbers == 3) {
-    std::ranges::transform(d, row.out, [](double x) { return static_cast<T>(x); });
-  } else {
-    const auto sh = SkyAndLight(
-        found.sky, {static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])});
-    std::ranges::transform(sh, row.out, [](float x) { return static_cast<T>(x); });
-  }
-}
-
-}  // namespace
 
 LightTargets::LightTargets(nn::Context& context, const LightConfig& config)
     : context_(context), search_(config), renderer_(context) {}

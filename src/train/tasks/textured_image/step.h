@@ -2,9 +2,8 @@
 // One training step of section 5.2: images -> network -> renderer under the predicted lights ->
 // losses of equation 14 -> gradients -> Adam.
 //
-// One picture cannot separate dark paint from dim light. So each object is seen in two views under
-// two lights, and the texture predicted from one view must explain the other view under the light
-// predicted from that view.
+// One picture cannot separate dark paint from dim light. So each object has two views under two
+// lights, and the texture predicted from one must explain the other under that one's light.
 #pragma once
 
 #include <vector>
@@ -50,10 +49,9 @@ BatchWork<TexturedBatch> RenderWork(nn::Context& context, TexturedStream& stream
 Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
                                   const std::vector<Sample>& models, std::int64_t first);
 
-// Targets for the lights that the network predicts for a batch, found by search (LightSearch). The
-// object is drawn unlit with the texture predicted from its other view; the target is the light
-// that makes this most like the input. The texture of the same view depends on the predicted light,
-// so the network would learn to repeat itself.
+// Targets for the predicted lights of a batch: the light (LightSearch) that makes the object, unlit
+// with the texture predicted from its other view, most like the input. The texture of the same view
+// depends on the predicted light, so the network would learn to repeat itself.
 
 // The predicted lights that LightTargets has targets for: directions or harmonics.
 inline const nn::Var& PredictedLights(const Prediction& objects) {

@@ -13,7 +13,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/data/broken_members.h"
-#include "train/data/build/glass.h"
+#include "train/data/build/make_model.h"
 #include "train/data/build/truth_mesh.h"
 
 namespace tilegrad::train::build_test {

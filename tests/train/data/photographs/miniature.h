@@ -9,7 +9,7 @@
 #include "base/rng.h"
 #include "io/image_file.h"
 #include "scene/weak_perspective_ref.h"
-#include "train/data/photographs/cmr_writer.h"
+#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 

@@ -15,9 +15,9 @@
 #include "base/rng.h"
 #include "io/image_file.h"
 #include "io/mat_file.h"
-#include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/photographs.h"
-#include "train/data/sources/procedural.h"
+#include "train/data/photographs/rendered_set.h"
+#include "train/data/sources/model_source.h"
 
 namespace tilegrad::train {
 

@@ -7,7 +7,6 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
-#include "train/data/photographs/extreme_points.h"
 #include "train/data/photographs/factorization.h"
 
 namespace tilegrad::train::rendered_set_test {

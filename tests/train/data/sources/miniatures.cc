@@ -14,7 +14,7 @@
 #include "render/picture/mesh_scene.h"
 #include "support/expect.h"
 #include "train/data/dataset.h"
-#include "train/data/sources/procedural.h"
+#include "train/data/sources/model_source.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train::miniatures {

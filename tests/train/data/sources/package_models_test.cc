@@ -13,7 +13,6 @@
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/data/sources/package_textures.h"
 
 namespace tilegrad::train::package_models_test {
 

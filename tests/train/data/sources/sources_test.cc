@@ -10,9 +10,9 @@
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
-#include "train/data/sources/procedural.h"
+#include "train/data/sources/model_source.h"
+#include "train/data/sources/package_models.h"
 #include "train/data/sources/split_list.h"
-#include "train/data/sources/sweethome3d_list.h"
 
 namespace tilegrad::train::sources_test {
 

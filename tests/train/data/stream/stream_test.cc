@@ -20,9 +20,7 @@
 #include "support/expect.h"
 #include "train/data/stream/mesh_cache.h"
 #include "train/data/stream/object_draw.h"
-#include "train/data/stream/recolor.h"
 #include "train/data/stream/textured_stream.h"
-#include "train/data/stream/view_draw.h"
 
 namespace tilegrad::train::stream_test {
 
