@@ -13,12 +13,13 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/mesh_options.h"
-#include "cli/photograph_sets.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
+#include "tilegrad/status.h"
 #include "train/data/build/build.h"
 #include "train/data/dataset.h"
+#include "train/data/photographs/collect.h"
 #include "train/data/sources/installed.h"
 #include "train/data/sources/model_source.h"
 #include "train/data/sources/split_list.h"
@@ -39,7 +40,80 @@ struct DatasetOptions {
   train::BuildOptions build;
 
   std::string Name() const { return fmt::format("{}", fmt::join(sources, "+")); }
+  Path OutputFolder() const { return out.empty() ? Path("datasets") / Name() : Path(out); }
 };
+
+// `tilegrad dataset` for photographs: CUB-200 and PASCAL3D+.
+
+void PrintSummary(const train::CollectionSummary& summary, const Path& folder) {
+  const auto [training, validation, test] = summary.photographs;
+  Print("{}", summary.broken.Summary());
+  for (const auto& [what, count] : summary.notes) Print("{:>7}  {}\n", count, what);
+  Print("{} training, {} validation and {} test photographs in {}\n", training, validation, test,
+        folder.string());
+  PrintResult({{"folder", folder.string()},
+               {"training", training},
+               {"validation", validation},
+               {"test", test}});
+}
+
+// A folder without annotations is one of an interrupted call, if it has pictures.
+Status CheckOut(const Path& folder, const std::string& source, bool force) {
+  const Path pictures = folder / (source == "cub" ? "images" : "Images");
+  if (IsFolder(pictures) && !PathExists(folder / "data")) return {};
+  return OutputGuard(force).CheckFolder(folder);
+}
+
+Status MakeSet(const train::CollectionJob& job, const Path& folder, const Workers& workers,
+               bool force) {
+  TILEGRAD_TRY(CheckOut(folder, job.source, force));
+  ProgressLine line;
+  const auto made = train::CollectPhotographs(job, folder, workers, line.Watching());
+  line.Finish();
+  if (!made.ok()) return made.status();
+  PrintSummary(*made, folder);
+  return {};
+}
+
+// Whether a source holds photographs.
+bool IsPhotographSource(const std::string& source) {
+  return source == "cub" || source == "pascal3d";
+}
+
+// Photographs and models make no one dataset, and photographs are taken as they are.
+Status CheckPhotographOptions(const DatasetOptions& options) {
+  const std::string source = options.Name();
+  if (options.sources.size() > 1)
+    return InvalidArgument("--source {}: photographs and models make no one dataset", source);
+  if (!options.meshes_only.empty())
+    return InvalidArgument("{}: --source {} has photographs, which are taken as they are",
+                           options.meshes_only, source);
+  if (options.input.empty()) return InvalidArgument("--source {} needs --input FOLDER", source);
+  if (source != "pascal3d" && !(options.classes.empty() && options.masks.empty()))
+    return InvalidArgument("--classes, --masks: --source {} has one class, and masks", source);
+  return {};
+}
+
+// Fills one folder, or a folder in it for each of several classes; names and omits classes without
+// a usable photograph.
+Status MakePhotographs(const DatasetOptions& options) {
+  TILEGRAD_TRY(CheckPhotographOptions(options));
+  std::vector<std::string> classes = options.classes;
+  if (classes.empty()) classes = {"car"};
+  const Path out = options.OutputFolder();
+  const Workers workers(options.workers);
+  std::size_t made = 0;
+  for (const std::string& name : classes) {
+    const train::CollectionJob job{options.Name(), options.input, name, options.masks,
+                                   options.build.allow_broken};
+    Status status = MakeSet(job, classes.size() > 1 ? out / name : out, workers, options.force);
+    const bool empty = status.code() == StatusCode::kNotFound && classes.size() > 1;
+    if (!status.ok() && !empty) return status;
+    if (empty) Print("left out: {}\n", status.message());
+    made += empty ? 0 : 1;
+  }
+  return made > 0 ? Status() : NotFound("{}: none of the classes has photographs", options.input);
+}
 
 using Opened = Result<std::unique_ptr<train::ModelSource>>;
 
@@ -193,23 +267,10 @@ Opened Open(const DatasetOptions& options, const Path& folder, const Ranks& rank
   return OpenDatasetSource(options);
 }
 
-// Sets of photographs, one by one: nothing is rendered.
-Status MakePhotographs(const DatasetOptions& options) {
-  if (options.sources.size() > 1)
-    return InvalidArgument("--source {}: photographs and models make no one dataset",
-                           options.Name());
-  if (!options.meshes_only.empty())
-    return InvalidArgument("{}: --source {} has photographs, which are taken as they are",
-                           options.meshes_only, options.Name());
-  return MakePhotographSets({options.Name(), options.input, options.out, options.masks,
-                             options.classes, options.workers, options.build.allow_broken,
-                             options.force});
-}
-
 Status Make(const DatasetOptions& options) {
   if (std::ranges::any_of(options.sources, IsPhotographSource)) return MakePhotographs(options);
   const auto start = std::chrono::steady_clock::now();
-  const Path folder = options.out.empty() ? Path("datasets") / options.Name() : Path(options.out);
+  const Path folder = options.OutputFolder();
   Ranks ranks;
   TILEGRAD_TRY(ranks.Join());
   auto source = Open(options, folder, ranks);

@@ -252,18 +252,118 @@ class RenderRun {
   }
 
   // Whether files of cameras may be written, before anything is rendered.
-  Status CheckCameras() const;
-  Status Mesh(const std::string& file);
-  Status Finish();
+  Status CheckCameras() const {
+    const Path out(settings_.write_cameras);
+    if (out.empty()) return {};
+    return guard_.CheckAll(IsJson(out) ? std::vector<Path>{out} : io::ColmapFiles(out));
+  }
+
+  Status Mesh(const std::string& file) {
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(file)));
+    TILEGRAD_TRY(TakeTexture(settings_.texture, &loaded).Within(file));
+    for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
+    for (const std::string& note : MaterialNotes(loaded.mesh, settings_.soft_delta > 0))
+      PrintNote("{}: {}\n", file, note);
+    origin_ = loaded.origin;
+    auto views = ChooseViews(settings_.view, loaded);
+    if (!views.ok()) return views.status().Within(file);
+    guard_.AddInputs(loaded.files);
+    const std::string stem = stems_.Take(Path(file).stem().string());
+    TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
+    const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
+    for (std::size_t i = 0; i < views->size(); ++i) {
+      if (stop_) return Cancelled("stopped after {}", Count(rendered_.size(), "file"));
+      line_.Sink()({"rendering " + stem, i, views->size(), ""});
+      TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
+    }
+    return {};
+  }
+
+  Status Finish() {
+    line_.Finish();
+    std::vector<std::string> files;
+    for (const Path& file : rendered_) files.push_back(file.string());
+    PrintResult({{"files", files}});
+    if (rendered_.size() == 1) Print("wrote {}\n", rendered_.back().string());
+    if (rendered_.size() > 1) {
+      const Path folder = rendered_.back().parent_path();
+      Print("wrote {} to {}\n", Count(rendered_.size(), "file"),
+            folder.empty() ? "this folder" : folder.string());
+    }
+    return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
+  }
 
  private:
   Result<std::vector<PictureName>> NamePictures(const std::string& stem,
-                                                const std::vector<io::CameraView>& views);
-  Status ClaimFiles(const PictureName& name);
-  Status View(const MeshScene& scene, const io::CameraView& view, const PictureName& name);
-  Status WriteCameras() const;
-  FaceCulling Culling(const MeshScene& scene) const;
-  void Explain(const Picture& picture, const std::string& name) const;
+                                                const std::vector<io::CameraView>& views) {
+    const bool single = settings_.meshes.size() == 1 && views.size() == 1;
+    // This folder may have the mesh's textures in it, chair.png of chair.obj.
+    const std::string base = settings_.file.out.empty() ? stem + "_render" : stem;
+    std::vector<PictureName> names;
+    for (const io::CameraView& view : views) {
+      const std::string name = views.size() == 1 ? base : base + "_" + view.name;
+      TILEGRAD_ASSIGN(names.emplace_back(), NamePicture(settings_.file, name, single));
+      TILEGRAD_TRY(ClaimFiles(names.back()));
+    }
+    return names;
+  }
+
+  // Before anything is rendered.
+  Status ClaimFiles(const PictureName& name) {
+    for (const Path& file : PictureFiles(settings_.file, name)) {
+      if (!files_.insert(file).second) {
+        return InvalidArgument(
+            "{}: two images have this name; render these meshes into separate folders",
+            file.string());
+      }
+      TILEGRAD_TRY(guard_.Check(file));
+    }
+    return {};
+  }
+
+  Status View(const MeshScene& mesh_scene, const io::CameraView& view, const PictureName& name) {
+    Scene scene = mesh_scene.scene();
+    scene.camera = CameraCast<float>(view.camera);
+    scene.shading.lighting = settings_.lighting;
+    const auto lights = LightsOf(settings_, scene.camera);
+    if (UsesLights(scene.shading)) scene.lights = lights;
+    const std::vector<float> sh = HarmonicsOf(settings_);
+    if (settings_.lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
+    PictureRequest request{.width = view.size.width,
+                           .height = view.size.height,
+                           .supersampling = settings_.supersampling,
+                           .soft_delta = settings_.soft_delta,
+                           .culling = Culling(mesh_scene),
+                           .cover = mesh_scene.cover()};
+    TILEGRAD_TRY(RequestOutputs(settings_.file, &request));
+    Picture picture;
+    TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
+    TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
+    const std::vector<Path> files = PictureFiles(settings_.file, name);
+    rendered_.insert(rendered_.end(), files.begin(), files.end());
+    if (settings_.explain) Explain(picture, name.stem.string());
+    views_.push_back({name.stem.filename().string() + name.ending,
+                      MovedCamera(view.camera, origin_), view.size});
+    return {};
+  }
+
+  Status WriteCameras() const {
+    const Path out(settings_.write_cameras);
+    return IsJson(out) ? io::SaveNerfCameras(out, views_) : io::SaveColmapCameras(out, views_);
+  }
+
+  FaceCulling Culling(const MeshScene& scene) const {
+    const bool back =
+        settings_.cull == "back" || (settings_.cull == "auto" && scene.single_sided());
+    return back ? FaceCulling::kBack : FaceCulling::kNone;
+  }
+
+  void Explain(const Picture& picture, const std::string& name) const {
+    for (std::size_t i = 0; i < picture.plans.size(); ++i) {
+      Print("{}, pass {} of {}:\n", name, i + 1, picture.plans.size());
+      for (const std::string& text : ExplainLines(picture.plans[i])) Print("  {}\n", text);
+    }
+  }
 
   const RenderSettings& settings_;
   Workers workers_;
@@ -277,118 +377,6 @@ class RenderRun {
   std::set<Path> files_;               // that are written, or will be
   std::vector<Path> rendered_;         // those that are there
 };
-
-FaceCulling RenderRun::Culling(const MeshScene& scene) const {
-  const bool back = settings_.cull == "back" || (settings_.cull == "auto" && scene.single_sided());
-  return back ? FaceCulling::kBack : FaceCulling::kNone;
-}
-
-void RenderRun::Explain(const Picture& picture, const std::string& name) const {
-  for (std::size_t i = 0; i < picture.plans.size(); ++i) {
-    Print("{}, pass {} of {}:\n", name, i + 1, picture.plans.size());
-    for (const std::string& text : ExplainLines(picture.plans[i])) Print("  {}\n", text);
-  }
-}
-
-// Before anything is rendered.
-Status RenderRun::ClaimFiles(const PictureName& name) {
-  for (const Path& file : PictureFiles(settings_.file, name)) {
-    if (!files_.insert(file).second) {
-      return InvalidArgument(
-          "{}: two images have this name; render these meshes into separate folders",
-          file.string());
-    }
-    TILEGRAD_TRY(guard_.Check(file));
-  }
-  return {};
-}
-
-Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
-                       const PictureName& name) {
-  Scene scene = mesh_scene.scene();
-  scene.camera = CameraCast<float>(view.camera);
-  scene.shading.lighting = settings_.lighting;
-  const auto lights = LightsOf(settings_, scene.camera);
-  if (UsesLights(scene.shading)) scene.lights = lights;
-  const std::vector<float> sh = HarmonicsOf(settings_);
-  if (settings_.lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
-  PictureRequest request{.width = view.size.width,
-                         .height = view.size.height,
-                         .supersampling = settings_.supersampling,
-                         .soft_delta = settings_.soft_delta,
-                         .culling = Culling(mesh_scene),
-                         .cover = mesh_scene.cover()};
-  TILEGRAD_TRY(RequestOutputs(settings_.file, &request));
-  Picture picture;
-  TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
-  TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
-  const std::vector<Path> files = PictureFiles(settings_.file, name);
-  rendered_.insert(rendered_.end(), files.begin(), files.end());
-  if (settings_.explain) Explain(picture, name.stem.string());
-  views_.push_back(
-      {name.stem.filename().string() + name.ending, MovedCamera(view.camera, origin_), view.size});
-  return {};
-}
-
-Status RenderRun::Mesh(const std::string& file) {
-  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(file)));
-  TILEGRAD_TRY(TakeTexture(settings_.texture, &loaded).Within(file));
-  for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
-  for (const std::string& note : MaterialNotes(loaded.mesh, settings_.soft_delta > 0))
-    PrintNote("{}: {}\n", file, note);
-  origin_ = loaded.origin;
-  auto views = ChooseViews(settings_.view, loaded);
-  if (!views.ok()) return views.status().Within(file);
-  guard_.AddInputs(loaded.files);
-  const std::string stem = stems_.Take(Path(file).stem().string());
-  TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
-  const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
-  for (std::size_t i = 0; i < views->size(); ++i) {
-    if (stop_) return Cancelled("stopped after {}", Count(rendered_.size(), "file"));
-    line_.Sink()({"rendering " + stem, i, views->size(), ""});
-    TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
-  }
-  return {};
-}
-
-Result<std::vector<PictureName>> RenderRun::NamePictures(const std::string& stem,
-                                                         const std::vector<io::CameraView>& views) {
-  const bool single = settings_.meshes.size() == 1 && views.size() == 1;
-  // This folder may have the mesh's textures in it, chair.png of chair.obj.
-  const std::string base = settings_.file.out.empty() ? stem + "_render" : stem;
-  std::vector<PictureName> names;
-  for (const io::CameraView& view : views) {
-    const std::string name = views.size() == 1 ? base : base + "_" + view.name;
-    TILEGRAD_ASSIGN(names.emplace_back(), NamePicture(settings_.file, name, single));
-    TILEGRAD_TRY(ClaimFiles(names.back()));
-  }
-  return names;
-}
-
-Status RenderRun::Finish() {
-  line_.Finish();
-  std::vector<std::string> files;
-  for (const Path& file : rendered_) files.push_back(file.string());
-  PrintResult({{"files", files}});
-  if (rendered_.size() == 1) Print("wrote {}\n", rendered_.back().string());
-  if (rendered_.size() > 1) {
-    const Path folder = rendered_.back().parent_path();
-    Print("wrote {} to {}\n", Count(rendered_.size(), "file"),
-          folder.empty() ? "this folder" : folder.string());
-  }
-  return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
-}
-
-Status RenderRun::CheckCameras() const {
-  const Path out(settings_.write_cameras);
-  if (out.empty()) return {};
-  return guard_.CheckAll(IsJson(out) ? std::vector<Path>{out} : io::ColmapFiles(out));
-}
-
-Status RenderRun::WriteCameras() const {
-  const Path out(settings_.write_cameras);
-  return IsJson(out) ? io::SaveNerfCameras(out, views_) : io::SaveColmapCameras(out, views_);
-}
 
 // One bad mesh does not keep the others from being rendered; the first error is the result.
 Status RunRender(const RenderSettings& settings) {

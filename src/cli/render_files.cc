@@ -120,77 +120,73 @@ struct Writer {
     return WriteFileAtomic(FileOf(name, output), io::EncodeNpy(io::MakeNpy<T>(shape, values)));
   }
 
-  Status Pngs();
-  Status Npys();
-  Status Exr();
-};
-
-Status Writer::Pngs() {
-  const auto same = [](float v) { return v; };
-  if (Wants(settings, "color"))
-    TILEGRAD_TRY(Png("color", ShownColor(picture, space, settings.background), 4));
-  if (Wants(settings, "alpha")) TILEGRAD_TRY(Png("alpha", picture.alpha, 1));
-  if (Wants(settings, "depth")) TILEGRAD_TRY(Png("depth", ShownDepth(picture.depth), 1));
-  if (Wants(settings, "normals")) {
-    const auto shown =
-        Interleave(PlanesOf(picture.normals, 3), 3, [](float n) { return 0.5f * n + 0.5f; });
-    TILEGRAD_TRY(Png("normals", shown, 3));
-  }
-  if (Wants(settings, "uv"))
-    TILEGRAD_TRY(Png("uv", Interleave(PlanesOf(picture.uv, 2), 3, same), 3));
-  if (Wants(settings, "faces")) {
-    std::vector<float> shown;
-    for (const std::int32_t id : picture.face_ids) {
-      const auto color = FaceColor(id);
-      shown.insert(shown.end(), color.begin(), color.end());
+  Status Pngs() {
+    const auto same = [](float v) { return v; };
+    if (Wants(settings, "color"))
+      TILEGRAD_TRY(Png("color", ShownColor(picture, space, settings.background), 4));
+    if (Wants(settings, "alpha")) TILEGRAD_TRY(Png("alpha", picture.alpha, 1));
+    if (Wants(settings, "depth")) TILEGRAD_TRY(Png("depth", ShownDepth(picture.depth), 1));
+    if (Wants(settings, "normals")) {
+      const auto shown =
+          Interleave(PlanesOf(picture.normals, 3), 3, [](float n) { return 0.5f * n + 0.5f; });
+      TILEGRAD_TRY(Png("normals", shown, 3));
     }
-    TILEGRAD_TRY(Png("faces", shown, 3));
+    if (Wants(settings, "uv"))
+      TILEGRAD_TRY(Png("uv", Interleave(PlanesOf(picture.uv, 2), 3, same), 3));
+    if (Wants(settings, "faces")) {
+      std::vector<float> shown;
+      for (const std::int32_t id : picture.face_ids) {
+        const auto color = FaceColor(id);
+        shown.insert(shown.end(), color.begin(), color.end());
+      }
+      TILEGRAD_TRY(Png("faces", shown, 3));
+    }
+    return {};
   }
-  return {};
-}
 
-Status Writer::Npys() {
-  const auto same = [](float v) { return v; };
-  const auto floats = [&](const std::string& output, const std::vector<float>& values,
-                          std::size_t channels) { return Npy<float>(output, values, channels); };
-  if (Wants(settings, "color"))
-    TILEGRAD_TRY(floats("color", ShownColor(picture, space, settings.background), 4));
-  if (Wants(settings, "alpha")) TILEGRAD_TRY(floats("alpha", picture.alpha, 1));
-  if (Wants(settings, "depth")) TILEGRAD_TRY(floats("depth", picture.depth, 1));
-  if (Wants(settings, "normals"))
-    TILEGRAD_TRY(floats("normals", Interleave(PlanesOf(picture.normals, 3), 3, same), 3));
-  if (Wants(settings, "uv"))
-    TILEGRAD_TRY(floats("uv", Interleave(PlanesOf(picture.uv, 2), 2, same), 2));
-  if (Wants(settings, "faces")) TILEGRAD_TRY(Npy<std::int32_t>("faces", picture.face_ids, 1));
-  return {};
-}
-
-Status Writer::Exr() {
-  const std::size_t pixels = PixelCount(picture);
-  std::vector<float> color = picture.color;
-  for (std::size_t i = 0; i < color.size(); ++i) {
-    const float linear = space == ColorSpace::kLinear ? color[i] : SrgbToLinear(color[i]);
-    color[i] = linear * picture.alpha[i % pixels];
+  Status Npys() {
+    const auto same = [](float v) { return v; };
+    const auto floats = [&](const std::string& output, const std::vector<float>& values,
+                            std::size_t channels) { return Npy<float>(output, values, channels); };
+    if (Wants(settings, "color"))
+      TILEGRAD_TRY(floats("color", ShownColor(picture, space, settings.background), 4));
+    if (Wants(settings, "alpha")) TILEGRAD_TRY(floats("alpha", picture.alpha, 1));
+    if (Wants(settings, "depth")) TILEGRAD_TRY(floats("depth", picture.depth, 1));
+    if (Wants(settings, "normals"))
+      TILEGRAD_TRY(floats("normals", Interleave(PlanesOf(picture.normals, 3), 3, same), 3));
+    if (Wants(settings, "uv"))
+      TILEGRAD_TRY(floats("uv", Interleave(PlanesOf(picture.uv, 2), 2, same), 2));
+    if (Wants(settings, "faces")) TILEGRAD_TRY(Npy<std::int32_t>("faces", picture.face_ids, 1));
+    return {};
   }
-  // Exact up to 2^24 faces: a float channel is what every reader takes.
-  const std::vector<float> faces(picture.face_ids.begin(), picture.face_ids.end());
-  io::ExrImage image{picture.width, picture.height, {}};
-  const auto add = [&](const std::string& output, const std::vector<float>& values,
-                       std::initializer_list<const char*> channels) {
-    if (!Wants(settings, output)) return;
-    const Planes planes = PlanesOf(values, channels.size());
-    for (std::size_t c = 0; c < channels.size(); ++c)
-      image.channels.push_back({channels.begin()[c], planes[c]});
-  };
-  add("color", color, {"R", "G", "B"});
-  if (Wants(settings, "color") || Wants(settings, "alpha"))
-    image.channels.push_back({"A", picture.alpha});
-  add("depth", picture.depth, {"Z"});
-  add("normals", picture.normals, {"normal.X", "normal.Y", "normal.Z"});
-  add("uv", picture.uv, {"uv.U", "uv.V"});
-  add("faces", faces, {"face.id"});
-  return io::SaveExr(FileOf(name, "color"), image);
-}
+
+  Status Exr() {
+    const std::size_t pixels = PixelCount(picture);
+    std::vector<float> color = picture.color;
+    for (std::size_t i = 0; i < color.size(); ++i) {
+      const float linear = space == ColorSpace::kLinear ? color[i] : SrgbToLinear(color[i]);
+      color[i] = linear * picture.alpha[i % pixels];
+    }
+    // Exact up to 2^24 faces: a float channel is what every reader takes.
+    const std::vector<float> faces(picture.face_ids.begin(), picture.face_ids.end());
+    io::ExrImage image{picture.width, picture.height, {}};
+    const auto add = [&](const std::string& output, const std::vector<float>& values,
+                         std::initializer_list<const char*> channels) {
+      if (!Wants(settings, output)) return;
+      const Planes planes = PlanesOf(values, channels.size());
+      for (std::size_t c = 0; c < channels.size(); ++c)
+        image.channels.push_back({channels.begin()[c], planes[c]});
+    };
+    add("color", color, {"R", "G", "B"});
+    if (Wants(settings, "color") || Wants(settings, "alpha"))
+      image.channels.push_back({"A", picture.alpha});
+    add("depth", picture.depth, {"Z"});
+    add("normals", picture.normals, {"normal.X", "normal.Y", "normal.Z"});
+    add("uv", picture.uv, {"uv.U", "uv.V"});
+    add("faces", faces, {"face.id"});
+    return io::SaveExr(FileOf(name, "color"), image);
+  }
+};
 
 }  // namespace
 

@@ -53,24 +53,181 @@ class Separation {
     return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   }
   std::size_t At(int x, int y) const { return static_cast<std::size_t>(y * width_ + x); }
-  bool OnBorder(std::size_t p) const;
-  glm::dvec3 Terms(std::size_t p) const;  // 1, x, y, the latter in [-1, 1]
-  double Gap(std::span<const float> color, std::size_t p) const;
+
+  bool OnBorder(std::size_t p) const {
+    const int x = static_cast<int>(p) % width_, y = static_cast<int>(p) / width_;
+    const int wide =
+        std::max(1, static_cast<int>(std::lround(kBorder * std::min(width_, height_))));
+    return std::min({x, y, width_ - 1 - x, height_ - 1 - y}) < wide;
+  }
+
+  // 1, x, y, the latter in [-1, 1].
+  glm::dvec3 Terms(std::size_t p) const {
+    const int x = static_cast<int>(p) % width_, y = static_cast<int>(p) / width_;
+    return {1, 2.0 * (x + 0.5) / width_ - 1, 2.0 * (y + 0.5) / height_ - 1};
+  }
+
+  double Gap(std::span<const float> color, std::size_t p) const {
+    const glm::dvec3 terms = Terms(p);
+    double most = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double value = static_cast<double>(color[c * pixels() + p]);
+      most = std::max(most, std::abs(value - glm::dot(model_[c], terms)));
+    }
+    return most;
+  }
 
   template <class Value>  // float(std::size_t pixel)
-  std::vector<float> Mean3x3(const Value& value) const;
-  std::vector<float> Averaged(std::span<const float> color) const;
-  void FitBorder();
-  void Measure();
-  void Flood();
-  void Peel();
-  void DropSpecks();
-  std::vector<float> Soft() const;
-  std::string Doubt() const;
+  std::vector<float> Mean3x3(const Value& value) const {
+    std::vector<float> out(pixels());
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x) {
+        float sum = 0;
+        for (int k = 0; k < 9; ++k) {
+          sum += value(At(std::clamp(x + k % 3 - 1, 0, width_ - 1),
+                          std::clamp(y + k / 3 - 1, 0, height_ - 1)));
+        }
+        out[At(x, y)] = sum / 9;
+      }
+    }
+    return out;
+  }
+
+  std::vector<float> Averaged(std::span<const float> color) const {
+    std::vector<float> out;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto plane = color.subspan(c * pixels(), pixels());
+      const std::vector<float> mean = Mean3x3([&](std::size_t p) { return plane[p]; });
+      out.insert(out.end(), mean.begin(), mean.end());
+    }
+    return out;
+  }
+
+  void FitBorder() {
+    for (std::size_t p = 0; p < pixels(); ++p) {
+      if (OnBorder(p)) border_.push_back(p);
+    }
+    std::vector<std::size_t> kept = border_;
+    for (int round = 0; round < kRounds; ++round) {
+      glm::dmat3 normal(1e-9);
+      std::array<glm::dvec3, 3> right{};
+      for (const std::size_t p : kept) {
+        const glm::dvec3 terms = Terms(p);
+        normal += glm::outerProduct(terms, terms);
+        for (std::size_t c = 0; c < 3; ++c) {
+          right[c] += static_cast<double>(color_[c * pixels() + p]) * terms;
+        }
+      }
+      for (std::size_t c = 0; c < 3; ++c) model_[c] = glm::inverse(normal) * right[c];
+      // The median bears with an object on half of the border.
+      std::vector<double> gaps;
+      for (const std::size_t p : border_) gaps.push_back(Gap(color_, p));
+      deviation_ = kToDeviation * Median(&gaps);
+      const double most = std::max(kKept * deviation_, kLeastThreshold / 2);
+      kept.clear();
+      for (const std::size_t p : border_) {
+        if (Gap(color_, p) <= most) kept.push_back(p);
+      }
+    }
+  }
+
+  void Measure() {
+    threshold_ = std::max(kLeastThreshold, kThreshold * deviation_);
+    gap_.resize(pixels());
+    place_.resize(pixels());
+    for (std::size_t p = 0; p < pixels(); ++p) gap_[p] = static_cast<float>(Gap(color_, p));
+    const auto outside = std::ranges::count_if(
+        border_, [&](std::size_t p) { return static_cast<double>(gap_[p]) > threshold_; });
+    foreign_ = static_cast<double>(outside) / static_cast<double>(border_.size());
+  }
+
+  void Flood() {
+    const auto plain = [&](std::size_t p) { return static_cast<double>(gap_[p]) <= threshold_; };
+    const auto like = [&](std::size_t p) { return static_cast<double>(gap_[p]) <= threshold_ / 2; };
+    for (const std::size_t p : border_) {
+      if (place_[p] == Place::kUnknown && plain(p)) Spread(p, Place::kBackground, plain);
+    }
+    const double least = kHole * static_cast<double>(pixels());
+    for (std::size_t p = 0; p < pixels(); ++p) {
+      if (place_[p] != Place::kUnknown || !like(p)) continue;
+      const auto hole = Spread(p, Place::kBackground, [&](std::size_t q) {
+        return place_[q] == Place::kUnknown && like(q);
+      });
+      if (static_cast<double>(hole.size()) >= least) continue;
+      for (const std::size_t q : hole) place_[q] = Place::kObject;
+    }
+    for (Place& place : place_) {
+      if (place == Place::kUnknown) place = Place::kObject;
+    }
+  }
+
+  void Peel() {
+    std::vector<double> gaps;
+    for (const std::size_t p : border_) gaps.push_back(Gap(raw_, p));
+    const double threshold = std::max(kLeastThreshold, kThreshold * kToDeviation * Median(&gaps));
+    const std::vector<float> share =
+        Mean3x3([&](std::size_t p) { return place_[p] == Place::kObject ? 1.0f : 0.0f; });
+    for (std::size_t p = 0; p < pixels(); ++p) {
+      if (share[p] < 1 && Gap(raw_, p) <= threshold) place_[p] = Place::kBackground;
+    }
+  }
+
+  void DropSpecks() {
+    std::vector<std::vector<std::size_t>> parts;
+    for (std::size_t p = 0; p < pixels(); ++p) {
+      if (place_[p] != Place::kObject) continue;
+      parts.push_back(
+          Spread(p, Place::kUnknown, [&](std::size_t q) { return place_[q] == Place::kObject; }));
+    }
+    std::size_t largest = 0;
+    for (const auto& part : parts) largest = std::max(largest, part.size());
+    for (const auto& part : parts) {
+      const bool speck = static_cast<double>(part.size()) < kSpeck * static_cast<double>(largest);
+      for (const std::size_t p : part) place_[p] = speck ? Place::kBackground : Place::kObject;
+    }
+  }
+
+  std::vector<float> Soft() const {
+    return Mean3x3([&](std::size_t p) { return place_[p] == Place::kObject ? 1.0f : 0.0f; });
+  }
+
+  std::string Doubt() const {
+    if (deviation_ > kMostUneven) {
+      return fmt::format("the background is not plain: it varies by {:.2f} along the border",
+                         deviation_);
+    }
+    if (foreign_ > kMostForeign) {
+      return fmt::format(
+          "the background is not plain, or the object is cut off: {:.0f} % of the border differ "
+          "from "
+          "the rest",
+          100 * foreign_);
+    }
+    const auto object = std::ranges::count(place_, Place::kObject);
+    const double share = static_cast<double>(object) / static_cast<double>(pixels());
+    if (share < kLeastObject) return "no foreground differs from the background";
+    if (share > kMostObject) return "almost no pixel resembles the border: no background was found";
+    return {};
+  }
 
   // Pixels that are connected with `first` and satisfy `belongs`, which are given `mark`.
   template <class Belongs>
-  std::vector<std::size_t> Spread(std::size_t first, Place mark, const Belongs& belongs);
+  std::vector<std::size_t> Spread(std::size_t first, Place mark, const Belongs& belongs) {
+    std::vector<std::size_t> found = {first};
+    place_[first] = mark;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const int x = static_cast<int>(found[i]) % width_, y = static_cast<int>(found[i]) / width_;
+      const int next[4][2] = {{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}};
+      for (const auto& [u, v] : next) {
+        if (u < 0 || v < 0 || u >= width_ || v >= height_) continue;
+        const std::size_t p = At(u, v);
+        if (place_[p] == mark || !belongs(p)) continue;
+        place_[p] = mark;
+        found.push_back(p);
+      }
+    }
+    return found;
+  }
 
   const int width_, height_;
   const std::span<const float> raw_;
@@ -81,177 +238,6 @@ class Separation {
   double deviation_ = 0, threshold_ = 0, foreign_ = 0;
   std::vector<Place> place_;
 };
-
-template <class Value>
-std::vector<float> Separation::Mean3x3(const Value& value) const {
-  std::vector<float> out(pixels());
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      float sum = 0;
-      for (int k = 0; k < 9; ++k) {
-        sum += value(At(std::clamp(x + k % 3 - 1, 0, width_ - 1),
-                        std::clamp(y + k / 3 - 1, 0, height_ - 1)));
-      }
-      out[At(x, y)] = sum / 9;
-    }
-  }
-  return out;
-}
-
-std::vector<float> Separation::Averaged(std::span<const float> color) const {
-  std::vector<float> out;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const auto plane = color.subspan(c * pixels(), pixels());
-    const std::vector<float> mean = Mean3x3([&](std::size_t p) { return plane[p]; });
-    out.insert(out.end(), mean.begin(), mean.end());
-  }
-  return out;
-}
-
-bool Separation::OnBorder(std::size_t p) const {
-  const int x = static_cast<int>(p) % width_, y = static_cast<int>(p) / width_;
-  const int wide = std::max(1, static_cast<int>(std::lround(kBorder * std::min(width_, height_))));
-  return std::min({x, y, width_ - 1 - x, height_ - 1 - y}) < wide;
-}
-
-glm::dvec3 Separation::Terms(std::size_t p) const {
-  const int x = static_cast<int>(p) % width_, y = static_cast<int>(p) / width_;
-  return {1, 2.0 * (x + 0.5) / width_ - 1, 2.0 * (y + 0.5) / height_ - 1};
-}
-
-double Separation::Gap(std::span<const float> color, std::size_t p) const {
-  const glm::dvec3 terms = Terms(p);
-  double most = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const double value = static_cast<double>(color[c * pixels() + p]);
-    most = std::max(most, std::abs(value - glm::dot(model_[c], terms)));
-  }
-  return most;
-}
-
-void Separation::FitBorder() {
-  for (std::size_t p = 0; p < pixels(); ++p) {
-    if (OnBorder(p)) border_.push_back(p);
-  }
-  std::vector<std::size_t> kept = border_;
-  for (int round = 0; round < kRounds; ++round) {
-    glm::dmat3 normal(1e-9);
-    std::array<glm::dvec3, 3> right{};
-    for (const std::size_t p : kept) {
-      const glm::dvec3 terms = Terms(p);
-      normal += glm::outerProduct(terms, terms);
-      for (std::size_t c = 0; c < 3; ++c) {
-        right[c] += static_cast<double>(color_[c * pixels() + p]) * terms;
-      }
-    }
-    for (std::size_t c = 0; c < 3; ++c) model_[c] = glm::inverse(normal) * right[c];
-    // The median bears with an object on half of the border.
-    std::vector<double> gaps;
-    for (const std::size_t p : border_) gaps.push_back(Gap(color_, p));
-    deviation_ = kToDeviation * Median(&gaps);
-    const double most = std::max(kKept * deviation_, kLeastThreshold / 2);
-    kept.clear();
-    for (const std::size_t p : border_) {
-      if (Gap(color_, p) <= most) kept.push_back(p);
-    }
-  }
-}
-
-void Separation::Measure() {
-  threshold_ = std::max(kLeastThreshold, kThreshold * deviation_);
-  gap_.resize(pixels());
-  place_.resize(pixels());
-  for (std::size_t p = 0; p < pixels(); ++p) gap_[p] = static_cast<float>(Gap(color_, p));
-  const auto outside = std::ranges::count_if(
-      border_, [&](std::size_t p) { return static_cast<double>(gap_[p]) > threshold_; });
-  foreign_ = static_cast<double>(outside) / static_cast<double>(border_.size());
-}
-
-template <class Belongs>
-std::vector<std::size_t> Separation::Spread(std::size_t first, Place mark, const Belongs& belongs) {
-  std::vector<std::size_t> found = {first};
-  place_[first] = mark;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const int x = static_cast<int>(found[i]) % width_, y = static_cast<int>(found[i]) / width_;
-    const int next[4][2] = {{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}};
-    for (const auto& [u, v] : next) {
-      if (u < 0 || v < 0 || u >= width_ || v >= height_) continue;
-      const std::size_t p = At(u, v);
-      if (place_[p] == mark || !belongs(p)) continue;
-      place_[p] = mark;
-      found.push_back(p);
-    }
-  }
-  return found;
-}
-
-void Separation::Flood() {
-  const auto plain = [&](std::size_t p) { return static_cast<double>(gap_[p]) <= threshold_; };
-  const auto like = [&](std::size_t p) { return static_cast<double>(gap_[p]) <= threshold_ / 2; };
-  for (const std::size_t p : border_) {
-    if (place_[p] == Place::kUnknown && plain(p)) Spread(p, Place::kBackground, plain);
-  }
-  const double least = kHole * static_cast<double>(pixels());
-  for (std::size_t p = 0; p < pixels(); ++p) {
-    if (place_[p] != Place::kUnknown || !like(p)) continue;
-    const auto hole = Spread(p, Place::kBackground, [&](std::size_t q) {
-      return place_[q] == Place::kUnknown && like(q);
-    });
-    if (static_cast<double>(hole.size()) >= least) continue;
-    for (const std::size_t q : hole) place_[q] = Place::kObject;
-  }
-  for (Place& place : place_) {
-    if (place == Place::kUnknown) place = Place::kObject;
-  }
-}
-
-void Separation::Peel() {
-  std::vector<double> gaps;
-  for (const std::size_t p : border_) gaps.push_back(Gap(raw_, p));
-  const double threshold = std::max(kLeastThreshold, kThreshold * kToDeviation * Median(&gaps));
-  const std::vector<float> share =
-      Mean3x3([&](std::size_t p) { return place_[p] == Place::kObject ? 1.0f : 0.0f; });
-  for (std::size_t p = 0; p < pixels(); ++p) {
-    if (share[p] < 1 && Gap(raw_, p) <= threshold) place_[p] = Place::kBackground;
-  }
-}
-
-void Separation::DropSpecks() {
-  std::vector<std::vector<std::size_t>> parts;
-  for (std::size_t p = 0; p < pixels(); ++p) {
-    if (place_[p] != Place::kObject) continue;
-    parts.push_back(
-        Spread(p, Place::kUnknown, [&](std::size_t q) { return place_[q] == Place::kObject; }));
-  }
-  std::size_t largest = 0;
-  for (const auto& part : parts) largest = std::max(largest, part.size());
-  for (const auto& part : parts) {
-    const bool speck = static_cast<double>(part.size()) < kSpeck * static_cast<double>(largest);
-    for (const std::size_t p : part) place_[p] = speck ? Place::kBackground : Place::kObject;
-  }
-}
-
-std::vector<float> Separation::Soft() const {
-  return Mean3x3([&](std::size_t p) { return place_[p] == Place::kObject ? 1.0f : 0.0f; });
-}
-
-std::string Separation::Doubt() const {
-  if (deviation_ > kMostUneven) {
-    return fmt::format("the background is not plain: it varies by {:.2f} along the border",
-                       deviation_);
-  }
-  if (foreign_ > kMostForeign) {
-    return fmt::format(
-        "the background is not plain, or the object is cut off: {:.0f} % of the border differ from "
-        "the rest",
-        100 * foreign_);
-  }
-  const auto object = std::ranges::count(place_, Place::kObject);
-  const double share = static_cast<double>(object) / static_cast<double>(pixels());
-  if (share < kLeastObject) return "no foreground differs from the background";
-  if (share > kMostObject) return "almost no pixel resembles the border: no background was found";
-  return {};
-}
 
 }  // namespace
 

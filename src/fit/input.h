@@ -11,8 +11,9 @@
 
 #include "base/file.h"
 #include "base/progress.h"
-#include "fit/bare_frames.h"
 #include "fit/image_loss.h"
+#include "fit/input.h"
+#include "fit/transforms.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
 
@@ -70,7 +71,7 @@ struct InputOptions {
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
-// none). Or a folder of pictures alone, which come without cameras (bare_frames.h). An image's mask
+// none). Or a folder of pictures alone, which come without cameras (transforms.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
 // images must have one size. Lenses that bend rays are straightened (undistort.h). Errors name the
 // file.
@@ -81,8 +82,8 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
 
 // What is left to do once there are names, cameras and images: masks as `background` says, of
 // images with alpha or opaque ones; every `hold_out`-th of the views that are not held out is; the
-// world turned so that y is up (input_up.h). Views whose mask is empty go, with a warning. An error
-// if no view is left to fit, or names one whose camera no fit can compute with (camera_check.h).
+// world turned so that y is up (TurnInputUpright). Views whose mask is empty go, with a warning. An
+// error if no view is left to fit, or names one whose camera no fit can compute with (CheckCamera).
 Status FinishInput(const InputOptions& options, FitInput* input);
 
 // Whether some pixel is not opaque.
@@ -108,5 +109,12 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size);
 // Means over squares of `factor` pixels; colours weighted by alpha. The sides must be multiples of
 // `factor`.
 TargetImages Reduce(const TargetImages& images, int factor);
+
+// The axis that all cameras stand upright about; none where that is not plain, or is y.
+std::optional<UpAxis> GuessUp(std::span<const Camera> cameras);
+
+// Turns the world y up, as in glTF, from `up` or, if that is not given, from GuessUp, with a
+// warning. In COLMAP's own world, up is the mean up of the cameras (UpOf).
+void TurnInputUpright(std::optional<UpAxis> up, FitInput* input);
 
 }  // namespace tilegrad::train

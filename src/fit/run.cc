@@ -35,39 +35,34 @@ namespace {
 // distance d outside.
 class SoftTargets {
  public:
-  SoftTargets(TargetImages images, const Workers& workers);
+  SoftTargets(TargetImages images, const Workers& workers)
+      : images_(std::move(images)), distances_(images_.alpha.size() / images_.pixels()) {
+    images_.silhouette = AlignedVector<float>(images_.outline());
+    workers.For(distances_.size(), [&](std::size_t v, std::size_t) {
+      const std::size_t plane = images_.pixels();
+      distances_[v] = DistanceOf(std::span(images_.silhouette).subspan(v * plane, plane),
+                                 images_.width, images_.height);
+    });
+  }
 
   // The images, with `silhouette` set for these views. delta in squared NDC. Allocates nothing.
-  const TargetImages& At(double delta, std::span<const int> views, const Workers& workers);
+  const TargetImages& At(double delta, std::span<const int> views, const Workers& workers) {
+    const double ndc = 2.0 / std::max(images_.width, images_.height);
+    const auto factor = static_cast<float>(ndc * ndc / delta);
+    workers.For(views.size(), [&](std::size_t i, std::size_t) {
+      const auto v = static_cast<std::size_t>(views[i]);
+      const std::vector<float>& d = distances_[v].values;
+      float* to = &images_.silhouette[v * images_.pixels()];
+      for (std::size_t p = 0; p < d.size(); ++p)
+        to[p] = d[p] >= 0 ? 1.0f : std::exp(-d[p] * d[p] * factor);
+    });
+    return images_;
+  }
 
  private:
   TargetImages images_;
   std::vector<MaskDistance> distances_;  // of each view
 };
-
-SoftTargets::SoftTargets(TargetImages images, const Workers& workers)
-    : images_(std::move(images)), distances_(images_.alpha.size() / images_.pixels()) {
-  images_.silhouette = AlignedVector<float>(images_.outline());
-  workers.For(distances_.size(), [&](std::size_t v, std::size_t) {
-    const std::size_t plane = images_.pixels();
-    distances_[v] = DistanceOf(std::span(images_.silhouette).subspan(v * plane, plane),
-                               images_.width, images_.height);
-  });
-}
-
-const TargetImages& SoftTargets::At(double delta, std::span<const int> views,
-                                    const Workers& workers) {
-  const double ndc = 2.0 / std::max(images_.width, images_.height);
-  const auto factor = static_cast<float>(ndc * ndc / delta);
-  workers.For(views.size(), [&](std::size_t i, std::size_t) {
-    const auto v = static_cast<std::size_t>(views[i]);
-    const std::vector<float>& d = distances_[v].values;
-    float* to = &images_.silhouette[v * images_.pixels()];
-    for (std::size_t p = 0; p < d.size(); ++p)
-      to[p] = d[p] >= 0 ? 1.0f : std::exp(-d[p] * d[p] * factor);
-  });
-  return images_;
-}
 
 constexpr std::int64_t kLogEvery = 10;
 constexpr const char* kInput = "input = ";
@@ -140,7 +135,21 @@ class FitWork : public RunWork {
   Status Begin(std::int64_t /*first_step*/) override {
     return job_.begun ? job_.begun() : Status();
   }
-  Status Step(std::int64_t step, StepValues* values) override;
+
+  Status Step(std::int64_t step, StepValues* values) override {
+    const FitConfig& config = config_;
+    const double time = clock_.At(step);
+    const FitSchedule schedule = ScheduleAt(config, time, SizeOf(job_.input));
+    const std::vector<int> views = ViewsAt(config, step, job_.input.training);
+    TILEGRAD_ASSIGN(FitValues v,
+                    fitter_.Step(StepOf(config, schedule, Targets(schedule, views), views)));
+    clock_.Note(step, v.image_loss);
+    *values = std::move(v);
+    values->also = {{"delta", schedule.delta}, {"factor", static_cast<double>(schedule.factor)}};
+    values->images = static_cast<std::int64_t>(views.size());
+    return {};
+  }
+
   std::vector<nn::NamedTensor> State() override {
     std::vector<nn::NamedTensor> state = fitter_.State();
     for (auto& tensor : clock_.State(context_)) state.push_back(std::move(tensor));
@@ -154,15 +163,40 @@ class FitWork : public RunWork {
   bool HasPicture(std::int64_t steps) const override {
     return ShowsAt(job_.config, steps) || (config_.timelapse > 0 && steps == clock_.End());
   }
-  Result<ImageU8> Picture(std::int64_t steps) override;
-  Mesh PictureMesh() const override;
+
+  Result<ImageU8> Picture(std::int64_t /*steps*/) override {
+    FitRenderer renderer(context_.workers());
+    FitRenderer::Job job;
+    job.views = std::span(job_.input.training).first(1);
+    job.alpha = false;
+    job.options.width = job_.input.images.width;
+    job.options.height = job_.input.images.height;
+    TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
+    return OverGrey(renderer.images(), 0, kWhite);
+  }
+
+  Mesh PictureMesh() const override {
+    Mesh mesh = MeshOfScene(fitter_.scene());
+    for (MeshTexture& texture : mesh.textures)
+      texture.image = ShrunkImage(texture.image, kPictureTexels);
+    return mesh;
+  }
 
   const FitScene& scene() const { return fitter_.scene(); }
   const FitClock& clock() const { return clock_; }
 
  private:
   // What views are held to at a schedule's resolution and softness.
-  const TargetImages& Targets(const FitSchedule& schedule, std::span<const int> views);
+  const TargetImages& Targets(const FitSchedule& schedule, std::span<const int> views) {
+    auto at = targets_.find(schedule.factor);
+    if (at == targets_.end()) {
+      at = targets_
+               .emplace(schedule.factor,
+                        SoftTargets(Reduce(job_.input.images, schedule.factor), context_.workers()))
+               .first;
+    }
+    return at->second.At(schedule.delta, views, context_.workers());
+  }
 
   const FitJob& job_;
   const FitConfig config_;
@@ -171,49 +205,6 @@ class FitWork : public RunWork {
   FitClock clock_;
   std::map<int, SoftTargets> targets_;  // by factor
 };
-
-const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<const int> views) {
-  auto at = targets_.find(schedule.factor);
-  if (at == targets_.end()) {
-    at = targets_
-             .emplace(schedule.factor,
-                      SoftTargets(Reduce(job_.input.images, schedule.factor), context_.workers()))
-             .first;
-  }
-  return at->second.At(schedule.delta, views, context_.workers());
-}
-
-Status FitWork::Step(std::int64_t step, StepValues* values) {
-  const FitConfig& config = config_;
-  const double time = clock_.At(step);
-  const FitSchedule schedule = ScheduleAt(config, time, SizeOf(job_.input));
-  const std::vector<int> views = ViewsAt(config, step, job_.input.training);
-  TILEGRAD_ASSIGN(FitValues v,
-                  fitter_.Step(StepOf(config, schedule, Targets(schedule, views), views)));
-  clock_.Note(step, v.image_loss);
-  *values = std::move(v);
-  values->also = {{"delta", schedule.delta}, {"factor", static_cast<double>(schedule.factor)}};
-  values->images = static_cast<std::int64_t>(views.size());
-  return {};
-}
-
-Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
-  FitRenderer renderer(context_.workers());
-  FitRenderer::Job job;
-  job.views = std::span(job_.input.training).first(1);
-  job.alpha = false;
-  job.options.width = job_.input.images.width;
-  job.options.height = job_.input.images.height;
-  TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return OverGrey(renderer.images(), 0, kWhite);
-}
-
-Mesh FitWork::PictureMesh() const {
-  Mesh mesh = MeshOfScene(fitter_.scene());
-  for (MeshTexture& texture : mesh.textures)
-    texture.image = ShrunkImage(texture.image, kPictureTexels);
-  return mesh;
-}
 
 // A texture that began blank has no colour where no view looked. One of the user's keeps his there.
 Status FillTexture(const FitJob& job, const Workers& workers, FitScene* scene) {
@@ -225,9 +216,6 @@ Status FillTexture(const FitJob& job, const Workers& workers, FitScene* scene) {
   return {};
 }
 
-}  // namespace
-
-namespace {
 Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& start,
                                            const Workers& workers) {
   const FitSchedule schedule = ScheduleAt(start.config, 0, SizeOf(job.input));

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
-#include <numeric>
 
+#include "base/union_find.h"
 #include "fit/unknowns.h"
 
 namespace tilegrad::train {
@@ -48,27 +48,6 @@ struct TexelGrid {
 TexelGrid GridOf(const FitScene& scene) {
   return {scene.texture.width, scene.texture.height, scene.wrap == Wrap::kRepeat};
 }
-
-// Which chart each pair of texture coordinates is of.
-class ChartUnion {
- public:
-  explicit ChartUnion(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  std::int32_t Find(std::int32_t i) {
-    auto& parent = parent_[static_cast<std::size_t>(i)];
-    while (parent != parent_[static_cast<std::size_t>(parent)])
-      parent = parent_[static_cast<std::size_t>(parent)];
-    return parent;
-  }
-  void Join(std::int32_t a, std::int32_t b) {
-    const std::int32_t low = std::min(Find(a), Find(b)), high = std::max(Find(a), Find(b));
-    parent_[static_cast<std::size_t>(high)] = low;
-  }
-
- private:
-  std::vector<std::int32_t> parent_;
-};
 
 // Calls visit(column, row) for each texel centre in a triangle, its border included.
 template <class Visit>
@@ -179,7 +158,7 @@ Result<std::vector<bool>> SeenTexels(const FitScene& scene, std::span<const int>
 
 std::vector<std::int32_t> ChartsOfTexels(const FitScene& scene) {
   const TexelGrid grid = GridOf(scene);
-  ChartUnion charts(scene.uvs.size() / 2);
+  UnionFind charts(scene.uvs.size() / 2);
   const std::vector<std::int32_t>& uv = scene.uv_indices;
   for (std::size_t c = 0; c + 2 < uv.size(); c += 3) {
     charts.Join(uv[c], uv[c + 1]);
@@ -189,7 +168,7 @@ std::vector<std::int32_t> ChartsOfTexels(const FitScene& scene) {
   for (std::size_t c = 0; c + 2 < uv.size(); c += 3) {
     const std::array corners = {TexelAt(scene, uv[c]), TexelAt(scene, uv[c + 1]),
                                 TexelAt(scene, uv[c + 2])};
-    const std::int32_t chart = charts.Find(uv[c]);
+    const auto chart = static_cast<std::int32_t>(charts.Of(uv[c]));
     ForEachTexel(corners, grid, [&](int x, int y) {
       const std::ptrdiff_t at = grid.At(x, y);
       if (at >= 0) out[static_cast<std::size_t>(at)] = chart;

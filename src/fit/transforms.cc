@@ -3,12 +3,76 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <vector>
 
+#include "base/error.h"
+#include "base/file.h"
 #include "base/json_text.h"
-#include "fit/camera_check.h"
+#include "io/camera_file.h"
+#include "io/image_file.h"
+#include "scene/camera.h"
+#include "scene/camera_conventions.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad::train {
 namespace {
+
+// Its pictures; a warning names those that are not read.
+std::vector<Path> TakePictures(const Path& folder, std::vector<std::string>* warnings) {
+  io::PictureNames found = io::PicturesIn(folder);
+  if (!found.others.empty())
+    warnings->push_back(fmt::format("{}: left out {}", folder.string(), found.DescribeOthers()));
+  return std::move(found.read);
+}
+
+// The folder that the names of images count from.
+Result<Path> FindImages(const Path& model, const std::string& first) {
+  std::error_code error;
+  Path folder = std::filesystem::absolute(model, error).lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();  // "model/"
+  for (int up = 0; up < 4; ++up, folder = folder.parent_path()) {
+    for (const Path& candidate : {folder / "images", folder}) {
+      if (IsFile(candidate / first)) return candidate;
+    }
+  }
+  return NotFound(
+      "{}: image {} not found, neither beside the model or above it nor in a folder \"images\" "
+      "there",
+      model.string(), first);
+}
+
+// The mask of `images`/`name`, in a folder "masks" or "mask" beside `images` or in it; empty where
+// there is none.
+Path MaskFileOf(const Path& images, const Path& name) {
+  for (const Path& folder :
+       {images.parent_path() / "masks", images.parent_path() / "mask", images / "masks"}) {
+    for (const Path& candidate : {folder / (name.string() + ".png"),
+                                  (folder / name).replace_extension(".png"), folder / name}) {
+      if (IsFile(candidate)) return candidate;
+    }
+  }
+  return {};
+}
+
+io::NerfFrame FrameOf(const io::CameraView& view) {
+  const NerfCamera camera = ToNerf(view.camera);
+  io::NerfFrame frame;
+  frame.place = view.name;
+  frame.camera_to_world = camera.camera_to_world;
+  frame.fl_x = camera.fl_x;
+  frame.fl_y = camera.fl_y;
+  frame.cx = camera.cx;
+  frame.cy = camera.cy;
+  frame.size = view.size;
+  frame.lens = view.lens;
+  return frame;
+}
+
+// Lenses that see from 179.9 degrees to a hundred-thousandth of one.
+constexpr double kLeastFocal = 5e-4, kMostFocal = 1e7;  // longer sides of the image
+constexpr double kMostOffCentre = 1e4;                  // longer sides of the image
+constexpr double kFarthest = 1e9;                       // world units
 
 // As it is written, with slashes, or with the ending that it leaves out: what is there of these.
 Path FindFile(const Path& folder, const std::string& name) {
@@ -63,6 +127,75 @@ std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize 
   }
   nlohmann::ordered_json file = {{"w", size.width}, {"h", size.height}, {"frames", frames}};
   return JsonText(std::move(file), 1) + "\n";
+}
+
+Status CheckCamera(const Camera64& camera, ImageSize image) {
+  TILEGRAD_TRY(Validate(camera));
+  const double side = std::max(image.width, image.height);
+  const double least = kLeastFocal * side, most = kMostFocal * side;
+  for (const double focal : {camera.fx, camera.fy}) {
+    if (focal >= least && focal <= most) continue;
+    return InvalidArgument(
+        "the camera's focal lengths are {:.6g} and {:.6g} pixels; a fit takes {:.3g} to {:.3g} for "
+        "an image of {} x {}",
+        camera.fx, camera.fy, least, most, image.width, image.height);
+  }
+  const double off = std::max(std::abs(camera.cx), std::abs(camera.cy));
+  if (off > kMostOffCentre * side) {
+    return InvalidArgument(
+        "the camera's principal point is ({:.6g}, {:.6g}), far from an image of "
+        "{} x {} pixels",
+        camera.cx, camera.cy, image.width, image.height);
+  }
+  const double* t = camera.translation;
+  const double distance = std::hypot(t[0], t[1], t[2]);
+  if (distance <= kFarthest) return {};
+  return InvalidArgument(
+      "the camera is {:.6g} from the world's origin; a fit takes cameras up to {:g} away: scale or "
+      "move them",
+      distance, kFarthest);
+}
+
+Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
+  TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model, {.bent = true}));
+  TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
+  std::vector<TransformsFrame> frames;
+  for (const io::CameraView& view : views) {
+    const std::string name = io::PortablePath(view.name);
+    TransformsFrame frame;
+    frame.image = images / name;
+    frame.mask = MaskFileOf(images, name);
+    frame.stored_order = true;  // COLMAP ignores the tag of orientation
+    frame.camera = FrameOf(view);
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+TransformsFrame BareFrame(double fov) {
+  TransformsFrame frame;
+  frame.camera.camera_to_world = NerfCamera().camera_to_world;
+  frame.angle_long = fov * std::numbers::pi / 180;
+  return frame;
+}
+
+std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
+                                            std::vector<std::string>* warnings) {
+  Path images = folder / "images";
+  std::vector<Path> pictures = TakePictures(images, warnings);
+  if (pictures.empty()) {
+    images = folder;
+    pictures = TakePictures(images, warnings);
+  }
+  std::vector<TransformsFrame> frames;
+  for (const Path& name : pictures) {
+    TransformsFrame frame = BareFrame(fov);
+    frame.image = images / name;
+    frame.mask = MaskFileOf(images, name);
+    frame.camera.place = name.string();
+    frames.push_back(std::move(frame));
+  }
+  return frames;
 }
 
 }  // namespace tilegrad::train

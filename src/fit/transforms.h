@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images and their cameras, as the folders that a fit reads name them (io/camera_file.h,
-// fit/colmap_frames.h, fit/bare_frames.h).
+// Images and their cameras, as the folders that a fit reads name them (io/camera_file.h).
 #pragma once
 
 #include <vector>
 
 #include "base/file.h"
 #include "io/camera_file.h"
+#include "scene/camera.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad::train {
 
@@ -32,5 +33,35 @@ struct TransformsView {
   double gain = 1;  // of exposure; written as "exposure_gain" where it is not 1
 };
 std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size);
+
+// Cameras are kept as floats, and a fit divides and multiplies by their numbers: an error says
+// which of these is beyond what that bears, of images of this size. Also those of Validate.
+Status CheckCamera(const Camera64& camera, ImageSize image);
+
+// A COLMAP project: its cameras, the images that they belong to, and masks beside these.
+//
+//   <project>/sparse/0/cameras.txt, images.txt   or .bin; the largest of several models; also
+//                                                <project>/sparse, <project>, and colmap/ before
+//                                                them, as nerfstudio has it
+//   <project>/images/a/1.jpg
+//   <project>/masks/a/1.jpg.png                  as COLMAP names masks, or masks/a/1.png
+//
+// Images are looked for in folders `images`, and by their names alone, beside the model and up to
+// two folders above it. Errors name the file.
+Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model);
+
+inline constexpr double kUsualFov = 65;  // degrees along the longer side: main cameras of phones
+
+// Without a picture: a lens that sees `fov` degrees along the longer side, and a pose that means
+// nothing.
+TransformsFrame BareFrame(double fov);
+
+// A folder of pictures without cameras; empty if there are none. Warns of pictures in formats that
+// are not read.
+//
+//   <folder>/images/a.jpg or <folder>/a.jpg     PNG, JPEG or WebP, in the order of their names
+//   <folder>/masks/a.jpg.png or masks/a.png     beside images/ or in <folder>
+std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
+                                            std::vector<std::string>* warnings);
 
 }  // namespace tilegrad::train

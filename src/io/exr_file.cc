@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
+#include "io/child_record.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
 
@@ -24,6 +25,12 @@
 #pragma GCC diagnostic pop
 
 namespace tilegrad::io {
+
+template <>
+inline constexpr auto kFieldsOf<LoadedExr> = std::tuple(&LoadedExr::width, &LoadedExr::height,
+                                                        &LoadedExr::names, &LoadedExr::values,
+                                                        &LoadedExr::warnings);
+
 namespace {
 
 class ExrStream : public Imf::OStream {
@@ -94,12 +101,7 @@ void Write(const ExrImage& image, Imf::OStream& stream) {
   file.writePixels(image.height);
 }
 
-// The child sends bytes to this process: 'E' and a message, or 'I', width, height, the numbers of
-// channels and of warnings, the names of channels and the warnings, each terminated by 0, and the
-// values.
-
 constexpr int kMaxChannels = 1024, kMaxWarnings = 2;
-constexpr std::uint8_t kImage = 'I', kError = 'E';
 
 class MemoryInput : public Imf::IStream {
  public:
@@ -165,18 +167,6 @@ Status CheckExrHeader(const Imf::Header& header, const GuardLimits& limits) {
   return ReadBudget::Take(bytes, fmt::format("{} pixels of {} channels", pixels, channels));
 }
 
-void Append(Bytes& out, const void* data, std::size_t size) {
-  const std::size_t at = out.size();
-  out.resize(at + size);
-  std::copy_n(static_cast<const std::uint8_t*>(data), size, out.data() + at);
-}
-
-Bytes ErrorBytes(std::string_view message) {
-  Bytes out = {kError};
-  Append(out, message.data(), message.size());
-  return out;
-}
-
 // All channels of the data window, concatenated.
 std::vector<float> ReadData(Imf::InputPart& in, const std::vector<std::string>& names) {
   const ExrWindow& window = in.header().dataWindow();
@@ -193,17 +183,15 @@ std::vector<float> ReadData(Imf::InputPart& in, const std::vector<std::string>& 
   return data;
 }
 
-// Copies one channel of the data window into the display window, whose floats may be unaligned.
-void PlaceInPicture(const float* data, const ExrWindow& from, const ExrWindow& to,
-                    std::uint8_t* picture) {
+// Copies one channel of the data window into the display window.
+void PlaceInPicture(const float* data, const ExrWindow& from, const ExrWindow& to, float* picture) {
   const auto at = [](const ExrWindow& window, std::int64_t x, std::int64_t y) {
     return (y - window.min.y) * SizeOfWindow(window).width + (x - window.min.x);
   };
   const int left = std::max(from.min.x, to.min.x), right = std::min(from.max.x, to.max.x);
   if (left > right) return;
-  const auto bytes = sizeof(float) * (static_cast<std::size_t>(right - left) + 1);
   for (std::int64_t y = std::max(from.min.y, to.min.y); y <= std::min(from.max.y, to.max.y); ++y)
-    std::memcpy(picture + sizeof(float) * at(to, left, y), data + at(from, left, y), bytes);
+    std::copy_n(data + at(from, left, y), right - left + 1, picture + at(to, left, y));
 }
 
 std::vector<std::string> ExrWarnings(const Imf::Header& header, int parts) {
@@ -217,41 +205,35 @@ std::vector<std::string> ExrWarnings(const Imf::Header& header, int parts) {
   return warnings;
 }
 
-Bytes ReadPicture(Imf::InputPart& in, int parts) {
+LoadedExr ReadPicture(Imf::InputPart& in, int parts) {
   const ExrWindow &data_window = in.header().dataWindow(), &display = in.header().displayWindow();
-  const std::vector<std::string> names = NamesOf(in.header().channels()),
-                                 warnings = ExrWarnings(in.header(), parts);
   const auto [width, height] = SizeOfWindow(display);
-  const std::array<std::int32_t, 4> sizes = {
-      static_cast<std::int32_t>(width), static_cast<std::int32_t>(height),
-      static_cast<std::int32_t>(names.size()), static_cast<std::int32_t>(warnings.size())};
-  Bytes out = {kImage};
-  Append(out, sizes.data(), sizeof(sizes));
-  for (const auto* texts : {&names, &warnings}) {
-    for (const std::string& text : *texts) Append(out, text.c_str(), text.size() + 1);
-  }
-  const std::vector<float> data = ReadData(in, names);
-  const std::size_t head = out.size(), data_pixels = data.size() / names.size(),
-                    plane = sizeof(float) * static_cast<std::size_t>(width * height);
-  out.resize(head + names.size() * plane);
-  for (std::size_t c = 0; c < names.size(); ++c)
-    PlaceInPicture(&data[c * data_pixels], data_window, display, &out[head + c * plane]);
+  LoadedExr out{static_cast<int>(width),
+                static_cast<int>(height),
+                NamesOf(in.header().channels()),
+                {},
+                ExrWarnings(in.header(), parts)};
+  const std::vector<float> data = ReadData(in, out.names);
+  const auto plane = static_cast<std::size_t>(width * height);
+  const std::size_t data_pixels = data.size() / out.names.size();
+  out.values.resize(out.names.size() * plane);
+  for (std::size_t c = 0; c < out.names.size(); ++c)
+    PlaceInPicture(&data[c * data_pixels], data_window, display, &out.values[c * plane]);
   return out;
 }
 
 // Runs in the child process.
-Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits) {
+Result<LoadedExr> ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits) {
   try {  // the library throws
     MemoryInput stream(bytes);
     Imf::MultiPartInputFile file(stream, /*numThreads=*/0);
-    const Status status = CheckExrHeader(file.header(0), limits);
-    if (!status.ok()) return ErrorBytes(status.message());
+    TILEGRAD_TRY(CheckExrHeader(file.header(0), limits));
     Imf::InputPart first(file, 0);
     return ReadPicture(first, file.parts());
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
-    return ErrorBytes(error.what());
+    return DataLoss("{}", error.what());
   }
 }
 
@@ -273,34 +255,17 @@ Status SaveExr(const Path& path, const ExrImage& image) {
   return WriteFileAtomic(path, bytes);
 }
 
+Bytes ExrForReader(const Result<LoadedExr>& image) { return EncodeRecord(image); }
+
 Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes) {
-  const Status damaged = DataLoss("the reader returned an incomplete image");
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.size() > 1 && text[0] == static_cast<char>(kError))
-    return DataLoss("{}", text.substr(1));
-  std::array<std::int32_t, 4> sizes = {};
-  std::size_t at = 1 + sizeof(sizes);
-  if (bytes.size() < at || bytes[0] != kImage) return damaged;
-  std::memcpy(sizes.data(), bytes.data() + 1, sizeof(sizes));
-  LoadedExr out;
-  out.width = sizes[0];
-  out.height = sizes[1];
-  if (out.width < 1 || out.height < 1 || std::max(out.width, out.height) > kMaxImageSide ||
-      sizes[2] < 1 || sizes[2] > kMaxChannels || sizes[3] < 0 || sizes[3] > kMaxWarnings)
-    return damaged;
-  for (int i = 0; i < sizes[2] + sizes[3]; ++i) {
-    const std::size_t end = text.find('\0', at);
-    if (end == std::string_view::npos) return damaged;
-    (i < sizes[2] ? out.names : out.warnings).emplace_back(text.substr(at, end - at));
-    at = end + 1;
-  }
-  const std::size_t count =
-      static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height) * out.names.size();
-  if ((bytes.size() - at) / sizeof(float) != count || (bytes.size() - at) % sizeof(float) != 0)
-    return damaged;
-  TILEGRAD_TRY(ReadBudget::Take(count * sizeof(float), "the image"));
-  out.values.resize(count);
-  std::memcpy(out.values.data(), bytes.data() + at, count * sizeof(float));
+  TILEGRAD_TRY(ReadBudget::Take(bytes.size(), "the image"));
+  TILEGRAD_ASSIGN(LoadedExr out, DecodeRecord<LoadedExr>(bytes));
+  const auto is_side = [](int side) { return side >= 1 && side <= kMaxImageSide; };
+  if (!is_side(out.width) || !is_side(out.height) || out.names.empty() ||
+      out.names.size() > kMaxChannels || out.warnings.size() > kMaxWarnings ||
+      out.values.size() != static_cast<std::size_t>(out.width) *
+                               static_cast<std::size_t>(out.height) * out.names.size())
+    return DataLoss("the reader returned an incomplete image");
   return out;
 }
 
@@ -310,8 +275,9 @@ Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::stri
     return DataLoss("{}: not an EXR image", name);
   GuardLimits limits;
   limits.memory_bytes = std::size_t{4} << 30;
-  const auto result = RunGuarded([&](AskParent) { return ReadInChild(bytes, limits); },
-                                 [](std::string_view) { return std::optional<Bytes>(); }, limits);
+  const auto result =
+      RunGuarded([&](AskParent) { return ExrForReader(ReadInChild(bytes, limits)); },
+                 [](std::string_view) { return std::optional<Bytes>(); }, limits);
   const std::string place = name + ": reading an EXR image";
   if (!result.ok()) return result.status().Within(place);
   auto image = ExrFromReader(*result);

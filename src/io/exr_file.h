@@ -41,6 +41,7 @@ struct LoadedExr {
 Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::string& name);
 // Decodes the child's output, which is untrusted: the library may have misbehaved.
 Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes);
+Bytes ExrForReader(const Result<LoadedExr>& image);
 Result<LoadedExr> LoadExr(const Path& path);
 
 }  // namespace tilegrad::io

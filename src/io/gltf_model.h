@@ -36,16 +36,8 @@ struct GltfDocument {
 // compressed; ResourceExhausted above 4 GiB. Numbers in the model are not validated yet.
 Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::string& name);
 
-// The extension with which the JSON compresses geometry; empty if none.
-std::string_view GltfCompression(std::string_view json);
-
 // DataLoss that says that the file cannot be read because of the extension.
 Status RefuseGltfCompression(std::string_view extension, const std::string& place);
-
-// DataLoss if the file requires an extension without which it cannot be drawn. One warning names
-// the other extensions that are ignored and would change the picture.
-Status CheckGltfExtensions(const tinygltf::Model& model, const std::string& place,
-                           std::vector<std::string>* warnings);
 
 // For a texture whose only image has an unsupported format: the extension that holds it.
 std::string GltfImageExtension(const tinygltf::Texture& texture);

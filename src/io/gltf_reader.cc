@@ -200,105 +200,10 @@ struct PrimitivePlace {
   SharedVertices shared = {};       // of this mesh's primitives so far
 };
 
-struct GltfWalk {
-  const tinygltf::Model& model;
-  const FileSource& source;
-  std::string name, place;
-  LoadedMesh out;
-  std::vector<std::optional<int>> textures;  // by glTF image
-  std::vector<bool> visited;                 // by node
-  std::vector<glm::dmat4> world;             // by node, if there are skins
-  std::set<std::string> warned = {};
-
-  Status AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what);
-  Status AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at, const std::string& what);
-  Status AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
-                         PrimitivePlace& at, const std::string& what);
-  void Warn(std::string warning);  // once
-  void WarnOfOtherScenes();
-  Material ConvertMaterial(int index);
-  void AddCamera(const tinygltf::Node& node, const glm::dmat4& m);
-  void SetSampler(int texture, Material* material);
-  int ImageTexture(int texture);
-  int AddImage(const tinygltf::Image& image, int index);
-  Status Visit(int node, const glm::dmat4& parent, int depth);
-};
-
-void GltfWalk::Warn(std::string warning) {
-  if (warned.insert(warning).second) out.warnings.push_back(std::move(warning));
-}
-
-int GltfWalk::ImageTexture(int texture) {
-  if (texture < 0) return -1;
-  const bool there = texture < static_cast<int>(model.textures.size());
-  const std::string other = there ? GltfImageExtension(model.textures[texture]) : "";
-  const int image = there ? model.textures[texture].source : -1;
-  const bool has_image = image >= 0 && image < static_cast<int>(model.images.size());
-  if (!other.empty() || !has_image) {
-    Warn(fmt::format("texture {} {}; the material's colour stands in", texture,
-                     !other.empty() ? "has its image in " + other + " only, which is not read"
-                     : there        ? "has no image"
-                                    : "does not exist"));
-  }
-  if (!has_image) return -1;
-  if (!textures[image]) textures[image] = AddImage(model.images[image], image);
-  return *textures[image];
-}
-
-int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
-  std::string label = image.name.empty() ? fmt::format("image {}", index) : image.name;
-  if (image.bufferView >= 0) {
-    const auto bytes = GltfViewBytes(model, image.bufferView, label);
-    return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
-  }
-  if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
-  if (image.uri.starts_with("data:")) {  // tinygltf took it for a file name
-    const std::string type = image.uri.substr(0, std::min(image.uri.find(','), kMostTypeShown));
-    return AddTexture(DataLoss("{}: \"{}\" is not read; save it as PNG or JPEG", label, type),
-                      label, out);
-  }
-  return AddTextureFile(source, FindByUri(source, name, image.uri), DecodePercent(image.uri), out);
-}
-
 TextureWrap WrapOf(int number) {
   return number == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
          : number == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
                                                            : TextureWrap::kRepeat;
-}
-
-void GltfWalk::SetSampler(int texture, Material* material) {
-  if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
-  const int index = model.textures[texture].sampler;
-  if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
-  const tinygltf::Sampler& sampler = model.samplers[index];
-  material->wrap = {WrapOf(sampler.wrapS), WrapOf(sampler.wrapT)};
-  material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
-}
-
-Material GltfWalk::ConvertMaterial(int index) {
-  Material material;
-  material.base_color = glm::vec4(1);  // glTF's default
-  if (index >= static_cast<int>(model.materials.size()))
-    Warn(fmt::format("material {} does not exist: white instead", index));
-  if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
-  const tinygltf::Material& from = model.materials[index];
-  material.name = from.name;
-  const GltfBaseColor color = GltfBaseColorOf(model, index);
-  material.base_color = glm::vec4(color.factor);  // linear, until FinishMaterials
-  material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
-                        : from.alphaMode == "BLEND" ? AlphaMode::kBlend
-                                                    : AlphaMode::kOpaque;
-  if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
-  if (material.alpha_mode == AlphaMode::kMask)
-    material.alpha_cutoff = static_cast<float>(std::clamp(from.alphaCutoff, 0.0, 2.0));
-  material.double_sided = from.doubleSided;
-  material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
-  material.base_color_texture = ImageTexture(color.texture);
-  SetSampler(color.texture, &material);
-  const auto& emission = from.emissiveFactor;
-  if (std::any_of(emission.begin(), emission.end(), [](double c) { return c > 0; }))
-    Warn(fmt::format("material \"{}\": its emission is not drawn", material.name));
-  return material;
 }
 
 // Primitives with the same key have the same vertices, whatever their uvs.
@@ -315,100 +220,183 @@ std::string VertexKey(const tinygltf::Primitive& p) {
   return key;
 }
 
-Status GltfWalk::AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
-                                 PrimitivePlace& at, const std::string& what) {
-  std::vector<glm::dvec3> exact;
-  const glm::dmat4& m = at.matrix;
-  if (!at.joints.empty() && IsSkinned(p)) {
-    TILEGRAD_TRY(ApplyGltfSkin(model, p, at.joints, what, &mesh, &exact));
-  } else {
-    for (const glm::vec3& v : mesh.positions) exact.emplace_back(m * glm::dvec4(v, 1));
-    if (m != glm::dmat4(1))
-      Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
-  }
-  const auto next = static_cast<std::int32_t>(out.mesh.positions.size());
-  const auto [first, added] = at.shared.try_emplace(VertexKey(p), next);
-  if (!added) return AppendFacesWithMaterial(mesh, first->second, material, out);
-  return AppendWithMaterial(std::move(mesh), material, out, exact);
-}
+struct GltfWalk {
+  const tinygltf::Model& model;
+  const FileSource& source;
+  std::string name, place;
+  LoadedMesh out;
+  std::vector<std::optional<int>> textures;  // by glTF image
+  std::vector<bool> visited;                 // by node
+  std::vector<glm::dmat4> world;             // by node, if there are skins
+  std::set<std::string> warned = {};
 
-Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at,
-                              const std::string& what) {
-  const bool triangles =
-      p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
-  if (!triangles) {
-    out.warnings.push_back(fmt::format("{}: points or lines left out", what));
+  Status AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what) {
+    const tinygltf::Mesh& mesh = model.meshes[node.mesh];
+    PrimitivePlace at{m, node.weights.empty() ? mesh.weights : node.weights, {}};
+    if (node.skin >= 0) {
+      TILEGRAD_ASSIGN(at.joints, GltfJointMatrices(model, node.skin, world, what));
+    }
+    for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+      TILEGRAD_TRY(AddPrimitive(mesh.primitives[i], at, fmt::format("{} primitive {}", what, i)));
+    }
     return {};
   }
-  TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
-  if (mesh.faces.empty()) return {};
-  FinishColors(ColorNumbers::kLinear, &mesh.colors, &out.warnings);
-  if (p.attributes.count("COLOR_1") > 0) Warn("sets of vertex colours but COLOR_0 are left out");
-  const Material material = ConvertMaterial(p.material);
-  if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
-    Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",
-                     material.name, GltfBaseColorOf(model, p.material).uv.Key()));
-  }
-  return AppendPrimitive(std::move(mesh), p, material, at, what).Within(what);
-}
 
-Status GltfWalk::AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what) {
-  const tinygltf::Mesh& mesh = model.meshes[node.mesh];
-  PrimitivePlace at{m, node.weights.empty() ? mesh.weights : node.weights, {}};
-  if (node.skin >= 0) {
-    TILEGRAD_ASSIGN(at.joints, GltfJointMatrices(model, node.skin, world, what));
+  Status AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at, const std::string& what) {
+    const bool triangles =
+        p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
+    if (!triangles) {
+      out.warnings.push_back(fmt::format("{}: points or lines left out", what));
+      return {};
+    }
+    TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
+    if (mesh.faces.empty()) return {};
+    FinishColors(ColorNumbers::kLinear, &mesh.colors, &out.warnings);
+    if (p.attributes.count("COLOR_1") > 0) Warn("sets of vertex colours but COLOR_0 are left out");
+    const Material material = ConvertMaterial(p.material);
+    if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
+      Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",
+                       material.name, GltfBaseColorOf(model, p.material).uv.Key()));
+    }
+    return AppendPrimitive(std::move(mesh), p, material, at, what).Within(what);
   }
-  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
-    TILEGRAD_TRY(AddPrimitive(mesh.primitives[i], at, fmt::format("{} primitive {}", what, i)));
-  }
-  return {};
-}
 
-void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::dmat4& m) {
-  if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
-  const tinygltf::Camera& from = model.cameras[node.camera];
-  const std::string label = from.name.empty() ? node.name : from.name;
-  if (from.type != "perspective") {
-    out.warnings.push_back(fmt::format("camera \"{}\" is orthographic: left out", label));
-    return;
+  Status AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
+                         PrimitivePlace& at, const std::string& what) {
+    std::vector<glm::dvec3> exact;
+    const glm::dmat4& m = at.matrix;
+    if (!at.joints.empty() && IsSkinned(p)) {
+      TILEGRAD_TRY(ApplyGltfSkin(model, p, at.joints, what, &mesh, &exact));
+    } else {
+      for (const glm::vec3& v : mesh.positions) exact.emplace_back(m * glm::dvec4(v, 1));
+      if (m != glm::dmat4(1))
+        Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
+    }
+    const auto next = static_cast<std::int32_t>(out.mesh.positions.size());
+    const auto [first, added] = at.shared.try_emplace(VertexKey(p), next);
+    if (!added) return AppendFacesWithMaterial(mesh, first->second, material, out);
+    return AppendWithMaterial(std::move(mesh), material, out, exact);
   }
-  MeshFileCamera camera;
-  camera.name = label;
-  for (int i = 0; i < 16; ++i) camera.camera.node_to_world[i] = m[i % 4][i / 4];
-  camera.camera.yfov = from.perspective.yfov;
-  camera.camera.aspect_ratio = from.perspective.aspectRatio;
-  camera.camera.znear = from.perspective.znear;
-  out.cameras.push_back(std::move(camera));
-}
 
-Status GltfWalk::Visit(int index, const glm::dmat4& parent, int depth) {
-  if (depth > kMaxNodeDepth)
-    return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
-  if (index < 0 || index >= static_cast<int>(model.nodes.size()))
-    return DataLoss("{}: node {} does not exist", place, index);
-  // Nodes form trees: a second visit is a cycle, or shared children, whose number of paths may grow
-  // without bound.
-  if (visited[index])
-    return DataLoss("{}: node {} is reached twice; nodes must form a tree", place, index);
-  visited[index] = true;
-  const tinygltf::Node& node = model.nodes[index];
-  const glm::dmat4 m = parent * GltfLocalMatrix(node);
-  AddCamera(node, m);
-  if (node.mesh >= 0) {
-    if (node.mesh >= static_cast<int>(model.meshes.size()))
-      return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
-    TILEGRAD_TRY(AddMesh(node, m, fmt::format("{}: mesh {}", place, node.mesh)));
+  // Each warning once.
+  void Warn(std::string warning) {
+    if (warned.insert(warning).second) out.warnings.push_back(std::move(warning));
   }
-  for (const int child : node.children) TILEGRAD_TRY(Visit(child, m, depth + 1));
-  return {};
-}
 
-void GltfWalk::WarnOfOtherScenes() {
-  for (std::size_t i = 0; i < visited.size(); ++i) {
-    if (!visited[i] && model.nodes[i].mesh >= 0)
-      return Warn("meshes that are not in the scene are left out");
+  void WarnOfOtherScenes() {
+    for (std::size_t i = 0; i < visited.size(); ++i) {
+      if (!visited[i] && model.nodes[i].mesh >= 0)
+        return Warn("meshes that are not in the scene are left out");
+    }
   }
-}
+
+  Material ConvertMaterial(int index) {
+    Material material;
+    material.base_color = glm::vec4(1);  // glTF's default
+    if (index >= static_cast<int>(model.materials.size()))
+      Warn(fmt::format("material {} does not exist: white instead", index));
+    if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
+    const tinygltf::Material& from = model.materials[index];
+    material.name = from.name;
+    const GltfBaseColor color = GltfBaseColorOf(model, index);
+    material.base_color = glm::vec4(color.factor);  // linear, until FinishMaterials
+    material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
+                          : from.alphaMode == "BLEND" ? AlphaMode::kBlend
+                                                      : AlphaMode::kOpaque;
+    if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
+    if (material.alpha_mode == AlphaMode::kMask)
+      material.alpha_cutoff = static_cast<float>(std::clamp(from.alphaCutoff, 0.0, 2.0));
+    material.double_sided = from.doubleSided;
+    material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
+    material.base_color_texture = ImageTexture(color.texture);
+    SetSampler(color.texture, &material);
+    const auto& emission = from.emissiveFactor;
+    if (std::any_of(emission.begin(), emission.end(), [](double c) { return c > 0; }))
+      Warn(fmt::format("material \"{}\": its emission is not drawn", material.name));
+    return material;
+  }
+
+  void AddCamera(const tinygltf::Node& node, const glm::dmat4& m) {
+    if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
+    const tinygltf::Camera& from = model.cameras[node.camera];
+    const std::string label = from.name.empty() ? node.name : from.name;
+    if (from.type != "perspective") {
+      out.warnings.push_back(fmt::format("camera \"{}\" is orthographic: left out", label));
+      return;
+    }
+    MeshFileCamera camera;
+    camera.name = label;
+    for (int i = 0; i < 16; ++i) camera.camera.node_to_world[i] = m[i % 4][i / 4];
+    camera.camera.yfov = from.perspective.yfov;
+    camera.camera.aspect_ratio = from.perspective.aspectRatio;
+    camera.camera.znear = from.perspective.znear;
+    out.cameras.push_back(std::move(camera));
+  }
+
+  void SetSampler(int texture, Material* material) {
+    if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
+    const int index = model.textures[texture].sampler;
+    if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
+    const tinygltf::Sampler& sampler = model.samplers[index];
+    material->wrap = {WrapOf(sampler.wrapS), WrapOf(sampler.wrapT)};
+    material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+  }
+
+  int ImageTexture(int texture) {
+    if (texture < 0) return -1;
+    const bool there = texture < static_cast<int>(model.textures.size());
+    const std::string other = there ? GltfImageExtension(model.textures[texture]) : "";
+    const int image = there ? model.textures[texture].source : -1;
+    const bool has_image = image >= 0 && image < static_cast<int>(model.images.size());
+    if (!other.empty() || !has_image) {
+      Warn(fmt::format("texture {} {}; the material's colour stands in", texture,
+                       !other.empty() ? "has its image in " + other + " only, which is not read"
+                       : there        ? "has no image"
+                                      : "does not exist"));
+    }
+    if (!has_image) return -1;
+    if (!textures[image]) textures[image] = AddImage(model.images[image], image);
+    return *textures[image];
+  }
+
+  int AddImage(const tinygltf::Image& image, int index) {
+    std::string label = image.name.empty() ? fmt::format("image {}", index) : image.name;
+    if (image.bufferView >= 0) {
+      const auto bytes = GltfViewBytes(model, image.bufferView, label);
+      return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
+    }
+    if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
+    if (image.uri.starts_with("data:")) {  // tinygltf took it for a file name
+      const std::string type = image.uri.substr(0, std::min(image.uri.find(','), kMostTypeShown));
+      return AddTexture(DataLoss("{}: \"{}\" is not read; save it as PNG or JPEG", label, type),
+                        label, out);
+    }
+    return AddTextureFile(source, FindByUri(source, name, image.uri), DecodePercent(image.uri),
+                          out);
+  }
+
+  Status Visit(int index, const glm::dmat4& parent, int depth) {
+    if (depth > kMaxNodeDepth)
+      return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
+    if (index < 0 || index >= static_cast<int>(model.nodes.size()))
+      return DataLoss("{}: node {} does not exist", place, index);
+    // Nodes form trees: a second visit is a cycle, or shared children, whose number of paths may
+    // grow without bound.
+    if (visited[index])
+      return DataLoss("{}: node {} is reached twice; nodes must form a tree", place, index);
+    visited[index] = true;
+    const tinygltf::Node& node = model.nodes[index];
+    const glm::dmat4 m = parent * GltfLocalMatrix(node);
+    AddCamera(node, m);
+    if (node.mesh >= 0) {
+      if (node.mesh >= static_cast<int>(model.meshes.size()))
+        return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
+      TILEGRAD_TRY(AddMesh(node, m, fmt::format("{}: mesh {}", place, node.mesh)));
+    }
+    for (const int child : node.children) TILEGRAD_TRY(Visit(child, m, depth + 1));
+    return {};
+  }
+};
 
 // The nodes of the default scene, or of the first one, or all root nodes.
 std::vector<int> SceneNodes(const tinygltf::Model& model) {

@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "io/image_readers.h"
-#include "io/png_chunks.h"
 
 namespace tilegrad::io {
 namespace {

@@ -14,8 +14,6 @@
 #include "base/text.h"
 #include "io/guarded_process.h"
 #include "io/image_readers.h"
-#include "io/png_chunks.h"
-#include "io/png_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC

@@ -48,6 +48,40 @@ std::uint32_t BigEndian(std::span<const std::uint8_t> bytes);
 std::uint32_t LittleEndian(std::span<const std::uint8_t> bytes);
 
 bool IsPng(std::span<const std::uint8_t> bytes);
+
+// A part of a PNG: length, type, data and a checksum (PNG, section 5.3).
+struct PngChunk {
+  std::string_view type;
+  std::span<const std::uint8_t> data;
+};
+
+// Iterates over chunks up to IEND; stops early at a chunk that exceeds the file. Ignores checksums.
+class PngChunks {
+ public:
+  // `bytes` begin with a PNG's signature (IsPng).
+  explicit PngChunks(std::span<const std::uint8_t> bytes) : rest_(bytes.subspan(kSignature)) {}
+
+  bool Next(PngChunk& chunk) {
+    if (chunk.type == "IEND" || rest_.size() < kFrame) return false;
+    const std::size_t length = BigEndian(rest_.first(4));
+    if (length > rest_.size() - kFrame) return false;
+    chunk.type = {reinterpret_cast<const char*>(&rest_[4]), 4};
+    chunk.data = rest_.subspan(8, length);
+    rest_ = rest_.subspan(kFrame + length);
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kSignature = 8, kFrame = 12;
+  std::span<const std::uint8_t> rest_;
+};
+
+// Decodes a PNG with 8 bits per channel and neither palette, transparent colour nor interlacing: 1
+// to 4 channels as in the file, with stb_image's pixels. Returns nothing for other and damaged PNGs
+// and if out of memory; stb_image then reads or refuses the file. `bytes` must have passed
+// CheckImageContainer and CheckImageSize.
+std::optional<ImageU8> DecodePlainPng(std::span<const std::uint8_t> bytes);
+
 // Accepts any number of filler bytes first, like stb_image.
 bool IsJpeg(std::span<const std::uint8_t> bytes);
 

@@ -38,9 +38,32 @@ struct JsonFrame {
     const json* own = FindIn(frame, key);
     return own != nullptr ? own : FindIn(top, key);
   }
-  Result<double> Number(const char* key) const;
+
+  Result<double> Number(const char* key) const {
+    const json* value = Find(key);
+    if (value == nullptr) return DataLoss("{}: \"{}\" is missing", place, key);
+    if (!value->is_number()) return DataLoss("{}: \"{}\" is not a number", place, key);
+    return value->get<double>();
+  }
+
   // Nested by rows or flat.
-  Result<std::vector<double>> Numbers(const char* key) const;
+  Result<std::vector<double>> Numbers(const char* key) const {
+    const json* value = Find(key);
+    if (value == nullptr) return DataLoss("{}: \"{}\" is missing", place, key);
+    std::vector<double> out;
+    const auto add = [&](const json& x) {
+      if (x.is_number()) out.push_back(x.get<double>());
+      return x.is_number();
+    };
+    bool good = value->is_array();
+    for (std::size_t i = 0; good && i < value->size(); ++i) {
+      const json& row = (*value)[i];
+      good = row.is_array() ? std::all_of(row.begin(), row.end(), add) : add(row);
+    }
+    if (!good) return DataLoss("{}: \"{}\" is not an array of numbers", place, key);
+    return out;
+  }
+
   template <std::size_t N>
   Result<std::array<double, N>> Array(const char* key) const {
     TILEGRAD_ASSIGN(const auto numbers, Numbers(key));
@@ -51,52 +74,25 @@ struct JsonFrame {
     return out;
   }
   // Of the image; 0 x 0 if both are absent.
-  Result<ImageSize> Size(const char* width, const char* height) const;
+  Result<ImageSize> Size(const char* width, const char* height) const {
+    if (Find(width) == nullptr && Find(height) == nullptr) return ImageSize();
+    TILEGRAD_ASSIGN(const double w, Number(width));
+    TILEGRAD_ASSIGN(const double h, Number(height));
+    constexpr double kMostSide = 1 << 20;
+    if (!(w >= 1 && h >= 1 && w <= kMostSide && h <= kMostSide) || w != std::floor(w) ||
+        h != std::floor(h)) {
+      return DataLoss("{}: an image of {} x {} pixels", place, w, h);
+    }
+    return ImageSize{static_cast<int>(w), static_cast<int>(h)};
+  }
+
   // The frame's own; nullopt if it is no text.
-  std::optional<std::string> Text(const char* key) const;
+  std::optional<std::string> Text(const char* key) const {
+    const json* value = FindIn(frame, key);
+    if (value == nullptr || !value->is_string()) return std::nullopt;
+    return value->get<std::string>();
+  }
 };
-
-Result<double> JsonFrame::Number(const char* key) const {
-  const json* value = Find(key);
-  if (value == nullptr) return DataLoss("{}: \"{}\" is missing", place, key);
-  if (!value->is_number()) return DataLoss("{}: \"{}\" is not a number", place, key);
-  return value->get<double>();
-}
-
-Result<std::vector<double>> JsonFrame::Numbers(const char* key) const {
-  const json* value = Find(key);
-  if (value == nullptr) return DataLoss("{}: \"{}\" is missing", place, key);
-  std::vector<double> out;
-  const auto add = [&](const json& x) {
-    if (x.is_number()) out.push_back(x.get<double>());
-    return x.is_number();
-  };
-  bool good = value->is_array();
-  for (std::size_t i = 0; good && i < value->size(); ++i) {
-    const json& row = (*value)[i];
-    good = row.is_array() ? std::all_of(row.begin(), row.end(), add) : add(row);
-  }
-  if (!good) return DataLoss("{}: \"{}\" is not an array of numbers", place, key);
-  return out;
-}
-
-Result<ImageSize> JsonFrame::Size(const char* width, const char* height) const {
-  if (Find(width) == nullptr && Find(height) == nullptr) return ImageSize();
-  TILEGRAD_ASSIGN(const double w, Number(width));
-  TILEGRAD_ASSIGN(const double h, Number(height));
-  constexpr double kMostSide = 1 << 20;
-  if (!(w >= 1 && h >= 1 && w <= kMostSide && h <= kMostSide) || w != std::floor(w) ||
-      h != std::floor(h)) {
-    return DataLoss("{}: an image of {} x {} pixels", place, w, h);
-  }
-  return ImageSize{static_cast<int>(w), static_cast<int>(h)};
-}
-
-std::optional<std::string> JsonFrame::Text(const char* key) const {
-  const json* value = FindIn(frame, key);
-  if (value == nullptr || !value->is_string()) return std::nullopt;
-  return value->get<std::string>();
-}
 
 // An object, or an error that names the file.
 Result<json> ParseJsonObject(const std::string& text, const Path& file) {

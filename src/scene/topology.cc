@@ -7,8 +7,9 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <tuple>
+
+#include "base/union_find.h"
 
 namespace tilegrad {
 namespace {
@@ -99,28 +100,6 @@ std::vector<glm::dvec3> FaceNormals(const Mesh& mesh) {
   return out;
 }
 
-// Joined corners, by union-find: the least of each group represents it.
-class CornerGroups {
- public:
-  explicit CornerGroups(Index count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  Index Of(Index i) {
-    while (parent_[i] != i) {
-      parent_[i] = parent_[parent_[i]];
-      i = parent_[i];
-    }
-    return i;
-  }
-  void Join(Index a, Index b) {
-    const auto [low, high] = std::minmax({Of(a), Of(b)});
-    parent_[high] = low;
-  }
-
- private:
-  std::vector<Index> parent_;
-};
-
 // A face's side, by its ends, ordered by the indices of their positions.
 struct FaceSide {
   std::array<Index, 2> places, corners;
@@ -152,12 +131,12 @@ std::vector<FaceSide> SortedSides(const Mesh& mesh) {
   return out;
 }
 
-// Tests all pairs of faces at an edge, and joins at both of its ends.
-CornerGroups JoinSmoothSides(const Mesh& mesh, double degrees) {
+// Groups of corners: tests all pairs of faces at an edge, and joins at both of its ends.
+UnionFind JoinSmoothSides(const Mesh& mesh, double degrees) {
   const double least = std::cos(degrees * std::numbers::pi / 180);
   const std::vector<glm::dvec3> normals = FaceNormals(mesh);
   const std::vector<FaceSide> sides = SortedSides(mesh);
-  CornerGroups groups(3 * mesh.faces.size());
+  UnionFind groups(3 * mesh.faces.size());
   for (Index i = 0; i < sides.size(); ++i) {
     for (Index j = i + 1; j < sides.size() && sides[j].places == sides[i].places; ++j) {
       const glm::dvec3 &a = normals[sides[i].corners[0] / 3], &b = normals[sides[j].corners[0] / 3];
@@ -180,7 +159,7 @@ void ColorsToCorners(Mesh* mesh) {
 }  // namespace
 
 void SplitAtCreases(double degrees, Mesh* mesh) {
-  CornerGroups groups = JoinSmoothSides(*mesh, degrees);
+  UnionFind groups = JoinSmoothSides(*mesh, degrees);
   ColorsToCorners(mesh);
   mesh->normals.clear();
   std::vector<glm::vec3> positions;

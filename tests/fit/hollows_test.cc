@@ -10,8 +10,8 @@
 #include <numbers>
 #include <vector>
 
-#include "fit/hull/carve.h"
-#include "fit/hull/cell_distance.h"
+#include "fit/hull/hollow_shape.h"
+#include "fit/hull/hull_mesh.h"
 #include "fit/views_fixture.h"
 #include "train/metrics/metrics.h"
 

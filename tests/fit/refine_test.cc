@@ -6,7 +6,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "fit/find_camera.h"
 #include "fit/input.h"
 #include "fit/views_fixture.h"
 #include "render/picture/mesh_pictures.h"

@@ -9,8 +9,7 @@
 #include <glm/geometric.hpp>
 #include <span>
 
-#include "fit/camera_check.h"
-#include "fit/input_up.h"
+#include "fit/input.h"
 #include "fit/run.h"
 #include "support/expect.h"
 

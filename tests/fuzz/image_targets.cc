@@ -3,6 +3,7 @@
 // what is mended: a PNG with a wrong checksum is refused before anything else is looked at.
 #include <zlib.h>
 
+#include "base/error.h"
 #include "fuzz/target.h"
 #include "io/exr_file.h"
 #include "io/image_file.h"
@@ -69,10 +70,8 @@ void Exr(Input input) { CheckExr(io::DecodeExr(input, "image")); }
 void ExrFromReader(Input input) { CheckExr(io::ExrFromReader(input)); }
 
 std::vector<Bytes> ExrFromReaderSeeds() {
-  Bytes image = {'I', 2, 0, 0, 0,   1, 0,   0,   0,   2, 0,   0, 0,
-                 1,   0, 0, 0, 'A', 0, 'n', '.', 'X', 0, 'w', 0};
-  image.resize(image.size() + 2 * 1 * 2 * sizeof(float));
-  return {image, ToBytes("Ethe file is cut short")};
+  return {io::ExrForReader(io::LoadedExr{2, 1, {"A", "n.X"}, {0, 0, 0, 0}, {"w"}}),
+          io::ExrForReader(DataLoss("the file is cut short"))};
 }
 
 // Read from files alone.

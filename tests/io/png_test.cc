@@ -7,7 +7,7 @@
 
 #include "base/rng.h"
 #include "io/image_file.h"
-#include "io/png_reader.h"
+#include "io/image_readers.h"
 #include "support/expect.h"
 
 #define STB_IMAGE_IMPLEMENTATION

@@ -35,7 +35,7 @@ LONG_FUNCTIONS = {}
 ADJOINT = "an adjoint of a reference: what went in, what came out, and the derivative of each"
 LONG_PARAMETER_LISTS = {
     ("src/compat/pytorch3d_fragment.h", "FragmentBackward"): (8, ADJOINT),
-    ("src/io/gltf_primitive.cc", "KeepEncoded"): (9, "tinygltf's callback"),
+    ("src/io/gltf_model.cc", "KeepEncoded"): (9, "tinygltf's callback"),
     ("src/raster/interpolate_ref.h", "InterpolateRefBackward"): (9, ADJOINT),
     ("src/train/data/sources/procedural.cc", "ChairBack"): (8, "measures of a piece of furniture"),
     ("src/train/data/sources/procedural.cc", "Wings"): (8, "measures of a pair of wings"),

@@ -2,6 +2,7 @@
 // What a hull could be hollow by: its inside, less walls and a floor, open at the top.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -43,5 +44,11 @@ class HollowRim {
   int layer_, bottom_;
   std::vector<float> distance_;  // to what is not wall, cells
 };
+
+// `full` [x][y][z]: not 0 where a cell is full; what lies beyond the grid is empty. Returns the
+// distance between the centres of a cell and of the nearest empty one, in cells; 0 of empty ones.
+// Exact (P. Felzenszwalb, D. Huttenlocher: Distance transforms of sampled functions, 2012).
+std::vector<float> DistanceToEmpty(const std::vector<std::uint8_t>& full,
+                                   const std::array<int, 3>& size, const Workers& workers);
 
 }  // namespace tilegrad::train

@@ -1,13 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surface of the visual hull as a mesh to start a fit from.
+// The visual hull (A. Laurentini 1994): the largest thing that the masks allow, carved out of a
+// grid; and its surface as a mesh to start a fit from.
 #pragma once
 
 #include <cmath>
 
-#include "fit/hull/carve.h"
+#include "base/parallel.h"
+#include "fit/input.h"
+#include "scene/level_set.h"
 #include "scene/mesh.h"
 
 namespace tilegrad::train {
+
+struct CarveOptions {
+  double cell_pixels = 0.7;  // a cell's side, in pixels of an image where the object is
+  int most_cells = 320;      // along the longest side; fewer where images are small
+  // Pixels that masks are widened by, so that what is thin is not cut by one view that shows it
+  // half a pixel off.
+  double margin_pixels = 0.25;
+  // How many views may see a point outside of their mask that is kept all the same, as a share of
+  // the views: for masks that lack something. Each makes the rest less sharp.
+  double tolerance = 0;
+};
+
+// About how far inside of the hull the grid's points are, world units: of the distances to the
+// outlines, each in one view, the least (or the one after those that `tolerance` forgives). Near
+// the surface only; elsewhere the sign counts. What a camera does not have before it is outside.
+// The grid surrounds the hull. Any number of workers gives the same bits. An error if no point is
+// inside, that says so; or kCancelled.
+Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options, const Workers& workers,
+                         const Watch& watch = {});
 
 struct HullOptions {
   CarveOptions carve;

@@ -6,6 +6,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "scene/camera_conventions.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -21,11 +23,6 @@ TargetImages Smaller(const TargetImages& images) {
   };
   while (halves(images.width) && halves(images.height)) factor *= 2;
   return factor == 1 ? images : Reduce(images, factor);
-}
-
-Camera Scaled(Camera camera, float factor) {
-  for (float* number : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *number *= factor;
-  return camera;
 }
 
 glm::vec3 CameraAxis(const Camera& camera, int i) {
@@ -89,7 +86,7 @@ PhotoViews::PhotoViews(const FitInput& input, const ScalarGrid& solid, const Wor
   workers.For(views_.size(), [&](std::size_t i, std::size_t) {
     const auto v = static_cast<std::size_t>(input.training[i]);
     View& view = views_[i];
-    view.camera = Scaled(input.cameras[v], factor);
+    view.camera = ScaledCamera(input.cameras[v], factor);
     view.eye = CameraCentre(view.camera);
     view.color = std::span(images_.color).subspan(3 * v * plane, 3 * plane);
     view.alpha = std::span(images_.outline()).subspan(v * plane, plane);

@@ -5,7 +5,7 @@
 // In rounds, at about 190 pixels: histograms of the colours inside and outside (color_odds.h) and
 // the silhouette of what the views have in common (common_hull.h) say for each pixel how probable
 // the object is there; pixels agree with their neighbours up to the picture's edges
-// (pixel_field.h); cells of a grid that too many views see past are emptied. Shadows are told from
+// (PixelField); cells of a grid that too many views see past are emptied. Shadows are told from
 // the object by the floor that they lie on (floor.h). This is N. Campbell et al., Automatic 3D
 // object segmentation in multiple views using volumetric graph-cuts (2010), with a mean field for
 // their graph cut and a floor. All views share the colours, so that what stands behind the object

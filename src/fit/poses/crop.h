@@ -3,6 +3,7 @@
 // at few pixels. Two views of an object from the same direction have nearly the same crop.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,5 +39,23 @@ double CropCost(const Crop& a, const Crop& b, double color_weight);
 // it from some distance. The camera with the lens of `from` that sees it at the place and size of
 // `wanted`, from the same direction.
 Camera Aligned(const Crop& seen, const Crop& wanted, const Camera& from);
+
+// What a search for cameras knows of its pictures.
+struct PosePictures {
+  TargetImages images;         // of few pixels
+  std::vector<Camera> lenses;  // intrinsics of such a picture; their poses mean nothing
+  std::vector<Crop> crops;     // of the pictures as they came
+  std::array<float, 3> mean_color = {};
+  double color_weight = 1;  // of the L1 difference of colours beside 1 - IoU
+};
+
+// Pictures of about `side` pixels along their longer side: a whole number of pixels becomes one,
+// and what is left over at the right and below is cut off. `lenses`: intrinsics of each. An error
+// names the first picture that shows no object.
+Result<PosePictures> PreparePictures(const TargetImages& images, std::span<const Camera> lenses,
+                                     int side);
+
+// How unlike any two pictures are, [N,N], in units of the median.
+std::vector<double> Unlikeness(const PosePictures& pictures);
 
 }  // namespace tilegrad::train

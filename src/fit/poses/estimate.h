@@ -8,7 +8,7 @@
 
 #include "base/progress.h"
 #include "fit/fitter.h"
-#include "fit/poses/pictures.h"
+#include "fit/poses/crop.h"
 
 namespace tilegrad::train {
 

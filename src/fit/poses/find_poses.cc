@@ -51,13 +51,83 @@ class PoseSearch {
   }
 
   // Whether a camera moved.
-  Result<bool> Sweep(double repulsion);
-  Result<PoseStart> Finish();
+  Result<bool> Sweep(double repulsion) {
+    std::vector<int> order = all_;
+    for (std::size_t k = 0; k + 1 < order.size(); ++k) {
+      std::swap(order[k], order[k + rng_.Below(order.size() - k)]);
+    }
+    const auto half = order.size() / 2;
+    const std::span<const int> parts[] = {std::span(order).first(half),
+                                          std::span(order).subspan(half)};
+    bool moved = false;
+    for (int side = 0; side < 2; ++side) {
+      estimate_.ForgetShape();
+      TILEGRAD_TRY(estimate_
+                       .Refit({.steps = kShapeSteps, .cameras = false, .shape_rate = kShapeRate},
+                              parts[side])
+                       .status());
+      TILEGRAD_ASSIGN(const bool some, LookForPictures(parts[1 - side], repulsion));
+      moved = moved || some;
+    }
+    TILEGRAD_TRY(estimate_.Refit({.steps = kJointSteps}, all_).status());
+    return moved;
+  }
+
+  Result<PoseStart> Finish() {
+    estimate_.ForgetShape();
+    TILEGRAD_TRY(estimate_.Refit({.steps = kWarmUp, .cameras = false}, all_).status());
+    PoseStart out;
+    TILEGRAD_ASSIGN(out.loss, estimate_.Refit({.steps = kFinalSteps}, all_));
+    out.cameras = estimate_.cameras();
+    return out;
+  }
 
  private:
-  void Scatter();
-  Result<bool> LookForPictures(std::span<const int> pictures, double repulsion);
-  double Repulsion(std::size_t picture, const Camera& there) const;
+  // Evenly over the sphere, between the elevations of usual photographs.
+  void Scatter() {
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      const double elevation = std::asin(rng_.Uniform(-0.4, 0.94)) * 180 / std::numbers::pi;
+      const Camera camera = OrbitCamera({}, rng_.Uniform(0, 360), elevation, kCameraDistance);
+      Crop sphere;
+      sphere.side = 1 / kCameraDistance;
+      estimate_.Place(i, Aligned(sphere, pictures_.crops[i], camera));
+    }
+  }
+
+  Result<bool> LookForPictures(std::span<const int> pictures, double repulsion) {
+    estimate_.Normalize();
+    TILEGRAD_ASSIGN(const std::vector<Viewpoint> around,
+                    LookAround(estimate_.scene(), estimate_.Up(), &renderer_));
+    bool moved = false;
+    for (const int picture : pictures) {
+      const auto n = static_cast<std::size_t>(picture);
+      const Viewpoint* best = nullptr;
+      double least = HUGE_VAL;
+      for (const Viewpoint& v : around) {
+        double cost = CropCost(v.crop, pictures_.crops[n], pictures_.color_weight);
+        if (repulsion > 0) cost += repulsion * Repulsion(n, v.camera);
+        if (cost < least) {
+          best = &v;
+          least = cost;
+        }
+      }
+      if (best == nullptr) continue;
+      const Camera camera = Aligned(best->crop, pictures_.crops[n], best->camera);
+      if (AngleBetween(camera, estimate_.cameras()[n]) < kStays) continue;
+      estimate_.Place(n, camera);
+      moved = true;
+    }
+    return moved;
+  }
+
+  double Repulsion(std::size_t picture, const Camera& there) const {
+    double sum = 0;
+    for (std::size_t j = 0; j < all_.size(); ++j) {
+      const double near = 1 - DirectionGap(there, estimate_.cameras()[j]) / kReach;
+      if (j != picture && near > 0) sum += near * unlike_[picture * all_.size() + j];
+    }
+    return sum;
+  }
 
   const PosePictures& pictures_;
   FitRenderer renderer_;
@@ -66,83 +136,6 @@ class PoseSearch {
   Rng rng_;
   std::vector<int> all_;
 };
-
-// Evenly over the sphere, between the elevations of usual photographs.
-void PoseSearch::Scatter() {
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    const double elevation = std::asin(rng_.Uniform(-0.4, 0.94)) * 180 / std::numbers::pi;
-    const Camera camera = OrbitCamera({}, rng_.Uniform(0, 360), elevation, kCameraDistance);
-    Crop sphere;
-    sphere.side = 1 / kCameraDistance;
-    estimate_.Place(i, Aligned(sphere, pictures_.crops[i], camera));
-  }
-}
-
-double PoseSearch::Repulsion(std::size_t picture, const Camera& there) const {
-  double sum = 0;
-  for (std::size_t j = 0; j < all_.size(); ++j) {
-    const double near = 1 - DirectionGap(there, estimate_.cameras()[j]) / kReach;
-    if (j != picture && near > 0) sum += near * unlike_[picture * all_.size() + j];
-  }
-  return sum;
-}
-
-Result<bool> PoseSearch::LookForPictures(std::span<const int> pictures, double repulsion) {
-  estimate_.Normalize();
-  TILEGRAD_ASSIGN(const std::vector<Viewpoint> around,
-                  LookAround(estimate_.scene(), estimate_.Up(), &renderer_));
-  bool moved = false;
-  for (const int picture : pictures) {
-    const auto n = static_cast<std::size_t>(picture);
-    const Viewpoint* best = nullptr;
-    double least = HUGE_VAL;
-    for (const Viewpoint& v : around) {
-      double cost = CropCost(v.crop, pictures_.crops[n], pictures_.color_weight);
-      if (repulsion > 0) cost += repulsion * Repulsion(n, v.camera);
-      if (cost < least) {
-        best = &v;
-        least = cost;
-      }
-    }
-    if (best == nullptr) continue;
-    const Camera camera = Aligned(best->crop, pictures_.crops[n], best->camera);
-    if (AngleBetween(camera, estimate_.cameras()[n]) < kStays) continue;
-    estimate_.Place(n, camera);
-    moved = true;
-  }
-  return moved;
-}
-
-Result<bool> PoseSearch::Sweep(double repulsion) {
-  std::vector<int> order = all_;
-  for (std::size_t k = 0; k + 1 < order.size(); ++k) {
-    std::swap(order[k], order[k + rng_.Below(order.size() - k)]);
-  }
-  const auto half = order.size() / 2;
-  const std::span<const int> parts[] = {std::span(order).first(half),
-                                        std::span(order).subspan(half)};
-  bool moved = false;
-  for (int side = 0; side < 2; ++side) {
-    estimate_.ForgetShape();
-    TILEGRAD_TRY(
-        estimate_
-            .Refit({.steps = kShapeSteps, .cameras = false, .shape_rate = kShapeRate}, parts[side])
-            .status());
-    TILEGRAD_ASSIGN(const bool some, LookForPictures(parts[1 - side], repulsion));
-    moved = moved || some;
-  }
-  TILEGRAD_TRY(estimate_.Refit({.steps = kJointSteps}, all_).status());
-  return moved;
-}
-
-Result<PoseStart> PoseSearch::Finish() {
-  estimate_.ForgetShape();
-  TILEGRAD_TRY(estimate_.Refit({.steps = kWarmUp, .cameras = false}, all_).status());
-  PoseStart out;
-  TILEGRAD_ASSIGN(out.loss, estimate_.Refit({.steps = kFinalSteps}, all_));
-  out.cameras = estimate_.cameras();
-  return out;
-}
 
 // The cameras again, with more pixels and vertices; in the frame that FoundPoses promises.
 Result<std::vector<Camera>> Refine(const PosePictures& pictures, std::span<const Camera> cameras,

@@ -9,8 +9,7 @@
 #include <limits>
 
 #include "fit/poses/crop.h"
-#include "fit/poses/input_poses.h"
-#include "fit/poses/pictures.h"
+#include "fit/poses/start_cameras.h"
 #include "fit/score.h"
 #include "fit/views_fixture.h"
 

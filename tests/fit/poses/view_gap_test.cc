@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fit/poses/view_gap.h"
-
 #include <gtest/gtest.h>
+
+#include "fit/poses/start_cameras.h"
 
 namespace tilegrad::train::view_gap_test {
 
