@@ -2,6 +2,7 @@
 // tilegrad predict: a coloured mesh and pictures of it all around from each image.
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -221,6 +222,25 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   return masked.ok() ? std::move(masked) : masked.status().Within(file);
 }
 
+// The files, and of folders their pictures.
+Result<std::vector<std::string>> PicturesOf(const std::vector<std::string>& paths) {
+  std::vector<std::string> files;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) {
+      files.push_back(path);
+      continue;
+    }
+    const io::PictureNames names = io::PicturesIn(path);
+    const std::string others = names.DescribeOthers();
+    if (names.read.empty())
+      return InvalidArgument("{}: holds no picture{}", path, others.empty() ? "" : "; " + others);
+    if (!others.empty()) PrintNote("tilegrad: warning: {}: skipped {}\n", path, others);
+    for (const Path& name : names.read) files.push_back((Path(path) / name).string());
+  }
+  return files;
+}
+
 // Image files and what their results are called: by the file, each name once.
 std::vector<std::pair<std::string, std::string>> NameResults(
     const std::vector<std::string>& images) {
@@ -362,6 +382,7 @@ Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>
 
 Status RunPrediction(const PredictOptions& given) {
   PredictOptions options = given;
+  TILEGRAD_ASSIGN(options.images, PicturesOf(given.images));
   if (!options.mask.empty() && options.images.size() > 1)
     return InvalidArgument("--mask works with one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run, train::kCutoutWeights));
@@ -397,9 +418,11 @@ Status RunPrediction(const PredictOptions& given) {
 void AddPredict(CommandList* list) {
   const auto [command, options] = AddCommand(
       list, "predict", "Predict a coloured 3D mesh from one image of an object", RunPrediction);
-  command->Add("images", &options->images,
-               "images of an object: cut out (RGBA), on a plain background, or with --mask",
-               {Required{}});
+  command->Add(
+      "images", &options->images,
+      "images of an object, or folders of them: cut out (RGBA), on a plain background, or with "
+      "--mask",
+      {Required{}});
   command->Add("--run", &options->run,
                fmt::format("{} [the newest run below runs/, else {} if installed]", kRunOrWeights,
                            train::kCutoutWeights));

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "fit/refine.h"
@@ -50,6 +51,19 @@ TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
   std::filesystem::rename(folder_ / "d", folder_ / "gone");
   const auto first_line = [](const std::string& text) { return text.substr(0, text.find('\n')); };
   EXPECT_EQ(first_line(Said("text.png")), first_line(said));
+}
+
+TEST_F(Predict, TakesThePicturesOfFolders) {
+  const auto pictures = folder_ / "pictures";
+  std::filesystem::create_directory(pictures);
+  ExpectError("predict --run " + In("r") + " " + In("pictures"), "pictures: holds no picture");
+  for (const char* name : {"b.png", "a.png"})
+    std::filesystem::copy_file(folder_ / "known.png", pictures / name);
+  std::ofstream(pictures / "c.heic") << "x";
+  std::ofstream(pictures / "notes.txt") << "x";
+  ExpectIn(Said("pictures"), "skipped 1 picture not in PNG, JPEG or WebP: c.heic");
+  for (const char* name : {"a_predicted.glb", "b_predicted.glb"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / name)) << name;
 }
 
 // The picture that was cut out, before a wall.
