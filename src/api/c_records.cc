@@ -58,6 +58,7 @@ struct RowCounts {
 void Set(const float* from, std::size_t width, RowCounts rows, std::span<const float>* to) {
   *to = SpanOf(from, rows.vertices * width);
 }
+
 void Set(const tilegrad_stream& from, std::size_t width, RowCounts rows, Stream* to) {
   const bool corner = from.per_corner != 0;
   to->values = SpanOf(from.values, (corner ? rows.corners : rows.vertices) * width);

@@ -32,6 +32,7 @@ struct TransformsView {
   Camera camera;
   double gain = 1;  // of exposure; written as "exposure_gain" where it is not 1
 };
+
 std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size);
 
 // Cameras are kept as floats, and a fit divides and multiplies by their numbers: an error says

@@ -16,6 +16,7 @@ struct ExrChannel {
   std::string name;
   std::span<const float> values;
 };
+
 struct ExrImage {
   int width = 0, height = 0;
   std::vector<ExrChannel> channels;

@@ -52,6 +52,7 @@ template <class T>
 const StreamT<T>& AsStream(const StreamT<T>& stream) {
   return stream;
 }
+
 template <class T>
 StreamT<T> AsStream(std::span<const T> values) {
   return {values};

@@ -100,6 +100,7 @@ inline Var WeightedSum(std::span<const Var> a, std::span<const Var> b) {
 struct Derivatives {
   Var s, first, t, second;
 };
+
 inline Derivatives Differentiate(const Function& f, const Leaves& at) {
   Derivatives d;
   d.s = WeightedSum(at.weights, Inputs{f(at.x)});

@@ -28,6 +28,7 @@ struct CropSource {
   int width = 0, height = 0;
   std::span<const float> color, alpha;  // [3,H,W], [H,W]
 };
+
 // None where nothing is opaque.
 std::optional<Crop> CropOf(const CropSource& image, const Camera& camera);
 

@@ -11,6 +11,7 @@ namespace {
 void Multiply(const GemmProblem<float>& problem, Context& context) {
   Gemm(problem, context.kernels());
 }
+
 void Multiply(const GemmProblem<double>& problem, Context&) { GemmRef(problem); }
 
 // op(a) op(b) + bias; shapes were checked. `bias` may be invalid.

@@ -25,6 +25,7 @@ template <class T>
 struct Copied {
   void operator()(const T& from, T& to) const { to = from; }
 };
+
 template <class T>
 struct Added {
   void operator()(const T& from, T& to) const { to += from; }
@@ -109,6 +110,7 @@ struct RowMove {
   int axis;
   std::size_t begin_x, begin_y, count;
 };
+
 template <template <class> class Op = Copied>
 void MoveRows(const RowMove& move, const Var& x, Tensor& y) {
   const AxisView vx(x.shape(), move.axis), vy(y.shape(), move.axis);

@@ -44,6 +44,7 @@ Result<Window> FitWindow(const ImageU8& rgba) {
 struct Sum {
   double value[4] = {};
 };
+
 Sum AverageArea(const ImageU8& rgba, double x0, double y0, double side) {
   Sum sum;
   const int first_y = std::max(0, static_cast<int>(std::floor(y0))),

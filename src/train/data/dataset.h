@@ -68,6 +68,7 @@ struct ModelInfo {
 inline const std::string& ShapeOf(const ModelInfo& model) {
   return model.shape.empty() ? model.id : model.shape;
 }
+
 // Counts each shape of a class once.
 std::size_t CountShapes(const std::vector<ModelInfo>& models);
 

@@ -53,6 +53,7 @@ double HuberDifference(std::span<const T> truth, std::span<const T> predicted, d
   }
   return sum;
 }
+
 template <class T>
 void HuberDifferenceBackward(std::span<const T> truth, std::span<const T> predicted, double soft,
                              double scale, std::span<T> d_predicted) {
@@ -61,6 +62,7 @@ void HuberDifferenceBackward(std::span<const T> truth, std::span<const T> predic
     d_predicted[i] = static_cast<T>(scale * std::clamp(d / soft, -1.0, 1.0));
   }
 }
+
 // soft > 0, in units of colours.
 nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft);
 

@@ -68,6 +68,7 @@ struct WeighedEdge {
   std::int32_t i, j;
   double weight;
 };
+
 // For a mesh with `positions` [V,3]: an entry for each corner of a face, for the opposite edge ij.
 std::vector<WeighedEdge> CotangentWeights(std::span<const Face> faces,
                                           std::span<const double> positions);

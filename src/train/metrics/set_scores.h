@@ -54,6 +54,7 @@ struct Nearest {
   std::size_t row = 0;  // the first of ties
   double distance = 0;  // Euclidean
 };
+
 // For each row of `from` the nearest of `to`. At least one row each.
 Result<std::vector<Nearest>> NearestRows(const FeatureRows& from, const FeatureRows& to,
                                          const Workers& workers);
@@ -67,6 +68,7 @@ struct Memorisation {
   // counting half: 0.5 where the two distributions are alike, 1 where every sample is a copy.
   double nearer = 0;
 };
+
 Result<Memorisation> MeasureMemorisation(const FeatureRows& samples, const FeatureRows& held_out,
                                          const FeatureRows& train, const Workers& workers);
 

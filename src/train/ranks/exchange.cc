@@ -13,6 +13,7 @@ constexpr auto kPause = std::chrono::microseconds(20);
 std::span<const std::byte> BytesOf(const float* data, std::size_t n) {
   return std::as_bytes(std::span(data, n));
 }
+
 std::span<std::byte> WritableBytesOf(float* data, std::size_t n) {
   return std::as_writable_bytes(std::span(data, n));
 }

@@ -95,6 +95,7 @@ template <class T>
 void SendValue(Transport& ranks, const Address& to, const T& value) {
   SendAndWait(ranks, to, std::as_bytes(std::span(&value, 1)));
 }
+
 template <class T>
 T ReceiveValue(Transport& ranks, const Address& from) {
   T value{};

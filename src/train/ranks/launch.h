@@ -36,6 +36,7 @@ struct RankPlace {
   Cores cores;      // of whole nodes
   int workers = 0;  // that these cores have for each of the ranks on them, at least 1
 };
+
 // Of rank `local` of `ranks` on one machine: neighbours share a node where there are more ranks
 // than nodes, and have several where there are fewer.
 RankPlace PlaceOf(std::span<const Cores> nodes, int local, int ranks);

@@ -46,6 +46,7 @@ struct FoundCheckpoint {
   std::vector<std::string> warnings;  // newer files that are damaged
   std::vector<Path> broken;           // these files
 };
+
 // The newest whole one. Skips only damaged files (cut short, wrong checksum): any other reason
 // (another version's format, permissions, memory) is an error, because resuming from an older file
 // would lose steps. NotFound if there is none; DataLoss names the first reason if all are damaged.

@@ -62,14 +62,17 @@ void AppendVarint(std::string& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out += static_cast<char>(value | 0x80);
   out += static_cast<char>(value);
 }
+
 void AppendKey(std::string& out, int field, WireType type) {
   AppendVarint(out, static_cast<std::uint64_t>(field) << 3 | type);
 }
+
 void AppendBytes(std::string& out, int field, std::string_view bytes) {
   AppendKey(out, field, kLengthDelimited);
   AppendVarint(out, bytes.size());
   out += bytes;
 }
+
 void AppendDouble(std::string& out, int field, double value) {
   AppendKey(out, field, kFixed64);
   AppendLittleEndian(out, std::bit_cast<std::uint64_t>(value));

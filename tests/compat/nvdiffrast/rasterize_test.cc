@@ -22,6 +22,7 @@ struct Truth {
   std::int32_t face;
   Barycentrics<double> at;
 };
+
 std::optional<Truth> TruthAt(const Scene<double>& scene, int x, int y) {
   constexpr double kClose = 2e-3;
   Truth best{-1, {}};

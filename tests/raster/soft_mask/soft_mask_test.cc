@@ -113,6 +113,7 @@ TEST(SoftMask, WayBackFromAlphaAlone) {
   CheckScenes(400000, 600, 12, {.with_transmittance = false});
   CheckScenes(450000, 60, 150, {.with_transmittance = false});
 }
+
 // What it leaves and the rounding that is added to that are on either side of 1/64.
 TEST(SoftMask, ALaneThatIsHardlyDarkIsNotLight) { CheckScenes(213605, 1, 12); }
 

@@ -44,6 +44,7 @@ struct DrawnLight {
   float shininess = 10;                        // Phong
   std::array<float, 9> sh = {};                // harmonics: sky + clamped cosine about `direction`
 };
+
 DrawnLight DrawLight(const LightConfig& config, Rng& rng);
 // The mean of many draws, with a unit direction: up to a tenth of a degree the one whose mean angle
 // to them is least.

@@ -165,6 +165,7 @@ TexturedStream::TexturedStream(const Job& job, MeshCache meshes, std::size_t lan
     : job_(job), meshes_(std::move(meshes)) {
   for (std::size_t w = 0; w < lanes; ++w) workers_.push_back(std::make_unique<Worker>());
 }
+
 TexturedStream::~TexturedStream() = default;
 TexturedStream::TexturedStream(TexturedStream&&) noexcept = default;
 

@@ -25,6 +25,7 @@ struct TexturedStreamConfig {
   TexturedMeshRequest meshes;
   double mirrored = 0.5;  // share of the objects that are shown mirrored at x = 0
 };
+
 // All of [stream] that means something.
 ConfigFields FieldsOf(TexturedStreamConfig* config);
 

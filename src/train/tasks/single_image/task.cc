@@ -52,6 +52,7 @@ class SingleImageModel : public Model {
   int image_size_;
   MeshNetwork network_;
 };
+
 // Predictions have the template's faces, positions of CheckpointInfo::half_extent, centred, and
 // vertex colours in [0, 1]; batch statistics are those of training (eval mode). Errors say what
 // does not fit in the checkpoint.
