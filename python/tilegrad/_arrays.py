@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts the caller's arrays to NumPy arrays: shares memory where possible; otherwise copies an
 array once and counts the copy. Errors name the function, the argument, and what was expected and
-got. All such checks of the Python package are here,
-and those of numbers, names, paths and threads.
+got. Those of numbers, names, paths and threads are here, too.
 
 Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
 the CPU) or `__array__`, numbers, and nested sequences of numbers. Masked arrays only if nothing in

@@ -83,15 +83,11 @@ void LoopTeam::For(std::size_t n, Task task) {
   }
   const std::lock_guard lock(outermost_);
   const Entering entering(this, 0);
-  if (n > 1) {
-    Run(&loops_.front(), n, task, 0);
-  } else if (n == 1) {
-    task(0, 0);
-  }
+  Run(&loops_.front(), n, task, 0);
 }
 
 void LoopTeam::RunNested(std::size_t n, Task task, std::size_t worker) {
-  for (std::size_t i = 1; i < loops_.size() && n > 1; ++i) {
+  for (std::size_t i = 1; i < loops_.size(); ++i) {
     OpenLoop& loop = loops_[i];
     if (loop.taken.load(std::memory_order_relaxed) || loop.taken.exchange(true)) continue;
     struct Leaving {
@@ -105,6 +101,10 @@ void LoopTeam::RunNested(std::size_t n, Task task, std::size_t worker) {
 }
 
 void LoopTeam::Run(OpenLoop* loop, std::size_t n, Task task, std::size_t worker) {
+  if (n <= 1) {  // nothing to share
+    for (std::size_t i = 0; i < n; ++i) task(i, worker);
+    return;
+  }
   loop->task = &task;
   loop->range_count = std::min({n, count(), kMostRanges});
   for (std::size_t r = 0; r < loop->range_count; ++r) {

@@ -9,9 +9,9 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "fit/colmap_run.h"
+#include "fit/frames.h"
 #include "fit/masks/floor.h"
 #include "fit/masks/start_masks.h"
-#include "fit/transforms.h"
 #include "fit/undistort.h"
 #include "io/camera_file.h"
 #include "train/data/dataset.h"
@@ -63,7 +63,7 @@ class InputReader {
  public:
   explicit InputReader(FitInput* input) : input_(*input) {}
 
-  Status AddAll(std::span<const TransformsFrame> frames, const Watch& watch) {
+  Status AddAll(std::span<const InputFrame> frames, const Watch& watch) {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       TILEGRAD_TRY(watch.At({"reading images", i, frames.size(), ""}));
       TILEGRAD_TRY(Add(frames[i]));
@@ -84,7 +84,7 @@ class InputReader {
     std::string image, mask;
   };
 
-  Status Add(const TransformsFrame& frame) {
+  Status Add(const InputFrame& frame) {
     TILEGRAD_ASSIGN(ViewPixels view, LoadViewPixels(frame));
     TILEGRAD_TRY(CheckSize(frame, view));
     const auto camera = CameraOfFrame(frame, view.size);
@@ -97,7 +97,7 @@ class InputReader {
     return {};
   }
 
-  Status CheckSize(const TransformsFrame& frame, const ViewPixels& view) {
+  Status CheckSize(const InputFrame& frame, const ViewPixels& view) {
     TargetImages& all = input_.images;
     if (input_.names.empty()) {
       all.width = view.size.width;
@@ -128,7 +128,7 @@ void HoldOut(int every, FitInput* input) {
 }
 
 struct Frames {
-  std::vector<TransformsFrame> frames;
+  std::vector<InputFrame> frames;
   bool posed = true, own_world = false;
   std::vector<std::string> warnings;
 };
@@ -252,7 +252,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   }
   if (PathExists(test) && input.posed) {
     TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
-    for (TransformsFrame& frame : more) {
+    for (InputFrame& frame : more) {
       input.held_out.push_back(static_cast<int>(read.frames.size()));
       read.frames.push_back(std::move(frame));
     }

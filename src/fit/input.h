@@ -11,9 +11,9 @@
 
 #include "base/file.h"
 #include "base/progress.h"
+#include "fit/frames.h"
 #include "fit/image_loss.h"
 #include "fit/input.h"
-#include "fit/transforms.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
 

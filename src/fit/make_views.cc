@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "fit/transforms.h"
+#include "fit/frames.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "render/picture/mesh_pictures.h"
@@ -70,7 +70,7 @@ std::vector<Path> EarlierViews(const Path& folder) {
   for (const Path& file : cameras) {
     const auto frames = ReadTransforms(file);
     if (!frames.ok()) continue;
-    for (const TransformsFrame& frame : *frames) {
+    for (const InputFrame& frame : *frames) {
       const int index = std::atoi(frame.image.stem().c_str());
       if (frame.image == folder / ImageName(index)) images.push_back(frame.image);
     }
@@ -104,7 +104,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   const Path truth = folder / kTruthName;
   TILEGRAD_TRY(WriteGuarded(guard, truth, [&] { return io::SaveGlb(truth, mesh); }));
   LitRenderer renderer;
-  std::vector<TransformsView> train, test;
+  std::vector<OutputFrame> train, test;
   const int all = options.views + options.held_out;
   for (int i = 0; i < all; ++i) {
     if (stop) return Cancelled("stopped; {} is not complete", folder.string());
@@ -120,7 +120,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
     }
   }
   const ImageSize size{options.size, options.size};
-  const auto write = [&](const char* name, const std::vector<TransformsView>& views) {
+  const auto write = [&](const char* name, const std::vector<OutputFrame>& views) {
     return WriteGuarded(guard, folder / name, [&] {
       return WriteTextAtomic(folder / name, WriteTransforms(views, size));
     });

@@ -14,11 +14,11 @@
 #include "base/file.h"
 #include "fit/clock.h"
 #include "fit/cutout.h"
+#include "fit/frames.h"
 #include "fit/hull/mask_distance.h"
 #include "fit/image_loss.h"
 #include "fit/material.h"
 #include "fit/texture_fill.h"
-#include "fit/transforms.h"
 #include "io/image_file.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
@@ -314,7 +314,7 @@ Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
 }
 
 Status FitResult::WriteCameras() const {
-  std::vector<TransformsView> views;
+  std::vector<OutputFrame> views;
   for (std::size_t i = 0; i < job_.input.names.size(); ++i) {
     const double gain = scene_.gains.empty() ? 1.0 : static_cast<double>(scene_.gains[i]);
     views.push_back({job_.input.names[i], scene_.cameras[i], gain});

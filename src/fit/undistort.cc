@@ -146,7 +146,7 @@ namespace {
 
 // NeRF programs differ: some turn images first, some ignore the tag as COLMAP does. Where the
 // camera's size is that of the stored image and not of the upright one, it counts stored pixels.
-Result<ImageU8> LoadTarget(const TransformsFrame& frame) {
+Result<ImageU8> LoadTarget(const InputFrame& frame) {
   TILEGRAD_ASSIGN(io::StoredImage stored, io::LoadStoredImage(frame.image));
   if (frame.stored_order) return std::move(stored.image);
   const ImageSize meant = frame.camera.size.value_or(ImageSize());
@@ -190,7 +190,7 @@ void TakeImage(const ImageU8& image, ViewPixels* out) {
 
 }  // namespace
 
-Result<ViewPixels> LoadViewPixels(const TransformsFrame& frame) {
+Result<ViewPixels> LoadViewPixels(const InputFrame& frame) {
   TILEGRAD_ASSIGN(const ImageU8 image, LoadTarget(frame));
   ViewPixels out;
   TakeImage(image, &out);

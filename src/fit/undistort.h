@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/transforms.h"
+#include "fit/frames.h"
 #include "scene/camera.h"
 
 namespace tilegrad::train {
@@ -21,7 +21,7 @@ struct ViewPixels {
 };
 
 // Turned as the frame's camera counts pixels. Errors name the file.
-Result<ViewPixels> LoadViewPixels(const TransformsFrame& frame);
+Result<ViewPixels> LoadViewPixels(const InputFrame& frame);
 
 // Takes what `lens` bends out of colours and alpha, bilinearly, and returns the camera of the image
 // that is left: `camera`, or where the object would leave the image one with a shorter focal

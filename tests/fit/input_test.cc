@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "base/text.h"
-#include "fit/transforms.h"
+#include "fit/frames.h"
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 

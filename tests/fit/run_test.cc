@@ -9,7 +9,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "fit/transforms.h"
+#include "fit/frames.h"
 #include "fit/views_fixture.h"
 #include "io/image_file.h"
 #include "nn/context.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "fit/transforms.h"
+#include "fit/frames.h"
 #include "fuzz/target.h"
 #include "io/image_file.h"
 #include "train/config.h"
@@ -43,7 +43,7 @@ void Transforms(Input input) {
   const MemoryFile file(input);
   const auto frames = train::ReadTransforms(file.path());
   if (!Accepted(frames)) return;
-  for (const train::TransformsFrame& frame : *frames) {
+  for (const train::InputFrame& frame : *frames) {
     (void)Accepted(train::CameraOfFrame(frame, {64, 48}));
   }
 }

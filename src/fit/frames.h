@@ -11,7 +11,7 @@
 
 namespace tilegrad::train {
 
-struct TransformsFrame {
+struct InputFrame {
   Path image, mask;           // whole paths; mask is empty where there is none
   bool stored_order = false;  // pixels are counted as the image stores them (io/image_file.h)
   io::NerfFrame camera;
@@ -20,20 +20,20 @@ struct TransformsFrame {
 
 // Of transforms.json. file_path and mask_path count from its folder; an ending of ".png" may be
 // left out. Errors name the file, the frame and the key.
-Result<std::vector<TransformsFrame>> ReadTransforms(const Path& file);
+Result<std::vector<InputFrame>> ReadTransforms(const Path& file);
 
 // The camera of a frame whose image has this size, without what its lens bends. An error says why
 // nothing can be fitted with it.
-Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image);
+Result<Camera> CameraOfFrame(const InputFrame& frame, ImageSize image);
 
 // One camera an image, all of one size; `images` are relative to the folder of the file.
-struct TransformsView {
+struct OutputFrame {
   std::string image;
   Camera camera;
   double gain = 1;  // of exposure; written as "exposure_gain" where it is not 1
 };
 
-std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size);
+std::string WriteTransforms(const std::vector<OutputFrame>& views, ImageSize size);
 
 // Cameras are kept as floats, and a fit divides and multiplies by their numbers: an error says
 // which of these is beyond what that bears, of images of this size. Also those of Validate.
@@ -49,20 +49,20 @@ Status CheckCamera(const Camera64& camera, ImageSize image);
 //
 // Images are looked for in folders `images`, and by their names alone, beside the model and up to
 // two folders above it. Errors name the file.
-Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model);
+Result<std::vector<InputFrame>> ReadColmapFrames(const Path& model);
 
 inline constexpr double kUsualFov = 65;  // degrees along the longer side: main cameras of phones
 
 // Without a picture: a lens that sees `fov` degrees along the longer side, and a pose that means
 // nothing.
-TransformsFrame BareFrame(double fov);
+InputFrame BareFrame(double fov);
 
 // A folder of pictures without cameras; empty if there are none. Warns of pictures in formats that
 // are not read.
 //
 //   <folder>/images/a.jpg or <folder>/a.jpg     PNG, JPEG or WebP, in the order of their names
 //   <folder>/masks/a.jpg.png or masks/a.png     beside images/ or in <folder>
-std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
-                                            std::vector<std::string>* warnings);
+std::vector<InputFrame> ReadBareFrames(const Path& folder, double fov,
+                                       std::vector<std::string>* warnings);
 
 }  // namespace tilegrad::train

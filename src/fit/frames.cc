@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fit/transforms.h"
+#include "fit/frames.h"
 
 #include <algorithm>
 #include <cmath>
@@ -86,12 +86,12 @@ Path FindFile(const Path& folder, const std::string& name) {
 
 }  // namespace
 
-Result<std::vector<TransformsFrame>> ReadTransforms(const Path& path) {
+Result<std::vector<InputFrame>> ReadTransforms(const Path& path) {
   TILEGRAD_ASSIGN(auto frames, io::ReadNerfFrames(path));
-  std::vector<TransformsFrame> out;
+  std::vector<InputFrame> out;
   for (io::NerfFrame& frame : frames) {
     if (!frame.image) return DataLoss("{}: needs \"file_path\", a string", frame.place);
-    TransformsFrame& one = out.emplace_back();
+    InputFrame& one = out.emplace_back();
     one.image = FindFile(path.parent_path(), *frame.image);
     if (frame.mask) one.mask = FindFile(path.parent_path(), *frame.mask);
     one.camera = std::move(frame);
@@ -99,7 +99,7 @@ Result<std::vector<TransformsFrame>> ReadTransforms(const Path& path) {
   return out;
 }
 
-Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image) {
+Result<Camera> CameraOfFrame(const InputFrame& frame, ImageSize image) {
   const ImageSize own = frame.camera.size.value_or(image);
   io::NerfFrame from = frame.camera;
   if (frame.angle_long > 0)
@@ -110,9 +110,9 @@ Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image) {
   return CameraCast<float>(resized);
 }
 
-std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size) {
+std::string WriteTransforms(const std::vector<OutputFrame>& views, ImageSize size) {
   nlohmann::ordered_json frames = nlohmann::ordered_json::array();
-  for (const TransformsView& view : views) {
+  for (const OutputFrame& view : views) {
     const NerfCamera pose = ToNerf(CameraCast<double>(view.camera));
     nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
     for (std::size_t r = 0; r < 4; ++r) {
@@ -156,13 +156,13 @@ Status CheckCamera(const Camera64& camera, ImageSize image) {
       distance, kFarthest);
 }
 
-Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
+Result<std::vector<InputFrame>> ReadColmapFrames(const Path& model) {
   TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model, {.bent = true}));
   TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
-  std::vector<TransformsFrame> frames;
+  std::vector<InputFrame> frames;
   for (const io::CameraView& view : views) {
     const std::string name = io::PortablePath(view.name);
-    TransformsFrame frame;
+    InputFrame frame;
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
     frame.stored_order = true;  // COLMAP ignores the tag of orientation
@@ -172,24 +172,24 @@ Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
   return frames;
 }
 
-TransformsFrame BareFrame(double fov) {
-  TransformsFrame frame;
+InputFrame BareFrame(double fov) {
+  InputFrame frame;
   frame.camera.camera_to_world = NerfCamera().camera_to_world;
   frame.angle_long = fov * std::numbers::pi / 180;
   return frame;
 }
 
-std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
-                                            std::vector<std::string>* warnings) {
+std::vector<InputFrame> ReadBareFrames(const Path& folder, double fov,
+                                       std::vector<std::string>* warnings) {
   Path images = folder / "images";
   std::vector<Path> pictures = TakePictures(images, warnings);
   if (pictures.empty()) {
     images = folder;
     pictures = TakePictures(images, warnings);
   }
-  std::vector<TransformsFrame> frames;
+  std::vector<InputFrame> frames;
   for (const Path& name : pictures) {
-    TransformsFrame frame = BareFrame(fov);
+    InputFrame frame = BareFrame(fov);
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
     frame.camera.place = name.string();
