@@ -71,7 +71,7 @@ struct InputOptions {
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
-// none). Or a folder of pictures alone, which come without cameras (transforms.h). An image's mask
+// none). Or a folder of pictures alone, which come without cameras (frames.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
 // images must have one size. Lenses that bend rays are straightened (undistort.h). Errors name the
 // file.

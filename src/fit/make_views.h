@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of a mesh from all around, as a folder that a fit reads (transforms.h): to try things
+// Images of a mesh from all around, as a folder that a fit reads (frames.h): to try things
 // with, where the truth is known.
 #pragma once
 
