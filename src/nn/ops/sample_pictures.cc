@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include "base/error.h"
@@ -91,8 +92,11 @@ void FillCells(std::span<const T> image, std::size_t size, ColorCells<T>* cells)
     for (std::size_t y = 0; y < side * kColorCells; ++y) {
       auto& row = (*cells)[y / side];
       const T* from = &image[(c * size + y) * size];
-      for (std::size_t x = 0; x < side * kColorCells; ++x)
-        row[4 * (x / side) + c] += scale * from[x];
+      for (std::size_t cell = 0; cell < kColorCells; ++cell, from += side) {
+        T& sum = row[4 * cell + c];
+        sum = std::accumulate(from, from + side, sum,
+                              [scale](T so_far, T x) { return so_far + scale * x; });
+      }
     }
   }
 }

@@ -2,7 +2,6 @@
 // Losses that are written by hand, with their gradients: over batches of images and of meshes,
 // items in parallel, sums merged in their order.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -44,36 +43,11 @@ nn::Var ScalarLoss(const char* name, const nn::Var& input, double value, nn::Ten
       {.name = name, .inputs = {input}, .outputs = {output}, .backward = std::move(backward)})[0];
 }
 
-// N images of `pixels` numbers each (all channels together), contiguous.
-template <class T>
-struct ImagePair {
-  std::span<const T> truth, predicted;  // [N * pixels] each
-  std::size_t images = 0;
-
-  std::size_t pixels() const { return images == 0 ? 0 : truth.size() / images; }
-  std::span<const T> Truth(std::size_t i) const { return truth.subspan(i * pixels(), pixels()); }
-  std::span<const T> Predicted(std::size_t i) const {
-    return predicted.subspan(i * pixels(), pixels());
-  }
-};
-
-// Predictions and targets of a batch, and the loss and gradient of each image.
-template <class T>
-struct ImageLosses {
-  ImagePair<T> pair;
-  std::span<T> gradient;
-  std::span<double> losses;
-
-  std::span<T> Gradient(std::size_t i) const {
-    return gradient.subspan(i * pair.pixels(), pair.pixels());
-  }
-};
-
-// Computes `grain` images at a time, or fewer at the end, with some(images, begin, end). The result
-// is the sum of all losses times `scale`.
-template <class Some>
-nn::Var ImageLossBySome(const char* name, const nn::Var& predicted, const nn::Tensor& truth,
-                        double scale, std::size_t grain, const Some& some) {
+// per_image(truth, predicted, d_predicted) -> the loss of one image; the result is the sum of all
+// times `scale`.
+template <class PerImage>
+nn::Var ImageLoss(const char* name, const nn::Var& predicted, const nn::Tensor& truth, double scale,
+                  PerImage per_image) {
   if (!predicted.valid()) return predicted;
   nn::Context& context = predicted.context();
   if (!(predicted.shape() == truth.shape()) || predicted.dtype() != truth.dtype() ||
@@ -86,46 +60,16 @@ nn::Var ImageLossBySome(const char* name, const nn::Var& predicted, const nn::Te
   const auto images = static_cast<std::size_t>(truth.shape()[0]);
   std::vector<double> losses(images);
   nn::WithFloatType(predicted.dtype(), [&]<class T>(T) {
-    const ImageLosses<T> all{{truth.span<T>(), predicted.value().template span<T>(), images},
-                             gradient.span<T>(),
-                             losses};
-    context.workers().ForRanges(
-        images, grain,
-        [&](std::size_t begin, std::size_t end, std::size_t) { some(all, begin, end); });
+    const std::span<const T> s = truth.span<T>(), p = predicted.value().template span<T>();
+    const std::size_t size = s.size() / std::max<std::size_t>(1, images);
+    context.workers().For(images, [&](std::size_t i, std::size_t) {
+      losses[i] = per_image(s.subspan(i * size, size), p.subspan(i * size, size),
+                            gradient.span<T>().subspan(i * size, size));
+    });
   });
   double sum = 0;
   for (const double loss : losses) sum += loss;
   return ScalarLoss(name, predicted, scale * sum, gradient);
-}
-
-// per_image(truth, predicted, d_predicted) -> the loss of one image.
-template <class PerImage>
-nn::Var ImageLoss(const char* name, const nn::Var& predicted, const nn::Tensor& truth, double scale,
-                  PerImage per_image) {
-  return ImageLossBySome(
-      name, predicted, truth, scale, 1,
-      [&]<class T>(const ImageLosses<T>& all, std::size_t i, std::size_t /*end*/) {
-        all.losses[i] = per_image(all.pair.Truth(i), all.pair.Predicted(i), all.Gradient(i));
-      });
-}
-
-// Images whose sums are taken side by side: each addition waits for the one before in its own sum.
-constexpr std::size_t kSumsAtOnce = 4;
-
-// AbsoluteDifference of each of kSumsAtOnce images from number `first` on.
-template <class T>
-void AbsoluteDifferences(const ImageLosses<T>& all, std::size_t first) {
-  const T* const s = all.pair.Truth(first).data();
-  const T* const p = all.pair.Predicted(first).data();
-  const std::size_t pixels = all.pair.pixels();
-  std::array<double, kSumsAtOnce> sums{};
-  for (std::size_t i = 0; i < pixels; ++i) {
-    for (std::size_t n = 0; n < kSumsAtOnce; ++n) {
-      const std::size_t at = n * pixels + i;
-      sums[n] += std::abs(static_cast<double>(p[at]) - static_cast<double>(s[at]));
-    }
-  }
-  std::ranges::copy(sums, all.losses.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
 // per_mesh(values [V,3], scale, d [V,3]) -> the loss of one mesh; the result is the mean.
@@ -170,17 +114,11 @@ std::vector<nn::Var> ConstantFeatures(const FeatureFunction& features, nn::Conte
 nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth) {
   const auto& shape = truth.shape();
   const double scale = static_cast<double>(shape[1]) / static_cast<double>(shape.elements());
-  return ImageLossBySome(
-      "color loss", image, truth, scale, kSumsAtOnce,
-      [scale]<class T>(const ImageLosses<T>& all, std::size_t begin, std::size_t end) {
-        const bool whole = end - begin == kSumsAtOnce;
-        if (whole) AbsoluteDifferences(all, begin);
-        for (std::size_t i = begin; i < end; ++i) {
-          const auto s = all.pair.Truth(i), p = all.pair.Predicted(i);
-          AbsoluteDifferenceBackward(s, p, scale, all.Gradient(i));
-          if (!whole) all.losses[i] = AbsoluteDifference(s, p);
-        }
-      });
+  return ImageLoss("color loss", image, truth, scale,
+                   [scale]<class T>(std::span<const T> s, std::span<const T> p, std::span<T> d) {
+                     AbsoluteDifferenceBackward(s, p, scale, d);
+                     return AbsoluteDifference(s, p);
+                   });
 }
 
 nn::Var WeightedColorL1Loss(const nn::Var& image, const nn::Tensor& truth,

@@ -82,16 +82,10 @@ struct BatchReader {
   double scale;
   template <class T>
   void Read(std::span<const From> from, T* to) const {
-    if (!mirrored) {
-      for (std::size_t i = 0; i < from.size(); ++i)
-        to[i] = static_cast<T>(from[i]) * static_cast<T>(scale);
-      return;
-    }
-    for (std::size_t row = 0; row < from.size(); row += size) {
-      const From* const last = &from[row + size - 1];
-      for (std::size_t x = 0; x < size; ++x)
-        to[row + x] = static_cast<T>(*(last - x)) * static_cast<T>(scale);
-    }
+    for (std::size_t i = 0; i < from.size(); ++i)
+      to[i] = static_cast<T>(from[i]) * static_cast<T>(scale);
+    for (std::size_t row = 0; mirrored && row < from.size(); row += size)
+      std::reverse(to + row, to + row + size);
   }
   // The target of image n of a batch.
   template <class T>
