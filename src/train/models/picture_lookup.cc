@@ -42,25 +42,38 @@ struct View {
   }
 };
 
-// Samples a picture at (x, y), in [0, 1] from its upper left corner; nothing beyond its edges.
+// Along one axis of a picture: two pixels, and the shares of a place between them. Nothing is
+// beyond the edges.
 template <class T>
-std::array<double, 4> SampleAt(const T* image, std::int64_t size, double x, double y) {
-  std::array<double, 4> out = {};
-  const double column = x * static_cast<double>(size) - 0.5;
-  const double row = y * static_cast<double>(size) - 0.5;
-  if (!(column > -1 && row > -1 && column < static_cast<double>(size) &&
-        row < static_cast<double>(size)))
-    return out;
-  const double left = std::floor(column), top = std::floor(row);
-  const double a = column - left, b = row - top;
-  for (int k = 0; k < 4; ++k) {
-    const std::int64_t i = static_cast<std::int64_t>(top) + k / 2;
-    const std::int64_t j = static_cast<std::int64_t>(left) + k % 2;
-    if (i < 0 || j < 0 || i >= size || j >= size) continue;
-    const double weight = (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b);
-    for (std::int64_t c = 0; c < 4; ++c)
-      out[static_cast<std::size_t>(c)] +=
-          weight * static_cast<double>(image[(c * size + i) * size + j]);
+struct TwoPixels {
+  std::size_t first, second;
+  T first_share, second_share;
+
+  // at: in (-1, size).
+  TwoPixels(T at, std::size_t size) {
+    const auto low = static_cast<std::size_t>(at + T(1));  // of the first pixel, plus 1
+    const T share = at + T(1) - static_cast<T>(low);
+    first = low > 0 ? low - 1 : 0;
+    second = std::min(low, size - 1);
+    first_share = low > 0 ? T(1) - share : T(0);
+    second_share = low < size ? share : T(0);
+  }
+};
+
+// Samples a picture at (x, y), in [0, 1] from its upper left corner.
+template <class T>
+std::array<T, 4> SampleAt(const T* image, std::size_t size, T x, T y) {
+  const T extent = static_cast<T>(size), column = x * extent - T(0.5), row = y * extent - T(0.5);
+  if (!(column > -1 && row > -1 && column < extent && row < extent)) return {};
+  const TwoPixels<T> across(column, size), down(row, size);
+  std::array<T, 4> out;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const T* const upper = image + (c * size + down.first) * size;
+    const T* const lower = image + (c * size + down.second) * size;
+    const auto along = [&across](const T* r) {
+      return across.first_share * r[across.first] + across.second_share * r[across.second];
+    };
+    out[c] = down.first_share * along(upper) + down.second_share * along(lower);
   }
   return out;
 }
@@ -156,51 +169,59 @@ PictureLookup::PictureLookup(const Mesh& sphere, int side)
       texels_(SphereTexels(sphere, side, side)) {}
 
 // A texel of the surface as a picture shows it.
+template <class T>
 struct SeenTexel {
-  std::array<double, 4> rgba;  // over black
-  glm::dvec3 normal;           // unit, in the axes of the camera
-  double facing;               // its cosine to the camera
-  double Color(std::size_t c) const { return rgba[c] / std::max(kLeastCover, rgba[3]); }
+  std::array<T, 4> rgba;  // over black
+  glm::vec<3, T> normal;  // unit, in the axes of the camera
+  T facing;               // its cosine to the camera
+  T Color(std::size_t c) const { return rgba[c] / std::max(T(kLeastCover), rgba[3]); }
 };
 
 template <class T>
 class PictureLookup::Picture {
+  using Vec3 = glm::vec<3, T>;
+
  public:
   Picture(const std::vector<Face>& faces, const Job& job, std::size_t m)
-      : size_(job.images.shape()[3]),
-        image_(job.images.data<T>() + m * static_cast<std::size_t>(4 * size_ * size_)),
-        positions_(job.positions.data<T>() +
-                   m * static_cast<std::size_t>(3 * job.positions.shape()[1])),
-        view_(job.pose.data<T>() + static_cast<std::size_t>(kPoseNumbers) * m),
-        normals_(
-            SmoothNormals(faces, positions_, static_cast<std::size_t>(job.positions.shape()[1]))) {}
+      : size_(static_cast<std::size_t>(job.images.shape()[3])),
+        image_(job.images.data<T>() + m * 4 * size_ * size_) {
+    const auto vertices = static_cast<std::size_t>(job.positions.shape()[1]);
+    const T* const p = job.positions.data<T>() + m * 3 * vertices;
+    const View view(job.pose.data<T>() + static_cast<std::size_t>(kPoseNumbers) * m);
+    x_ = static_cast<T>(view.x);
+    y_ = static_cast<T>(view.y);
+    scale_ = static_cast<T>(view.scale);
+    nearness_ = static_cast<T>(view.nearness);
+    const std::vector<glm::dvec3> normals = SmoothNormals(faces, p, vertices);
+    for (std::size_t v = 0; v < vertices; ++v)
+      vertices_.push_back({Vec3(view.Turned({p[3 * v], p[3 * v + 1], p[3 * v + 2]})),
+                           Vec3(view.Turned(normals[v]))});
+  }
 
-  SeenTexel At(const SurfacePoint& point) const {
-    glm::dvec3 x(0), n(0);
+  SeenTexel<T> At(const SurfacePoint& point) const {
+    Vec3 x(0), n(0);
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto v = static_cast<std::size_t>(point.vertices[k]);
-      const double weight = static_cast<double>(point.weights[k]);
-      const T* p = positions_ + 3 * v;
-      x += weight * glm::dvec3(p[0], p[1], p[2]);
-      n += weight * normals_[v];
+      const Vertex& v = vertices_[static_cast<std::size_t>(point.vertices[k])];
+      const T weight = static_cast<T>(point.weights[k]);
+      x += weight * v.position;
+      n += weight * v.normal;
     }
-    x = view_.Turned(x);
-    n = view_.Turned(n);
-    n /= glm::length(n) + 1e-12;
+    n /= glm::length(n) + T(1e-12);
     // In units of the camera's distance: depth 1 at the origin.
-    const double depth = std::max(kLeastDepth, 1 - view_.nearness * x.z);
-    const glm::dvec3 eye(-view_.nearness * x.x, -view_.nearness * x.y, depth);
-    return {SampleAt(image_, size_, view_.x + view_.scale * x.x / depth,
-                     view_.y - view_.scale * x.y / depth),
-            n, glm::dot(n, eye) / glm::length(eye)};
+    const T depth = std::max(T(kLeastDepth), 1 - nearness_ * x.z), zoom = scale_ / depth;
+    const Vec3 eye(-nearness_ * x.x, -nearness_ * x.y, depth);
+    return {SampleAt(image_, size_, x_ + zoom * x.x, y_ - zoom * x.y), n,
+            glm::dot(n, eye) / glm::length(eye)};
   }
 
  private:
-  std::int64_t size_;
+  struct Vertex {
+    Vec3 position, normal;  // in the axes of the camera
+  };
+  std::size_t size_;
   const T* image_;
-  const T* positions_;
-  View view_;
-  std::vector<glm::dvec3> normals_;
+  T x_, y_, scale_, nearness_;  // of View
+  std::vector<Vertex> vertices_;
 };
 
 template <class T>
@@ -209,17 +230,18 @@ void PictureLookup::LookAt(const Job& job, std::size_t m, std::size_t channels, 
   const T* l = job.light.empty() ? nullptr : job.light.data<T>() + 3 * m;
   const std::size_t plane = side_ * side_;
   for (std::size_t t = 0; t < plane; ++t) {
-    const SeenTexel seen = picture.At(texels_[t]);
-    const double lit =
-        l == nullptr ? 1.0
-                     : std::max(kLeastLight, glm::dot(seen.normal, glm::dvec3(l[0], l[1], l[2])));
-    const double values[kChannels] = {seen.Color(0), seen.Color(1), seen.Color(2),
-                                      seen.rgba[3],  seen.facing,   -std::log(lit)};
+    const SeenTexel<T> seen = picture.At(texels_[t]);
+    std::array<T, kChannels> values = {seen.Color(0), seen.Color(1), seen.Color(2),
+                                       seen.rgba[3],  seen.facing,   T(0)};
+    if (l != nullptr && channels == kChannels) {
+      const T lit = glm::dot(seen.normal, glm::vec<3, T>(l[0], l[1], l[2]));
+      values[5] = -std::log(std::max(T(kLeastLight), lit));
+    }
     // The mirror image of column j is side / 2 - 1 - j, as scene/shapes.h says.
     const std::size_t j = t % side_, other = t - j + (side_ + side_ / 2 - 1 - j) % side_;
     for (std::size_t c = 0; c < channels; ++c) {
-      out[c * plane + t] = static_cast<T>(values[c]);
-      out[(channels + c) * plane + other] = static_cast<T>(values[c]);
+      out[c * plane + t] = values[c];
+      out[(channels + c) * plane + other] = values[c];
     }
   }
 }
@@ -230,18 +252,21 @@ struct CueSums {
   glm::dvec3 normal{0}, bright_normal{0}, lit_normal{0}, lit_bright_normal{0};
   glm::dmat3 lit_products{0};  // of normals with themselves
 
-  void Add(const SeenTexel& seen) {
-    const double weight = std::max(0.0, seen.facing) * seen.rgba[3];
+  template <class T>
+  void Add(const SeenTexel<T>& seen) {
+    const double weight = std::max(T(0), seen.facing) * seen.rgba[3];
+    if (weight == 0) return;
     const double brightness = (seen.Color(0) + seen.Color(1) + seen.Color(2)) / 3;
+    const glm::dvec3 n(seen.normal);
     all += weight;
     bright += weight * brightness;
-    normal += weight * seen.normal;
-    bright_normal += weight * brightness * seen.normal;
+    normal += weight * n;
+    bright_normal += weight * brightness * n;
     if (brightness < kBlack) return;
     lit += weight;
-    lit_normal += weight * seen.normal;
-    lit_bright_normal += weight * brightness * seen.normal;
-    lit_products += glm::outerProduct(weight * seen.normal, seen.normal);
+    lit_normal += weight * n;
+    lit_bright_normal += weight * brightness * n;
+    lit_products += glm::outerProduct(weight * n, n);
   }
   // Least squares, drawn a little towards the camera where normals leave it open.
   glm::dvec3 Light() const {

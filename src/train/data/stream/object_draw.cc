@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -26,7 +27,7 @@ void Normalize(float half_extent, std::vector<glm::vec3>* positions) {
   for (glm::vec3& p : *positions) p = scale * (p - centre);
 }
 
-float Luminance(glm::vec3 c) { return 0.299f * c.r + 0.587f * c.g + 0.114f * c.b; }
+constexpr glm::vec3 kLuminance(0.299f, 0.587f, 0.114f);
 
 // Columns are the images of red, green and blue.
 glm::mat3 HueTurn(double angle) {
@@ -100,17 +101,13 @@ Recolor::Recolor(const StreamConfig& config, Rng& rng) {
   const double angle = rng.Uniform(0, 2 * std::numbers::pi);
   const glm::vec3 towards(rng.Uniform(), rng.Uniform(), rng.Uniform());
   const double share = rng.Uniform();
-  brightness_ = static_cast<float>(std::exp(rng.Uniform(-config.brightness, config.brightness)));
-  if (!other) return;
-  turn_ = HueTurn(angle);
-  tint_ = towards / std::max(0.1f, Luminance(towards));
-  tinted_ = static_cast<float>(share * share);
-}
-
-glm::vec3 Recolor::operator()(glm::vec3 color) const {
-  color = turn_ * color;
-  color = glm::mix(color, Luminance(color) * tint_, tinted_);
-  return glm::clamp(brightness_ * color, glm::vec3(0), glm::vec3(1));
+  const double brightness = std::exp(rng.Uniform(-config.brightness, config.brightness));
+  if (other) {
+    const glm::vec3 tint = towards / std::max(0.1f, glm::dot(kLuminance, towards));
+    const auto tinted = static_cast<float>(share * share);
+    map_ = ((1 - tinted) * map_ + tinted * glm::outerProduct(tint, kLuminance)) * HueTurn(angle);
+  }
+  map_ *= static_cast<float>(brightness);
 }
 
 Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, std::size_t view, Rng& rng) {

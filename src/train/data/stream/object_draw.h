@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <span>
@@ -48,12 +49,12 @@ inline std::span<const float> Flat(const std::vector<glm::vec3>& values) {
 class Recolor {
  public:
   Recolor(const StreamConfig& config, Rng& rng);
-  glm::vec3 operator()(glm::vec3 color) const;
+  glm::vec3 operator()(glm::vec3 color) const {
+    return glm::clamp(map_ * color, glm::vec3(0), glm::vec3(1));
+  }
 
  private:
-  glm::mat3 turn_ = glm::mat3(1);
-  glm::vec3 tint_ = glm::vec3(1);
-  float tinted_ = 0, brightness_ = 1;
+  glm::mat3 map_ = glm::mat3(1);
 };
 
 // View 0 is what the network sees; the others have a range of elevations of their own. Azimuth from
