@@ -43,6 +43,39 @@ void MoveRow(const StridedBox& box, std::size_t begin, std::size_t end, const T*
   for (std::size_t i = begin; i < end; ++i) op(from[i * step_from], to[i * step_to]);
 }
 
+// Where a row of a box starts. Divides for the first row only: rows may be as short as a colour.
+class RowStart {
+ public:
+  RowStart(const StridedBox& box, std::size_t row) : box_(box) {
+    for (std::size_t i = kAxes; i-- > 0;) {
+      index_[i] = row % box.extents[i];
+      row /= box.extents[i];
+      Step(i, index_[i]);
+    }
+  }
+  std::size_t from() const { return from_; }
+  std::size_t to() const { return to_; }
+  void Next() {
+    for (std::size_t i = kAxes; i-- > 0;) {
+      Step(i, 1);
+      if (++index_[i] < box_.extents[i]) return;
+      Step(i, 0 - index_[i]);
+      index_[i] = 0;
+    }
+  }
+
+ private:
+  static constexpr std::size_t kAxes = StridedBox::kRank - 1;
+  void Step(std::size_t axis, std::size_t by) {
+    from_ += by * box_.strides_from[axis];
+    to_ += by * box_.strides_to[axis];
+  }
+
+  const StridedBox& box_;
+  std::array<std::size_t, kAxes> index_{};
+  std::size_t from_ = 0, to_ = 0;
+};
+
 // Calls op(from, to) for all elements. Long rows are cut, so that one is more than one task.
 template <class Op, class T>
 void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& workers) {
@@ -51,20 +84,18 @@ void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& wor
   const std::size_t length = std::max<std::size_t>(1, box.extents.back());
   const std::size_t grain = GrainFor(rows * length, 16384, workers);  // elements
   const std::size_t pieces = (length + grain - 1) / grain;
-  const auto move = [&](std::size_t row, std::size_t piece) {
-    std::size_t rest = row, offset_from = 0, offset_to = 0;
-    for (std::size_t i = box.extents.size() - 1; i-- > 0;) {
-      const std::size_t index = rest % box.extents[i];
-      rest /= box.extents[i];
-      offset_from += index * box.strides_from[i];
-      offset_to += index * box.strides_to[i];
-    }
-    MoveRow<Op>(box, piece * grain, std::min(box.extents.back(), (piece + 1) * grain),
-                from + offset_from, to + offset_to);
-  };
   workers.ForRanges(rows * pieces, std::max<std::size_t>(1, grain / length),
                     [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t i = begin; i < end; ++i) move(i / pieces, i % pieces);
+                      RowStart row(box, begin / pieces);
+                      std::size_t piece = begin % pieces;
+                      for (std::size_t i = begin; i < end; ++i) {
+                        MoveRow<Op>(box, piece * grain,
+                                    std::min(box.extents.back(), (piece + 1) * grain),
+                                    from + row.from(), to + row.to());
+                        if (++piece < pieces) continue;
+                        piece = 0;
+                        row.Next();
+                      }
                     });
 }
 

@@ -32,8 +32,11 @@ void FindSegments(const raster::FaceRows& rows, int columns,
         ++j;
         continue;
       }
-      const std::int32_t first = j, surface = surface_of(faces[j]);
-      while (j < columns && faces[j] != raster::kNoFace && surface_of(faces[j]) == surface) ++j;
+      const std::int32_t first = j, face = faces[j], surface = surface_of(face);
+      const auto same_surface = [&](std::int32_t other) {
+        return other == face || (other != raster::kNoFace && surface_of(other) == surface);
+      };
+      while (j < columns && same_surface(faces[j])) ++j;
       segments->push_back({surface, at + first, j - first});
     }
   }
