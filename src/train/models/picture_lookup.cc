@@ -51,7 +51,8 @@ struct TwoPixels {
 
   // at: in (-1, size).
   TwoPixels(T at, std::size_t size) {
-    const auto low = static_cast<std::size_t>(at + T(1));  // of the first pixel, plus 1
+    // Of the first pixel, plus 1. The sum may round up to size + 1.
+    const std::size_t low = std::min(static_cast<std::size_t>(at + T(1)), size);
     const T share = at + T(1) - static_cast<T>(low);
     first = low > 0 ? low - 1 : 0;
     second = std::min(low, size - 1);
