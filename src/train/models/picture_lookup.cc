@@ -20,24 +20,25 @@ constexpr double kLeastLight = 0.25;  // nor by less light: dark pixels would tu
 constexpr double kBlack = 0.03;       // brightness of what no light reaches, at most
 
 // A pose as it is used.
+template <class T>
 struct View {
-  glm::dvec3 right, up, back;  // rows of the rotation
-  double x, y, scale, nearness;
+  using Vec3 = glm::vec<3, T>;
+  Vec3 right, up, back;  // rows of the rotation
+  T x, y, scale, nearness;
 
-  template <class T>
   explicit View(const T* p)
       : right(p[0], p[1], p[2]),
         up(p[3], p[4], p[5]),
-        x(0.5 + kShiftUnit * static_cast<double>(p[6])),
-        y(0.5 + kShiftUnit * static_cast<double>(p[7])),
-        scale(kScale + kScaleUnit * static_cast<double>(p[8])),
-        nearness(std::max(0.0, kNearness + kNearnessUnit * static_cast<double>(p[9]))) {
-    right /= glm::length(right) + 1e-9;
+        x(T(0.5) + T(kShiftUnit) * p[6]),
+        y(T(0.5) + T(kShiftUnit) * p[7]),
+        scale(T(kScale) + T(kScaleUnit) * p[8]),
+        nearness(std::max(T(0), T(kNearness) + T(kNearnessUnit) * p[9])) {
+    right /= glm::length(right) + T(1e-9);
     up -= glm::dot(up, right) * right;
-    up /= glm::length(up) + 1e-9;
+    up /= glm::length(up) + T(1e-9);
     back = glm::cross(right, up);
   }
-  glm::dvec3 Turned(const glm::dvec3& v) const {
+  Vec3 Turned(const Vec3& v) const {
     return {glm::dot(right, v), glm::dot(up, v), glm::dot(back, v)};
   }
 };
@@ -152,7 +153,7 @@ Pose PoseOf(const Camera& camera, int size) {
 
 Camera CameraOf(const Pose& pose, int size) {
   constexpr double kFarthest = 100;
-  const View view(pose.data());
+  const View<double> view(pose.data());
   Camera camera;
   const glm::dvec3 rows[3] = {view.right, view.up, view.back};
   for (int i = 0; i < 9; ++i) camera.rotation[i] = static_cast<float>(rows[i / 3][i % 3]);
@@ -185,18 +186,14 @@ class PictureLookup::Picture {
  public:
   Picture(const std::vector<Face>& faces, const Job& job, std::size_t m)
       : size_(static_cast<std::size_t>(job.images.shape()[3])),
-        image_(job.images.data<T>() + m * 4 * size_ * size_) {
+        image_(job.images.data<T>() + m * 4 * size_ * size_),
+        view_(job.pose.data<T>() + static_cast<std::size_t>(kPoseNumbers) * m) {
     const auto vertices = static_cast<std::size_t>(job.positions.shape()[1]);
     const T* const p = job.positions.data<T>() + m * 3 * vertices;
-    const View view(job.pose.data<T>() + static_cast<std::size_t>(kPoseNumbers) * m);
-    x_ = static_cast<T>(view.x);
-    y_ = static_cast<T>(view.y);
-    scale_ = static_cast<T>(view.scale);
-    nearness_ = static_cast<T>(view.nearness);
     const std::vector<glm::dvec3> normals = SmoothNormals(faces, p, vertices);
     for (std::size_t v = 0; v < vertices; ++v)
-      vertices_.push_back({Vec3(view.Turned({p[3 * v], p[3 * v + 1], p[3 * v + 2]})),
-                           Vec3(view.Turned(normals[v]))});
+      vertices_.push_back(
+          {view_.Turned({p[3 * v], p[3 * v + 1], p[3 * v + 2]}), view_.Turned(Vec3(normals[v]))});
   }
 
   SeenTexel<T> At(const SurfacePoint& point) const {
@@ -209,9 +206,9 @@ class PictureLookup::Picture {
     }
     n /= glm::length(n) + T(1e-12);
     // In units of the camera's distance: depth 1 at the origin.
-    const T depth = std::max(T(kLeastDepth), 1 - nearness_ * x.z), zoom = scale_ / depth;
-    const Vec3 eye(-nearness_ * x.x, -nearness_ * x.y, depth);
-    return {SampleAt(image_, size_, x_ + zoom * x.x, y_ - zoom * x.y), n,
+    const T depth = std::max(T(kLeastDepth), 1 - view_.nearness * x.z), zoom = view_.scale / depth;
+    const Vec3 eye(-view_.nearness * x.x, -view_.nearness * x.y, depth);
+    return {SampleAt(image_, size_, view_.x + zoom * x.x, view_.y - zoom * x.y), n,
             glm::dot(n, eye) / glm::length(eye)};
   }
 
@@ -221,7 +218,7 @@ class PictureLookup::Picture {
   };
   std::size_t size_;
   const T* image_;
-  T x_, y_, scale_, nearness_;  // of View
+  View<T> view_;
   std::vector<Vertex> vertices_;
 };
 

@@ -48,7 +48,7 @@ void AddSamples(const Images& images, std::size_t n, Samples samples, std::span<
     for (std::size_t c = 0; c < 3; ++c) {
       const float* const of = &values[(3 * n + c) * plane + y * width];
       const auto color = [=](std::size_t x) {
-        return share * std::min(1.0f, std::max(0.0f, of[x]));
+        return share * std::min(std::max(of[x], 0.0f), 1.0f);  // NaN stays
       };
       const auto normal = [=](std::size_t x) { return share * of[x]; };
       if (colors) {
