@@ -26,8 +26,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 // If there are enough portions, each worker takes its own, which stay in its caches and need no
 // synchronisation. Else all workers share each portion, in three loops.
 
-// Transformed values of both sides in a portion shared by all workers, about: 8 MB. Weight
-// gradients are summed portion by portion, so their bits depend on this.
+// Transformed values of both sides in a portion shared by all workers, about: 8 MB.
 constexpr std::size_t kSharedValues = std::size_t{1} << 21;
 // In a worker's own portion, about: 2 MB, the best of 1 to 8.
 constexpr std::size_t kOwnValues = std::size_t{1} << 19;
@@ -65,6 +64,25 @@ inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, const 
     return SharedPortions(plan, kSharedValues * std::max<std::size_t>(1, count / kFewWorkers));
   }
   return {true, unit, Panels::Parts(units, std::min(units, RoundUp(parts, count)))};
+}
+
+// Weight gradients are summed portion by portion in so many groups, or in one. Groups are workers'
+// own: where two cores share no cache, writing what the other has read takes 4 times as long.
+constexpr std::size_t kSumGroups = 16;
+
+inline std::size_t WeightSumsSize(const WinogradPlan& plan) {
+  return WinogradSide{plan, true}.total() * RoundUp(plan.s.out_channels, kTileColumns);
+}
+
+// The bits of weight gradients depend on this, and so it depends on the shape alone.
+inline PortionCut WeightGradPortions(const WinogradPlan& plan) {
+  const std::size_t values = plan.tile_rows() * ValuesOfRow(plan), parts = values / kOwnValues;
+  const bool deep = parts * kOwnTiles <= plan.tile_rows() * plan.tiles_across;
+  if (parts < kSumGroups || !deep || 4 * kSumGroups * WeightSumsSize(plan) > values) {
+    return SharedPortions(plan);
+  }
+  const std::size_t count = std::min(plan.tile_rows(), RoundUp(parts, kSumGroups));
+  return {true, 1, Panels::Parts(plan.tile_rows(), count)};
 }
 
 struct Portions {
@@ -137,19 +155,25 @@ struct OwnLoops {
   }
 };
 
+// Calls run(index, loops) for `count` parts, each of one worker or all of them shared.
+template <class Run>
+void ForOwnOrShared(bool own, std::size_t count, const Workers& workers, const Run& run) {
+  if (own) {
+    workers.ForParts(count, [&](std::size_t index, const Workers::Part& part) {
+      run(index, OwnLoops{part, part.worker()});
+    });
+  } else {
+    for (std::size_t index = 0; index < count; ++index) run(index, SharedLoops{workers});
+  }
+}
+
 // Calls run(rows, loops) for each portion.
 template <class Run>
 void ForPortions(const Portions& portions, const Workers& workers, const Run& run) {
-  const std::size_t count = portions.cut.units.count();
-  if (portions.cut.own) {
-    workers.ForParts(count, [&](std::size_t portion, const Workers::Part& part) {
-      run(portions.rows(portion), OwnLoops{part, part.worker()});
-    });
-  } else {
-    for (std::size_t portion = 0; portion < count; ++portion) {
-      run(portions.rows(portion), SharedLoops{workers});
-    }
-  }
+  ForOwnOrShared(portions.cut.own, portions.cut.units.count(), workers,
+                 [&](std::size_t portion, const auto& loops) {
+                   run(portions.rows(portion), loops);
+                 });
 }
 
 inline void TransformInput(const WinogradPlan& plan, const TileRows& rows, const SlotLayout& layout,
@@ -246,31 +270,38 @@ void WinogradInputGradTarget(const Conv2dShape& s, const float* d_y, const float
 void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float* d_y,
                               float* d_weight, const KernelContext& context) {
   const WinogradPlan plan(s);
-  const Portions portions(plan, SharedPortions(plan));  // which fixes the order of the sums
-  const std::size_t count = portions.cut.units.count();
-  const std::size_t panels = DivideUp(s.out_channels, kTileColumns);
-  const WinogradMemory memory(portions, portions.input.total() * panels * kTileColumns, context);
-  float *const inputs = memory.inputs(0), *const outputs = memory.outputs(0);
-  for (std::size_t portion = 0; portion < count; ++portion) {
-    const TileRows rows = portions.rows(portion);
-    const SlotLayout in = RowLayout(portions.input, rows);
-    const WinogradCorrelation product{portions.input, in,   inputs, outputs,
-                                      memory.weights, rows, panels, portion > 0};
-    const std::size_t items = OutputItems(product);
-    context.workers.For(items + s.in_channels, [&](std::size_t index, std::size_t worker) {
-      if (index < items) {
-        TransformOutputRows(product, d_y, index, memory.places(worker));
-      } else {
-        TransformInput(plan, rows, in, x, index - items, memory.places(worker), inputs);
-      }
-    });
-    product.Multiply(context.workers);
-    if (portion + 1 < count) continue;
-    const Panels channels(s.in_channels, kFinishedChannels);
-    context.workers.For(panels * channels.count(), [&](std::size_t index, std::size_t) {
-      FinishWeightGrad(product, index % panels, channels.range(index / panels), d_weight);
-    });
-  }
+  const Portions portions(plan, WeightGradPortions(plan));
+  const bool own = portions.cut.own;
+  const Panels groups = Panels::Parts(portions.cut.units.count(), own ? kSumGroups : 1);
+  const std::size_t sums_size = WeightSumsSize(plan);
+  const WinogradMemory memory(portions, groups.count() * sums_size, context);
+  const WeightSumGroups sums{portions.input, DivideUp(s.out_channels, kTileColumns), memory.weights,
+                             sums_size, groups.count()};
+  ForOwnOrShared(own, groups.count(), context.workers, [&](std::size_t group, const auto& loops) {
+    float *const inputs = memory.inputs(loops.owner), *const outputs = memory.outputs(loops.owner);
+    for (std::size_t portion = groups.begin(group); portion < groups.begin(group + 1); ++portion) {
+      const TileRows rows = portions.rows(portion);
+      const SlotLayout in = RowLayout(portions.input, rows);
+      const WinogradCorrelation product{sums, group, in, inputs, outputs, rows,
+                                        portion > groups.begin(group)};
+      const std::size_t items = OutputItems(product);
+      loops.For(items + s.in_channels, [&](std::size_t index, std::size_t worker) {
+        if (index < items) {
+          TransformOutputRows(product, d_y, index, memory.places(worker));
+        } else {
+          TransformInput(plan, rows, in, x, index - items, memory.places(worker), inputs);
+        }
+      });
+      product.Multiply(loops);
+    }
+  });
+  const Panels channels(s.in_channels, kFinishedChannels);
+  context.workers.For(sums.panels * channels.count(), [&](std::size_t index, std::size_t) {
+    const std::size_t panel = index % sums.panels;
+    const Panels::Range some = channels.range(index / sums.panels);
+    MergeGroups(sums, panel, some);
+    FinishWeightGrad(sums, panel, some, d_weight);
+  });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE

@@ -302,34 +302,45 @@ HWY_INLINE void PlainRowsTile(const float* rows, std::size_t row_stride, std::si
   }
 }
 
-struct WinogradCorrelation {
+// The sums of some groups of portions, to be added up in order.
+struct WeightSumGroups {
   const WinogradSide& input;
+  std::size_t panels;  // of output channels
+  float* data;  // [group][slot][panel of output channels][index of the input's side][kTileColumns]
+  std::size_t group_stride, groups;
+
+  float* At(std::size_t group, std::size_t slot, std::size_t panel, std::size_t index) const {
+    return data + group * group_stride +
+           (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
+  }
+};
+
+struct WinogradCorrelation {
+  const WeightSumGroups& sums;
+  std::size_t group;
   const SlotLayout& in_layout;  // RowLayout
   const float* inputs;
   float* outputs;  // [slot][panel of output channels][tile][kTileColumns]
-  float* sums;     // [slot][panel of output channels][index of the input's side][kTileColumns]
   const TileRows& rows;
-  std::size_t panels;  // of output channels
   bool accumulate;
 
   std::size_t OutputAt(std::size_t slot, std::size_t panel) const {
-    return (slot * panels + panel) * rows.pitch * kTileColumns;
-  }
-  std::size_t SumAt(std::size_t slot, std::size_t panel, std::size_t index) const {
-    return (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
+    return (slot * sums.panels + panel) * rows.pitch * kTileColumns;
   }
 
   // Work items: some rows of a slot with all panels or, with many workers, fewer rows with one
   // panel.
-  void Multiply(const Workers& workers) const {
-    const bool many = static_cast<std::size_t>(workers.count()) > kFewWorkers;
+  template <class Loops>
+  void Multiply(const Loops& loops) const {
+    const WinogradSide& input = sums.input;
+    const bool many = loops.workers_sharing() > kFewWorkers;
     const std::size_t item_rows = (many ? kManySlotRowPanels : kSlotRowPanels) * kTileRows;
-    const std::size_t item_panels = many ? 1 : panels, groups = panels / item_panels;
+    const std::size_t item_panels = many ? 1 : sums.panels, groups = sums.panels / item_panels;
     std::size_t most = 0;
     for (std::size_t slot = 0; slot < input.plan.slots(); ++slot) {
       most = std::max(most, DivideUp(input.size(slot), item_rows));
     }
-    workers.For(input.plan.slots() * most * groups, [&](std::size_t index, std::size_t) {
+    loops.For(input.plan.slots() * most * groups, [&](std::size_t index, std::size_t) {
       const std::size_t slot = index / groups / most, block = index / groups % most;
       const std::size_t panel = index % groups * item_panels;
       const Panels blocks(input.size(slot), item_rows);
@@ -350,7 +361,7 @@ struct WinogradCorrelation {
           const std::size_t row = some.begin + row_panels.begin(i);
           PlainRowsTile(inputs + in_layout.At(slot, row, 0) + t, in_layout.index_stride,
                         row_panels.size(i), columns, steps,
-                        {.c = sums + SumAt(slot, panel, row),
+                        {.c = sums.At(group, slot, panel, row),
                          .ldc = kTileColumns,
                          .offset = {0, kLanes},
                          .count = {kLanes, kLanes},
@@ -366,15 +377,15 @@ struct WinogradCorrelation {
 constexpr std::size_t kOutputRows = 8;
 
 inline std::size_t OutputItems(const WinogradCorrelation& product) {
-  return product.panels * DivideUp(product.rows.count, kOutputRows);
+  return product.sums.panels * DivideUp(product.rows.count, kOutputRows);
 }
 
 // The values of one item. memory: for one row of tiles, all channels.
 inline void TransformOutputRows(const WinogradCorrelation& product, const float* d_y,
                                 std::size_t item, float* memory) {
-  const WinogradPlan& plan = product.input.plan;
-  const std::size_t slot_stride = product.OutputAt(1, 0);
-  const std::size_t panel = item % product.panels, first = item / product.panels * kOutputRows;
+  const WinogradPlan& plan = product.sums.input.plan;
+  const std::size_t slot_stride = product.OutputAt(1, 0), panels = product.sums.panels;
+  const std::size_t panel = item % panels, first = item / panels * kOutputRows;
   for (std::size_t r = first; r < std::min(first + kOutputRows, product.rows.count); ++r) {
     GatherChannels(plan, TileRow(plan, product.rows.first + r), d_y, panel * kTileColumns, memory);
     float* values =
@@ -414,15 +425,15 @@ struct TransformWeightsBack {
 };
 
 // The sums of phase (a, b) between input channel 0 and one panel of output channels.
-inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t panel, std::size_t a,
+inline WeightSums SumsOfPhase(const WeightSumGroups& sums, std::size_t panel, std::size_t a,
                               std::size_t b) {
-  const WinogradPlan& plan = product.input.plan;
+  const WinogradPlan& plan = sums.input.plan;
   WeightSums from;
   for (std::size_t i = 0; i <= plan.taps(a); ++i) {
     for (std::size_t j = 0; j <= plan.taps(b); ++j) {
       const std::size_t slot = i * plan.axis_slots + j;
-      const std::size_t index = plan.phase_index(slot, a, b) * product.input.channels();
-      from.data[i][j] = product.sums + product.SumAt(slot, panel, index);
+      const std::size_t index = plan.phase_index(slot, a, b) * sums.input.channels();
+      from.data[i][j] = sums.At(0, slot, panel, index);
     }
   }
   return from;
@@ -431,17 +442,36 @@ inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t pa
 // Input channels per work item.
 constexpr std::size_t kFinishedChannels = 8;
 
-// Finishes some input channels.
-inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t panel,
-                             Panels::Range some, float* d_weight) {
-  const WinogradPlan& plan = product.input.plan;
+// Adds the sums of some input channels to those of the first group.
+inline void MergeGroups(const WeightSumGroups& sums, std::size_t panel, Panels::Range some) {
+  const WinogradPlan& plan = sums.input.plan;
+  const std::size_t count = (some.end - some.begin) * kTileColumns;
+  for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
+    for (std::size_t phase = 0; phase < plan.phases(slot); ++phase) {
+      const std::size_t index = phase * sums.input.channels() + some.begin;
+      float* const to = sums.At(0, slot, panel, index);
+      for (std::size_t group = 1; group < sums.groups; ++group) {
+        const float* from = sums.At(group, slot, panel, index);
+        for (std::size_t k = 0; k < count; k += kLanes) {
+          const Vec sum = hn::Add(hn::LoadU(Tag(), to + k), hn::LoadU(Tag(), from + k));
+          hn::StoreU(sum, Tag(), to + k);
+        }
+      }
+    }
+  }
+}
+
+// Finishes some input channels of the first group's sums.
+inline void FinishWeightGrad(const WeightSumGroups& groups, std::size_t panel, Panels::Range some,
+                             float* d_weight) {
+  const WinogradPlan& plan = groups.input.plan;
   const std::size_t area = plan.kernel * plan.kernel, first = panel * kTileColumns;
   const std::size_t in_channels = plan.s.in_channels;
   const std::size_t channels = std::min(kTileColumns, plan.s.out_channels - first);
   WeightSums sums[4];  // stride <= 2
   for (std::size_t a = 0; a < plan.stride; ++a) {
     for (std::size_t b = 0; b < plan.stride; ++b) {
-      sums[a * plan.stride + b] = SumsOfPhase(product, panel, a, b);
+      sums[a * plan.stride + b] = SumsOfPhase(groups, panel, a, b);
     }
   }
   float taps[kMostTaps * kTileColumns];
