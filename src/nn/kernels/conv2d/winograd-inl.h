@@ -170,10 +170,9 @@ void ForOwnOrShared(bool own, std::size_t count, const Workers& workers, const R
 // Calls run(rows, loops) for each portion.
 template <class Run>
 void ForPortions(const Portions& portions, const Workers& workers, const Run& run) {
-  ForOwnOrShared(portions.cut.own, portions.cut.units.count(), workers,
-                 [&](std::size_t portion, const auto& loops) {
-                   run(portions.rows(portion), loops);
-                 });
+  ForOwnOrShared(
+      portions.cut.own, portions.cut.units.count(), workers,
+      [&](std::size_t portion, const auto& loops) { run(portions.rows(portion), loops); });
 }
 
 inline void TransformInput(const WinogradPlan& plan, const TileRows& rows, const SlotLayout& layout,
@@ -282,8 +281,8 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
     for (std::size_t portion = groups.begin(group); portion < groups.begin(group + 1); ++portion) {
       const TileRows rows = portions.rows(portion);
       const SlotLayout in = RowLayout(portions.input, rows);
-      const WinogradCorrelation product{sums, group, in, inputs, outputs, rows,
-                                        portion > groups.begin(group)};
+      const WinogradCorrelation product{
+          sums, group, in, inputs, outputs, rows, portion > groups.begin(group)};
       const std::size_t items = OutputItems(product);
       loops.For(items + s.in_channels, [&](std::size_t index, std::size_t worker) {
         if (index < items) {
