@@ -203,10 +203,12 @@ TEST(Conv2dWinograd, AgreesWithDirectWhereWorkersHavePortionsOfTheirOwn) {
   ExpectAgreesWithDirect({61, 40, 14, 15, 64, 3, 3, 1, 1}, 9);
 }
 
-// Enough tiles for groups of sums of the weight gradient, with 4 portions each, and with 2.
+// Enough tiles for groups of sums of the weight gradient, with 4 portions each, and with 2; fewer
+// rows of tiles than groups.
 TEST(Conv2dWinograd, AgreesWithDirectWhereSumsComeInGroups) {
   ExpectAgreesWithDirect({40, 17, 61, 66, 35, 3, 3, 1, 1}, 9);
   ExpectAgreesWithDirect({50, 16, 65, 64, 18, 4, 4, 2, 1}, 9);
+  ExpectAgreesWithDirect({1, 16, 5, 20000, 16, 3, 3, 1, 1}, 9);
 }
 
 // The bound above is far from what happens. Next to the error of the direct kernels, measured on

@@ -76,7 +76,8 @@ inline std::size_t WeightSumsSize(const WinogradPlan& plan) {
 
 // The bits of weight gradients depend on this, and so it depends on the shape alone.
 inline PortionCut WeightGradPortions(const WinogradPlan& plan) {
-  const std::size_t values = plan.tile_rows() * ValuesOfRow(plan), parts = values / kOwnValues;
+  const std::size_t values = plan.tile_rows() * ValuesOfRow(plan);
+  const std::size_t parts = std::min(plan.tile_rows(), values / kOwnValues);
   const bool deep = parts * kOwnTiles <= plan.tile_rows() * plan.tiles_across;
   if (parts < kSumGroups || !deep || 4 * kSumGroups * WeightSumsSize(plan) > values) {
     return SharedPortions(plan);
