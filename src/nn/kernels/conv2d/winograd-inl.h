@@ -50,25 +50,37 @@ inline PortionCut SharedPortions(const WinogradPlan& plan, std::size_t values = 
   return {false, 1, Panels(plan.tile_rows(), rows)};
 }
 
-// Each worker gets its own portions if there are at least two per worker, or one with many workers,
-// since starting loops together then costs more than waiting for the last; `unit` rows of tiles
-// stay together. Shared portions grow with the number of workers, as do their caches.
-inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
-  const auto count = static_cast<std::size_t>(workers.count());
-  const std::size_t units = plan.tile_rows() / unit;
+// How many portions of a worker's own there may be, `unit` rows of tiles staying together; 0 if
+// those would be too large.
+inline std::size_t MostOwnPortions(const WinogradPlan& plan, std::size_t unit) {
+  if (unit * ValuesOfRow(plan) > kSharedValues) return 0;
   const std::size_t rows =
       std::max(DivideUp(kOwnTiles, plan.tiles_across), kOwnValues / ValuesOfRow(plan));
-  const std::size_t parts = std::max<std::size_t>(1, units / DivideUp(rows, unit));
-  const std::size_t least = count <= kFewWorkers ? 2 * count : count;
-  if (unit * ValuesOfRow(plan) > kSharedValues || (count > 1 && parts < least)) {
-    return SharedPortions(plan, kSharedValues * std::max<std::size_t>(1, count / kFewWorkers));
-  }
-  return {true, unit, Panels::Parts(units, std::min(units, RoundUp(parts, count)))};
+  return std::max<std::size_t>(1, plan.tile_rows() / unit / DivideUp(rows, unit));
 }
 
-// Weight gradients are summed portion by portion in so many groups, or in one. Groups are workers'
-// own: where two cores share no cache, writing what the other has read takes 4 times as long.
+inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, std::size_t count) {
+  const std::size_t units = plan.tile_rows() / unit;
+  return {true, unit, Panels::Parts(units, std::min(units, count))};
+}
+
+// Each worker gets its own portions if there are at least two per worker, or one with many workers,
+// since starting loops together then costs more than waiting for the last. Shared portions grow
+// with the number of workers, as do their caches.
+inline PortionCut PortionsFor(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
+  const auto count = static_cast<std::size_t>(workers.count());
+  const std::size_t most = MostOwnPortions(plan, unit);
+  const std::size_t least = count > 1 && count <= kFewWorkers ? 2 * count : count;
+  if (most >= least) return OwnPortions(plan, unit, RoundUp(most, count));
+  return SharedPortions(plan, kSharedValues * std::max<std::size_t>(1, count / kFewWorkers));
+}
+
+// Weight gradients are summed in groups of portions, a worker's own: where two cores share no
+// cache, writing what the other has read takes 4 times as long. Each group costs memory for its
+// sums; more workers than groups help each other.
 constexpr std::size_t kSumGroups = 16;
+// The values of a group per value of its sums, at least, so that merging costs little.
+constexpr std::size_t kValuesPerSum = 4;
 
 inline std::size_t WeightSumsSize(const WinogradPlan& plan) {
   return WinogradSide{plan, true}.total() * RoundUp(plan.s.out_channels, kTileColumns);
@@ -76,14 +88,12 @@ inline std::size_t WeightSumsSize(const WinogradPlan& plan) {
 
 // The bits of weight gradients depend on this, and so it depends on the shape alone.
 inline PortionCut WeightGradPortions(const WinogradPlan& plan) {
+  const std::size_t most = MostOwnPortions(plan, 1);
   const std::size_t values = plan.tile_rows() * ValuesOfRow(plan);
-  const std::size_t parts = std::min(plan.tile_rows(), values / kOwnValues);
-  const bool deep = parts * kOwnTiles <= plan.tile_rows() * plan.tiles_across;
-  if (parts < kSumGroups || !deep || 4 * kSumGroups * WeightSumsSize(plan) > values) {
+  if (most < kSumGroups || values < kValuesPerSum * kSumGroups * WeightSumsSize(plan)) {
     return SharedPortions(plan);
   }
-  const std::size_t count = std::min(plan.tile_rows(), RoundUp(parts, kSumGroups));
-  return {true, 1, Panels::Parts(plan.tile_rows(), count)};
+  return OwnPortions(plan, 1, RoundUp(most, kSumGroups));
 }
 
 struct Portions {
@@ -190,7 +200,7 @@ struct WinogradOperands {
 
 inline void Convolve(const WinogradPlan& plan, const WinogradOperands& operands,
                      const KernelContext& context) {
-  const Portions portions(plan, OwnPortions(plan, 1, context.workers));
+  const Portions portions(plan, PortionsFor(plan, 1, context.workers));
   const PackedWinogradWeights packed(portions.output, portions.input, operands.weights_of);
   const WinogradMemory memory(portions, packed.size(), context);
   packed.Fill(operands.weight, memory.weights, context.workers);
@@ -241,7 +251,7 @@ void WinogradInputGradTarget(const Conv2dShape& s, const float* d_y, const float
   }
   const WinogradPlan plan(s);
   // Adjacent rows of tiles in one image add to the same pixels.
-  const Portions portions(plan, OwnPortions(plan, plan.tiles_down, context.workers));
+  const Portions portions(plan, PortionsFor(plan, plan.tiles_down, context.workers));
   const PackedWinogradWeights packed(portions.input, portions.output);
   const WinogradMemory memory(portions, packed.size(), context);
   packed.Fill(weight, memory.weights, context.workers);
@@ -296,11 +306,13 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
     }
   });
   const Panels channels(s.in_channels, kFinishedChannels);
+  if (own) {
+    context.workers.ForRanges(
+        sums_size, kMergedValues,
+        [&](std::size_t begin, std::size_t end, std::size_t) { sums.Merge(begin, end); });
+  }
   context.workers.For(sums.panels * channels.count(), [&](std::size_t index, std::size_t) {
-    const std::size_t panel = index % sums.panels;
-    const Panels::Range some = channels.range(index / sums.panels);
-    MergeGroups(sums, panel, some);
-    FinishWeightGrad(sums, panel, some, d_weight);
+    FinishWeightGrad(sums, index % sums.panels, channels.range(index / sums.panels), d_weight);
   });
 }
 

@@ -313,6 +313,17 @@ struct WeightSumGroups {
     return data + group * group_stride +
            (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
   }
+
+  // Adds the other groups' sums [begin, end), whole vectors, to the first's, in order.
+  void Merge(std::size_t begin, std::size_t end) const {
+    for (std::size_t group = 1; group < groups; ++group) {
+      const float* from = data + group * group_stride;
+      for (std::size_t i = begin; i < end; i += kLanes) {
+        const Vec sum = hn::Add(hn::LoadU(Tag(), data + i), hn::LoadU(Tag(), from + i));
+        hn::StoreU(sum, Tag(), data + i);
+      }
+    }
+  }
 };
 
 struct WinogradCorrelation {
@@ -439,27 +450,9 @@ inline WeightSums SumsOfPhase(const WeightSumGroups& sums, std::size_t panel, st
   return from;
 }
 
-// Input channels per work item.
+// Per work item: input channels, and sums of a group (16 KB, half of L1).
 constexpr std::size_t kFinishedChannels = 8;
-
-// Adds the sums of some input channels to those of the first group.
-inline void MergeGroups(const WeightSumGroups& sums, std::size_t panel, Panels::Range some) {
-  const WinogradPlan& plan = sums.input.plan;
-  const std::size_t count = (some.end - some.begin) * kTileColumns;
-  for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
-    for (std::size_t phase = 0; phase < plan.phases(slot); ++phase) {
-      const std::size_t index = phase * sums.input.channels() + some.begin;
-      float* const to = sums.At(0, slot, panel, index);
-      for (std::size_t group = 1; group < sums.groups; ++group) {
-        const float* from = sums.At(group, slot, panel, index);
-        for (std::size_t k = 0; k < count; k += kLanes) {
-          const Vec sum = hn::Add(hn::LoadU(Tag(), to + k), hn::LoadU(Tag(), from + k));
-          hn::StoreU(sum, Tag(), to + k);
-        }
-      }
-    }
-  }
-}
+constexpr std::size_t kMergedValues = 4096;
 
 // Finishes some input channels of the first group's sums.
 inline void FinishWeightGrad(const WeightSumGroups& groups, std::size_t panel, Panels::Range some,
