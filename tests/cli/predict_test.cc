@@ -146,7 +146,8 @@ TEST_F(Predict, TellsItsStagesAndEndsAtCtrlC) {
 TEST_F(Predict, WritesTheLightAndMovesIt) {
   ExpectDone("train --config " TILEGRAD_CONFIGS "/texture_quick.toml --data " + In("d") +
              " --out " + In("lit") +
-             " --set schedule.steps=1 --set schedule.batch=2 --set network.base=2 --set "
+             " --set schedule.steps=1 --set schedule.batch=2 --set schedule.portions=2 --set "
+             "network.base=2 --set "
              "network.most=4 --set network.levels=2 --set network.latent=8 --set "
              "network.hidden=8 --set network.light_width=8 --set network.lookup_width=4 --set "
              "network.template_level=1");

@@ -70,7 +70,8 @@ class ShapeNetTest : public ProgramTest {
   }
   void TrainAndEval(const std::string& settings) const {
     ExpectDone("train --config texture_quick --data " + In("data") + " --out " + In("run") +
-               " --set schedule.steps=20 --set schedule.batch=4 --set network.base=4 --set "
+               " --set schedule.steps=20 --set schedule.batch=4 --set schedule.portions=2 --set "
+               "network.base=4 --set "
                "network.most=8 --set network.levels=2 --set network.latent=12 --set "
                "network.hidden=12 --set network.light_width=8 --set network.lookup_width=4 " +
                settings);

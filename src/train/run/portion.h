@@ -33,8 +33,9 @@ inline Status CheckPortions(std::int64_t batch, std::int64_t portions) {
     return InvalidArgument("schedule.portions is {}, but must be a power of two", portions);
   if (batch % portions == 0) return {};
   return InvalidArgument(
-      "schedule.batch is {}, which schedule.portions = {} does not divide: take a multiple of {}",
-      batch, portions, portions);
+      "schedule.batch is {}, which schedule.portions = {} does not divide: take a multiple of {}, "
+      "or schedule.portions = {}",
+      batch, portions, portions, 1 << std::countr_zero(static_cast<std::uint64_t>(batch)));
 }
 
 }  // namespace tilegrad::train

@@ -49,17 +49,18 @@ inline bool SampleIsDue(const Schedule& s, std::int64_t steps) {
 // Its keys, in table [schedule].
 inline ConfigFields FieldsOf(Schedule* s) {
   const auto reporting = Affects::kReporting;
-  return {{"schedule.steps", &s->steps, 1, kNoLimit, "number of training steps"},
-          {"schedule.seed", &s->seed, 0, kNoLimit, "seed of weights, order and views"},
-          {"schedule.portions", &s->portions, 1, 1 << 20,
-           "portions of a batch, each computed independently, for up to as many processes; a power "
-           "of two"},
-          {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
-          {"schedule.sample_every", &s->sample_every, 1, kNoLimit,
-           "steps between samples; the first ones are at 10, 20, 40 and so on", reporting},
-          {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},
-          {"schedule.keep_checkpoints", &s->keep_checkpoints, 1, kNoLimit,
-           "number of newest checkpoints to keep", reporting}};
+  return {
+      {"schedule.steps", &s->steps, 1, kNoLimit, "number of training steps"},
+      {"schedule.seed", &s->seed, 0, kNoLimit, "seed of weights, order and views"},
+      {"schedule.portions", &s->portions, 1, 1 << 20,
+       "portions of a batch, each computed independently, for up to as many groups of threads or "
+       "processes; a power of two"},
+      {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
+      {"schedule.sample_every", &s->sample_every, 1, kNoLimit,
+       "steps between samples; the first ones are at 10, 20, 40 and so on", reporting},
+      {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},
+      {"schedule.keep_checkpoints", &s->keep_checkpoints, 1, kNoLimit,
+       "number of newest checkpoints to keep", reporting}};
 }
 
 enum class ExistingRun {
