@@ -2,14 +2,15 @@
 // Photographs of section 5.4 that anyone can make, in the layout of PASCAL3D+
 // (src/train/data/photographs/rendered_set.h):
 //
-//   photograph_set datasets/cars /usr/share/backgrounds photographs [train] [test]
+//   photograph_set datasets/cars /usr/share/backgrounds photographs [train] [test] [exact]
 //
 // `datasets/cars`: of tilegrad dataset --source cars, whose training and test models are taken.
-// Backgrounds: every .jpg below the folder.
+// Backgrounds: every .jpg below the folder. `exact`: training cameras are, too.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <string_view>
 
 #include "base/error.h"
 #include "train/data/photographs/rendered_set.h"
@@ -28,7 +29,8 @@ std::vector<Path> PhotographsBelow(const Path& folder) {
 }
 
 Status Run(int argc, char** argv) {
-  if (argc < 4) return InvalidArgument("photograph_set DATASET BACKGROUNDS OUT [TRAIN] [TEST]");
+  if (argc < 4)
+    return InvalidArgument("photograph_set DATASET BACKGROUNDS OUT [TRAIN] [TEST] [exact]");
   const Workers workers(0);
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(argv[1]));
   const auto open = [&](Split split) {
@@ -41,7 +43,11 @@ Status Run(int argc, char** argv) {
   if (argc > 5) job.test_count = std::atoi(argv[5]);
   fmt::print("{} training and {} test models, {} backgrounds\n", job.train.size(), job.test.size(),
              job.backgrounds.size());
-  return MakeRenderedSet(job, {}, argv[3], workers, {});
+  AnnotationNoise noise;
+  if (argc > 6 && argv[6] != std::string_view("exact"))
+    return InvalidArgument("{}: the last argument is \"exact\" or nothing", argv[6]);
+  noise.cameras = argc <= 6;
+  return MakeRenderedSet(job, noise, argv[3], workers, {});
 }
 
 }  // namespace

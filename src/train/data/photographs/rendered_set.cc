@@ -231,8 +231,8 @@ Status FindCameras(PhotographSet* set) {
   return {};
 }
 
-// From the world of the models to that of the cameras, by the means of keypoints in both.
-Similarity WorldOfCameras(const PhotographSet& set) {
+// Of the training part's objects, in the world of the models.
+std::vector<Point> MeanPoints(const PhotographSet& set) {
   std::vector<Point> mean(set.mean_keypoints.size());
   const std::vector<int> train = set.Select(Split::kTrain);
   for (const int i : train) {
@@ -240,24 +240,30 @@ Similarity WorldOfCameras(const PhotographSet& set) {
     for (std::size_t k = 0; k < mean.size(); ++k)
       mean[k] = mean[k] + (1 / static_cast<double>(train.size())) * points[k];
   }
-  return FitSimilarity(mean, set.mean_keypoints);
+  return mean;
 }
 
-// For the test part only: nothing else uses the true models.
-void TellTruth(PhotographSet* set) {
-  const Similarity to_cameras = WorldOfCameras(*set);
-  for (Photograph& photo : set->photographs) {
-    if (photo.split != Split::kTest) {
-      photo.points.clear();
-      continue;
-    }
-    std::vector<Keypoint> all = photo.keypoints;
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      photo.points[k] = to_cameras(photo.points[k]);
-      all[k].visible = true;
-    }
-    photo.camera = FitWeakCamera(photo.points, all, *photo.camera);
+void MakeCameraExact(const Similarity& to_cameras, Photograph* photo) {
+  std::vector<Keypoint> all = photo->keypoints;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    photo->points[k] = to_cameras(photo->points[k]);
+    all[k].visible = true;
   }
+  photo->camera = FitWeakCamera(photo->points, all, *photo->camera);
+}
+
+// For the test part: keypoints and cameras of the true models. For the training part cameras, if
+// they are exact, whose mean shape is then the true one too.
+void TellTruth(bool exact_cameras, PhotographSet* set) {
+  std::vector<Point> mean = MeanPoints(*set);
+  const Similarity to_cameras = FitSimilarity(mean, set->mean_keypoints);
+  for (Photograph& photo : set->photographs) {
+    const bool test = photo.split == Split::kTest;
+    if (test || exact_cameras) MakeCameraExact(to_cameras, &photo);
+    if (!test) photo.points.clear();
+  }
+  if (!exact_cameras) return;
+  for (std::size_t k = 0; k < mean.size(); ++k) set->mean_keypoints[k] = to_cameras(mean[k]);
 }
 
 }  // namespace
@@ -354,7 +360,7 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
       set.photographs.push_back(std::move(photo));
   }
   TILEGRAD_TRY(FindCameras(&set));
-  TellTruth(&set);
+  TellTruth(!noise.cameras, &set);
   return WriteCmrLayout(folder, set);
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Synthetic photographs that anyone can make: models in front of real backgrounds, one view of each
-// object, annotated as noisily as real ones, in the layout of PASCAL3D+ (photographs.h). Only the
-// annotations of the test part come from the true models and are exact, also its cameras: each is
-// the one that projects its object's true keypoints best, in the world of the training part's.
+// object, annotated as noisily as real ones, in the layout of PASCAL3D+ (photographs.h). The annotations
+// of the test part come from the true models and are exact, also its cameras: each is the one that
+// projects its object's true keypoints best, in the world of the training part's.
 #pragma once
 
 #include <array>
@@ -30,13 +30,14 @@ struct AnnotationNoise {
   double mask = 2.0;       // pixels by which a mask's outline wanders, one standard deviation
   double keypoint = 0.02;  // standard deviation of each coordinate, relative to the box
   double hidden = 0.1;     // share of visible keypoints that are not annotated
+  bool cameras = true;     // found from the keypoints; else exact, as the test part's
 };
 
 // Writes <folder>/Images and <folder>/{data,sfm}. An object is a model stretched by up to 15 %
 // along each axis, seen from all around at elevations from -5 to 30 degrees by a pinhole camera a
 // few lengths away, under the light of datasets. Keypoints: FindExtremePoints, visible where
-// nothing hides them. Cameras of the training part: factorization.h, from the keypoints alone. The
-// same for any number of workers.
+// nothing hides them. Cameras of the training part: factorization.h, from the keypoints alone, if
+// noise.cameras. The same for any number of workers.
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const Watch& watch);
 
