@@ -204,12 +204,4 @@ LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& contex
   return net.Add<LinearLayer>(name, context, LinearShape{.in = in, .out = out}, rng);
 }
 
-void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
-                      std::int64_t channels, Rng& rng) {
-  Sequential& body = net.Add<Residual>(name).body;
-  const ConvShape conv{.in = channels, .out = channels, .options = {.padding = 1}};
-  AddConvBlock(body, "1", context, {.conv = conv, .norm = true, .activation = &Relu}, rng);
-  AddConvBlock(body, "2", context, {.conv = conv, .norm = true}, rng);
-}
-
 }  // namespace tilegrad::nn

@@ -176,11 +176,6 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
 LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
                        std::int64_t out, Rng& rng);
 
-// "name": x + two 3x3 convolutions of x with the same number of channels, the first followed by
-// norm and ReLU, the second by norm.
-void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
-                      std::int64_t channels, Rng& rng);
-
 Var LeakyRelu02(const Var& x);  // LeakyRelu of slope 0.2, as an Activation
 
 }  // namespace tilegrad::nn

@@ -68,17 +68,6 @@ TEST_F(Networks, AMapThatWrapsHasNoEdges) {
   EXPECT_GT(ReduceMax(Abs(y), {0, 1, 2, 3}).item(), 1e-6);
 }
 
-TEST_F(Networks, ResidualBlocksDifferentiated) {
-  Sequential blocks;
-  AddResidualBlock(blocks, "a", context_, 2, rng_);
-  AddResidualBlock(blocks, "b", context_, 2, rng_);
-  const Var image = Input({2, 2, 5, 6});
-  EXPECT_EQ(blocks.Forward(image, Mode::kEval).shape(), image.shape());
-  ExpectGradientBy(
-      WeightsOf(blocks), [&] { return Mean(Square(blocks.Forward(image, Mode::kTrain) - 1.0)); },
-      rng_);
-}
-
 // WGAN-GP: d(critic loss + penalty)/d(weights), to 1e-6 of it, for each kind of critic.
 TEST_F(Networks, CriticStepWithGradientPenalty) {
   const CriticShape shapes[] = {{.base = 3, .halvings = 2},

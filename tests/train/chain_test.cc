@@ -52,19 +52,6 @@ NetworkConfig TinyNetwork() {
           .output_deviation = 1};
 }
 
-// Two 3x3 convolutions without bias and two batch norms a block: 2 (9 c^2 + 2 c) weights with c = 4
-// and c = 8 channels.
-TEST(MeshNetwork, BlocksAreResidual) {
-  const Workers workers(1);
-  nn::Context context(workers);
-  NetworkConfig config = TinyNetwork();
-  MeshNetwork plain(context, config, 16, 1);
-  config.blocks = 1;
-  MeshNetwork deeper(context, config, 16, 1);
-  EXPECT_EQ(nn::CountParameters(deeper.module()) - nn::CountParameters(plain.module()),
-            2 * (9 * 16 + 2 * 4) + 2 * (9 * 64 + 2 * 8));
-}
-
 // The gradient of smoothing is covered by the chain below.
 TEST(MeshNetwork, SmoothingSpreadsOffsets) {
   const Workers workers(1);

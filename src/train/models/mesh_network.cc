@@ -24,13 +24,6 @@ struct NetworkBuilder {
         nn::ConvShape{.in = in, .out = out, .kernel = kKernel, .options = kHalve}, rng);
     net.Add<nn::BatchNorm>("conv_norm" + name, context, out, kRelu);
   }
-  void Blocks(nn::Sequential& net, const std::string& name, std::int64_t channels) {
-    for (std::int64_t i = 0; i < config.blocks; ++i) {
-      const std::string block = fmt::format("block{}_{}", name, i + 1);
-      nn::AddResidualBlock(net, block, context, channels, rng);
-      net.Add<nn::Activation>(block + "_relu", &nn::Relu);
-    }
-  }
   nn::LinearLayer& Fc(nn::Sequential& net, const std::string& name, std::int64_t in,
                       std::int64_t out) {
     auto& layer =
@@ -52,9 +45,7 @@ void BuildEncoder(NetworkBuilder& b, nn::Sequential& net, int image_size) {
   const std::int64_t c = b.config.channels, code = b.config.code, side = image_size / 8;
   b.Conv(net, "1", 4, c);
   b.Conv(net, "2", c, 2 * c);
-  b.Blocks(net, "2", 2 * c);
   b.Conv(net, "3", 2 * c, 4 * c);
-  b.Blocks(net, "3", 4 * c);
   net.Add<nn::Flatten>("flatten");
   b.FcRelu(net, "1", 4 * c * side * side, code);
   b.FcRelu(net, "2", code, code);

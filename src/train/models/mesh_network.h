@@ -11,7 +11,6 @@ namespace tilegrad::train {
 // x 64 with the 642-vertex template.
 struct NetworkConfig {
   std::int64_t channels = 64;   // of the first convolution; the next two have 2x and 4x
-  std::int64_t blocks = 0;      // residual blocks after the second and after the third convolution
   std::int64_t code = 1024;     // width of the encoder's three fully connected layers
   std::int64_t hidden1 = 1024;  // widths of each decoder
   std::int64_t hidden2 = 2048;

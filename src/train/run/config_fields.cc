@@ -64,8 +64,10 @@ struct GoneKey {
   std::string_view key;
   std::optional<double> value;
 };
-constexpr GoneKey kGone[] = {
-    {"network.stiffness", 0}, {"network.wrap", 1}, {"schedule.shard_optimizer", {}}};
+constexpr GoneKey kGone[] = {{"network.blocks", 0},
+                             {"network.stiffness", 0},
+                             {"network.wrap", 1},
+                             {"schedule.shard_optimizer", {}}};
 
 Status PassOver(const ConfigFields& fields, const std::string& key, const toml::node& node) {
   const auto* const gone = std::find_if(std::begin(kGone), std::end(kGone),

@@ -13,8 +13,6 @@ ConfigFields FieldsOf(NetworkConfig* c) {
   return Joined(
       {{{"network.channels", &c->channels, 1, 4096,
          "channels of the first convolution; then 2x and 4x"},
-        {"network.blocks", &c->blocks, 0, 16,
-         "residual blocks after the second and after the third convolution"},
         {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
         {"network.hidden1", &c->hidden1, 1, 65536, "width of each decoder's first layer"},
         {"network.hidden2", &c->hidden2, 1, 65536, "width of each decoder's second layer"}},
