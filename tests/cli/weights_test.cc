@@ -191,7 +191,7 @@ TEST_F(Weights, AreWrittenAsOtherFilesAre) {
 
 TEST_F(Weights, OfEveryTaskAreWhole) {
   ExpectDone("train --config " TILEGRAD_CONFIGS "/classify.toml --data " + Shared("d") + " --out " +
-             In("c") + " --set schedule.steps=1 --set schedule.batch=2");
+             In("c") + " --set schedule.steps=1 --set schedule.batch=2 --set schedule.portions=1");
   ExpectDone("export --run " + In("c") + " --out " + In("c.safetensors"));
   EXPECT_EQ(Scores(In("c.safetensors"))["rows"], Scores(In("c"))["rows"]);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Synthetic photographs that anyone can make: models in front of real backgrounds, one view of each
-// object, annotated as noisily as real ones, in the layout of PASCAL3D+ (photographs.h). The annotations
-// of the test part come from the true models and are exact, also its cameras: each is the one that
-// projects its object's true keypoints best, in the world of the training part's.
+// object, annotated as noisily as real ones, in the layout of PASCAL3D+ (photographs.h). The
+// annotations of the test part come from the true models and are exact, also its cameras: each is
+// the one that projects its object's true keypoints best, in the world of the training part's.
 #pragma once
 
 #include <array>
