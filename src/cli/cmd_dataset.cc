@@ -279,7 +279,8 @@ Status Make(const DatasetOptions& options) {
   train::BuildOptions build = options.build;
   build.group = ranks.group();
   build.anew = options.force;
-  for (const std::string& name : options.classes) build.classes.push_back(train::SynsetName(name));
+  for (const std::string& name : options.classes)
+    build.classes.push_back(train::SafeFileName(train::SynsetName(name)));
   const Workers workers(ranks.Workers(options.workers));
   ProgressLine line;
   auto made =
@@ -303,6 +304,9 @@ Status Make(const DatasetOptions& options) {
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
         summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
         Count(static_cast<std::size_t>(summary.reused), "model file"), seconds);
+  if (summary.renewed > 0)
+    Print("{} made again: the files read for them changed, or were not recorded\n",
+          Count(static_cast<std::size_t>(summary.renewed), "model file"));
   if (const auto advice = train::AdviceOnFewModels(summary.models, /*streamed=*/false))
     PrintNote("tilegrad: warning: {}\n", *advice);
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);

@@ -94,6 +94,19 @@ TEST_F(DatasetTest, MissingPackagesAndOptionsWithoutEffect) {
   ExpectError("dataset --source planes --up z" + out, "--up");
 }
 
+TEST_F(DatasetTest, ClassesByTheNamesOfTheirFolders) {
+  for (const char* name : {"椅子", "a b", "other"}) {
+    for (const char* model : {"/a.obj", "/b.obj"})
+      Write(std::string("set/") + name + model,
+            std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  }
+  const std::string chosen = Dataset("set") + " --classes '椅子,a b'";
+  ExpectIn(ExpectDone(chosen), "4 models", "椅子", "(0 model files reused)");
+  Write("set/a b/b.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n");
+  ExpectIn(ExpectDone(chosen), "(3 model files reused)", "1 model file made again");
+  EXPECT_TRUE(Exists("set_data/models/a_b/b.npz"));
+}
+
 TEST_F(DatasetTest, WhatAFolderHoldsBesidesIsNamed) {
   Write("set/notes.txt", "none");
   Write("set/wedge/a.max", "none");

@@ -22,6 +22,7 @@ struct ModelStamp {
   std::string recipe;          // of its dataset, DatasetInfo::recipe
   std::uint64_t geometry = 0;  // as ModelInfo::geometry
   int source_faces = 0;        // as ModelInfo::source_faces
+  std::string inputs = {};     // as SourceModel::inputs; any bytes
 };
 
 const char* SplitName(Split split);  // "train", "validation", "test"

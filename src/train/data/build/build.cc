@@ -207,7 +207,10 @@ class Builder {
         missing = true;
     }));
     if (missing) TILEGRAD_TRY(MakeMissing(share));
-    if (!options_.group || share.of > 1) summary_.reused = reused;
+    if (!options_.group || share.of > 1) {
+      summary_.reused = reused;
+      summary_.renewed = renewed_;
+    }
     return {};
   }
 
@@ -222,10 +225,12 @@ class Builder {
                                       "the source must hold the same files everywhere"}}));
     const Status made = MakeShare({rank, ranks});
     TILEGRAD_TRY(group.Agree(made, {}));
-    int reused = 0;
-    for (const std::string& count : GatherTexts(group.ranks(), std::to_string(summary_.reused)))
-      reused += std::stoi(count);
-    summary_.reused = reused;
+    for (int* count : {&summary_.reused, &summary_.renewed}) {
+      int all = 0;
+      for (const std::string& one : GatherTexts(group.ranks(), std::to_string(*count)))
+        all += std::stoi(one);
+      *count = all;
+    }
     return {};
   }
 
@@ -250,8 +255,12 @@ class Builder {
 
   void Reuse(std::size_t i) {
     auto stamp = VerifyModelFile(FileOf(i), info_);
-    if (stamp.ok()) outcomes_[i].stamp = *stamp;
     if (stamp.status().code() == StatusCode::kIo) Fail(stamp.status());
+    if (!stamp.ok()) return;
+    if (source_.IsUnchanged(chosen_[i], stamp->inputs))
+      outcomes_[i].stamp = std::move(*stamp);
+    else
+      ++renewed_;
   }
 
   // A refused resource may be refused for all models, and is no fault of this one.
@@ -393,6 +402,7 @@ class Builder {
   std::mutex mutex_;
   Status failure_;
   std::atomic<bool> failed_ = false;
+  std::atomic<int> renewed_ = 0;
   BuildSummary summary_;
 };
 

@@ -47,15 +47,17 @@ struct BuildSummary {
   std::vector<ModelWarning> warnings;  // of models that this build read, not of kept ones
   std::vector<IgnoredFile> ignored;    // by the source
   int reused = 0;                      // model files kept from an earlier build
+  int renewed = 0;                     // made again, since their models are not what they were
   std::uint64_t bytes = 0;             // of the dataset's files
 };
 
-// Writes the files of dataset.h to `folder`. Keeps readable model files of the same recipe: an
-// interrupted build resumes and gives the same bytes, with any number of workers and ranks. Lists
-// models that fail in rejected.jsonl and omits them. `stop` ends it between models with kCancelled.
-// Errors: a folder with a dataset of another recipe, options out of range, no usable model, too
-// many broken ones of a published set, a full disk. With a group every rank calls it; rank 0 gets
-// the summary, without warnings of models that others read.
+// Writes the files of dataset.h to `folder`. Keeps readable model files of the same recipe whose
+// models are unchanged (ModelSource::IsUnchanged): an interrupted build resumes and gives the same
+// bytes, with any number of workers and ranks. Lists models that fail in rejected.jsonl and omits
+// them. `stop` ends it between models with kCancelled. Errors: a folder with a dataset of another
+// recipe, options out of range, no usable model, too many broken ones of a published set, a full
+// disk. With a group every rank calls it; rank 0 gets the summary, without warnings of models that
+// others read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers, const Watch& watch);
 

@@ -74,6 +74,7 @@ Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const D
   }
   TILEGRAD_TRY(CheckVisible(made.data, info.image_size));
   made.stamp.recipe = info.recipe;
+  made.stamp.inputs = std::move(model.inputs);
   return made;
 }
 

@@ -142,6 +142,10 @@ Result<ModelStamp> StampFromArrays(const NpzArrays& arrays) {
   stamp.recipe.assign(recipe.begin(), recipe.end());
   stamp.geometry = static_cast<std::uint64_t>(numbers[0]);
   stamp.source_faces = static_cast<int>(numbers[1]);
+  if (arrays.contains("inputs")) {
+    TILEGRAD_ASSIGN(const auto inputs, Take<std::uint8_t>(arrays, "inputs", {kAny}));
+    stamp.inputs.assign(inputs.begin(), inputs.end());
+  }
   return stamp;
 }
 
@@ -164,6 +168,7 @@ Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData&
       {"stamp", MakeNpy<std::int64_t>({2}, numbers)},
   };
   if (info.own_cameras) arrays["cameras"] = CamerasToNpy(info, data.cameras);
+  if (!stamp.inputs.empty()) arrays["inputs"] = TextToNpy(stamp.inputs);
   return io::SaveNpz(path, arrays);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 
 namespace tilegrad::train {
 
@@ -36,10 +37,14 @@ Result<std::vector<Path>> ListFolder(const Path& folder) {
 }
 
 std::string SafeFileName(const std::string& text) {
-  std::string out = text;
-  for (char& c : out) {
-    const auto u = static_cast<unsigned char>(c);
-    if (u > 127 || (!std::isalnum(u) && c != '.' && c != '-' && c != '_')) c = '_';
+  constexpr std::uint32_t kLastControl = 0x9f;  // of Unicode's second set
+  std::string out;
+  for (std::string_view rest = text; !rest.empty();) {
+    const Utf8Character c = FirstCharacter(rest);
+    const bool stays = c.code > kLastControl || std::isalnum(static_cast<int>(c.code)) ||
+                       c.code == '.' || c.code == '-' || c.code == '_';
+    out += c.valid && stays ? rest.substr(0, c.bytes) : "_";
+    rest.remove_prefix(c.bytes);
   }
   const bool hidden = out.empty() || out[0] == '.';
   return hidden ? "_" + out : out;

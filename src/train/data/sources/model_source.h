@@ -38,6 +38,7 @@ struct SourceModel {
   // source holds images instead.
   std::variant<Mesh, ModelData> data;
   std::vector<std::string> warnings = {};  // of its reader: a texture is missing, ...
+  std::string inputs = {};                 // for ModelSource::IsUnchanged
 };
 
 // What a source says of itself.
@@ -61,6 +62,12 @@ class ModelSource {
   const std::vector<IgnoredFile>& ignored() const { return ignored_; }
   // Thread-safe. Called in ascending order, give or take the number of workers.
   virtual Result<SourceModel> Load(std::size_t entry) const = 0;
+  // Whether Load would give the model that had these `inputs` (SourceModel), empty where an earlier
+  // version loaded it. Installed and published models are what their ids say; files of users
+  // change. Thread-safe.
+  virtual bool IsUnchanged(std::size_t /*entry*/, const std::string& /*inputs*/) const {
+    return true;
+  }
   // Frees all of the entries but their files: nothing but Load and facts is called from now on.
   void ForgetEntries();
   // The camera and sizes that the source dictates, where it holds images.
@@ -108,6 +115,7 @@ std::unique_ptr<ModelSource> CombineSources(std::string name,
 
 // folder/<class>/<file>, every file whose ending io::LoadMesh knows. Other files, except images and
 // parts of a model, are `ignored`, as are models outside a class's folder or in a subfolder of one.
+// Names that begin with '.' do not count. An error if two folders would be one class.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
 // ShapeNetCore, version 1 or 2 (shapenet.cc), of the paper's 13 synsets; skips other folders. A
@@ -138,7 +146,9 @@ std::string SynsetName(const std::string& synset);
 // The contents of a folder, sorted; errors name it.
 Result<std::vector<Path>> ListFolder(const Path& folder);
 
-// Turns any text into a file name: letters, digits, '.', '-' and '_' stay, the rest becomes '_'.
+// Turns any text into a file name: ASCII letters and digits, '.', '-', '_' and UTF-8 beyond ASCII
+// stay; the rest, controls and what is no UTF-8 become '_'. A '_' comes before a first '.' and
+// makes a name of nothing.
 std::string SafeFileName(const std::string& text);
 
 // The parts of `text` between separators; views of it, one more than there are separators.

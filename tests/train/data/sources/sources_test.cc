@@ -136,6 +136,111 @@ TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
   std::filesystem::remove(folder_ / "set/empty/.hidden");  // our own
 }
 
+TEST_F(SourcesTest, NamesOfClassesStayDifferent) {
+  for (const char* name : {"椅子", "桌子", "a b", "A_B", "\xff", "a.b"})
+    Write(std::string("set/") + name + "/é.off.obj", kTetrahedron);
+  std::set<std::string> classes;
+  const auto source = Ok(FolderSource(folder_ / "set"));
+  for (const SourceEntry& entry : (*source)->entries()) {
+    classes.insert(entry.class_name);
+    EXPECT_EQ(entry.id, "é.off");
+  }
+  EXPECT_EQ(classes, (std::set<std::string>{"椅子", "桌子", "a_b", "A_B", "_", "a.b"}));
+  Write("set/a_b/x.obj", kTetrahedron);
+  ExpectMessage(FolderSource(folder_ / "set").status(), "a b and ", "a_b would both", "rename one");
+}
+
+TEST_F(SourcesTest, HiddenNamesAreNoModels) {
+  const char* const hidden[] = {"set/.git", "set/c/._a.obj", "set/c/textures/._x.obj"};
+  Write("set/.git/a.obj", kTetrahedron);
+  Write(hidden[1], "");
+  Write(hidden[2], "");
+  Write("set/c/a.obj", kTetrahedron);
+  const auto source = Ok(FolderSource(folder_ / "set"));
+  EXPECT_EQ((*source)->entries().size(), 1u);
+  EXPECT_TRUE((*source)->ignored().empty());
+  for (const char* name : hidden) std::filesystem::remove_all(folder_ / name);
+}
+
+// Builds a dataset of one folder again and again.
+class RepeatedTest : public SourcesTest {
+ protected:
+  BuildSummary Build(int workers = 1) const {
+    BuildOptions options;
+    options.image_size = 8;
+    options.views = 2;
+    const auto source = Ok(FolderSource(folder_ / "set"));
+    return Ok(BuildDataset(**source, options, folder_ / "out", Workers(workers), {})).value();
+  }
+  void ExpectBuilt(int reused, int renewed) const {
+    const BuildSummary summary = Build();
+    EXPECT_EQ(summary.reused, reused);
+    EXPECT_EQ(summary.renewed, renewed);
+  }
+};
+
+// Which are made unique by what is beside them.
+TEST_F(RepeatedTest, IdsMayMoveToOtherModels) {
+  Write("set/c/b.off",
+        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  Build();
+  Write("set/c/b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const BuildSummary moved = Build();
+  EXPECT_EQ(moved.renewed, 1);
+  ASSERT_EQ(moved.models.size(), 2u);
+  EXPECT_EQ(moved.models[0].source_faces, 1);
+  EXPECT_EQ(moved.models[1].source_faces, 4);
+  ExpectBuilt(2, 0);
+  const auto again = Contents(folder_ / "out");
+  std::filesystem::remove_all(folder_ / "out");
+  Build(2);
+  EXPECT_EQ(Contents(folder_ / "out"), again);
+}
+
+TEST_F(RepeatedTest, ChangedFilesAreReadAgain) {
+  const std::string painted = std::string("mtllib a.mtl\nvt 0 0\nusemtl m\n") +
+                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n";
+  Write("set/c/a.obj", painted);
+  Write("set/c/a.mtl", "newmtl m\nKd 1 0 0\n");
+  Write("set/c/b.obj", kTetrahedron);
+  Build();
+  ExpectBuilt(2, 0);
+  Write("set/c/a.obj", painted + "# changed\n");
+  ExpectBuilt(1, 1);
+  Write("set/c/a.mtl", "newmtl m\nKd 0 1 0\nmap_Kd skin.ppm\n");
+  ExpectBuilt(1, 1);
+  ExpectBuilt(2, 0);  // without its texture
+  Write("set/c/skin.ppm", std::string("P6 1 1 255\n\x20\x40\x60"));
+  ExpectBuilt(1, 1);
+  Write("set/c/skin.ppm", std::string("P6 1 1 255\n\x60\x40\x20"));
+  ExpectBuilt(1, 1);
+  std::filesystem::remove(folder_ / "set/c/skin.ppm");
+  ExpectBuilt(1, 1);
+}
+
+// As files of earlier versions are.
+TEST_F(RepeatedTest, FilesWithoutARecordAreMadeAgain) {
+  Write("set/c/a.obj", kTetrahedron);
+  const DatasetInfo info = Build().info;
+  const auto whole = Contents(folder_ / "out");
+  const Path file = ModelFilePath(folder_ / "out", "c", "a");
+  ModelStamp stamp = Ok(VerifyModelFile(file, info)).value();
+  stamp.inputs.clear();
+  Ok(SaveModelFile(file, info, Ok(LoadModelFile(file, info)).value(), stamp));
+  ExpectBuilt(0, 1);
+  EXPECT_EQ(Contents(folder_ / "out"), whole);
+}
+
+// A link to itself cannot be opened even by root, unlike a file without permissions.
+TEST_F(RepeatedTest, FilesThatCannotBeOpenedCostThemselves) {
+  Write("set/c/a.obj", kTetrahedron);
+  std::filesystem::create_symlink("b.obj", folder_ / "set/c/b.obj");
+  const BuildSummary summary = Build();
+  EXPECT_EQ(summary.models.size(), 1u);
+  ASSERT_EQ(summary.rejected.size(), 1u);
+  ExpectIn(summary.rejected[0].reason, "b.obj", "cannot open");
+}
+
 TEST_F(SourcesTest, FoldersWithoutModelsAreErrors) {
   EXPECT_EQ(FolderSource(folder_).status().code(), StatusCode::kNotFound);
   EXPECT_EQ(FolderSource(folder_ / "no").status().code(), StatusCode::kNotFound);
