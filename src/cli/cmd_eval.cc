@@ -12,6 +12,7 @@
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/fingerprint.h"
+#include "train/data/trained_models.h"
 #include "train/eval/statistics.h"
 #include "train/models/sphere_model.h"
 #include "train/predictor.h"
@@ -94,6 +95,8 @@ Result<std::vector<train::Trait>> TraitsOf(const EvalOptions& options, const Sub
 
 Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
   Status ready = Prepare(options, workers, out);
+  if (ready.ok() && !ranks.follows() && kSplits.at(options.split) != train::Split::kTrain)
+    ready = train::WarnWithoutList(out->run, ProgressLine().Warnings());
   if (!ranks.group()) return ready;
   std::vector<train::Trait> traits;
   if (ready.ok()) {
@@ -105,8 +108,9 @@ Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Su
 }
 
 Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
-  // Files first: printing may fail.
-  if (!subject.files.empty()) TILEGRAD_TRY(train::WriteEvaluation(subject.run, evaluation));
+  // Files first: printing may fail. Where they cannot be written, the work must not be lost.
+  const Status saved =
+      subject.files.empty() ? Status() : train::WriteEvaluation(subject.run, evaluation);
   Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
   nlohmann::ordered_json json = train::EvaluationJson(evaluation);
   if (subject.other) {
@@ -115,7 +119,7 @@ Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
     json["compared"] = train::ComparisonJson(comparison);
   }
   PrintResult(json);
-  if (subject.files.empty()) return {};
+  if (!saved.ok() || subject.files.empty()) return saved;
   Print("written to {} and {}\n", subject.files[0].string(), subject.files[1].string());
   return {};
 }

@@ -44,14 +44,14 @@ Status RunExport(const ExportOptions& options) {
   const auto floats = options.half ? nn::StoredFloats::kHalf : nn::StoredFloats::kFull;
   TILEGRAD_TRY(predictor.ExportWeights(out, credits, floats).Within(out.string()));
   std::error_code error;
-  const auto bytes = std::filesystem::file_size(out, error);
-  Print("{}: {}, {:.1f} MB\n{}\n", out.string(), predictor.description(),
-        static_cast<double>(bytes) / 1e6, credits);
+  const auto bytes = std::filesystem::file_size(out, error);  // devices have none
+  Print("{}: {}{}\n{}\n", out.string(), predictor.description(),
+        error ? "" : fmt::format(", {:.1f} MB", static_cast<double>(bytes) / 1e6), credits);
   PrintResult({{"weights", out.string()},
                {"parameters", predictor.model().parameters()},
                {"step", predictor.step()},
                {"half", options.half},
-               {"bytes", bytes},
+               {"bytes", error ? nlohmann::json() : nlohmann::json(bytes)},
                {"credits", credits}});
   return {};
 }

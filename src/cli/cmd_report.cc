@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
+#include "train/data/trained_models.h"
 #include "train/report/report.h"
 
 namespace tilegrad::cli {
@@ -39,6 +40,7 @@ Status RunReport(const ReportOptions& options) {
   const auto summary = train::WriteReport(job, workers, line.Watching());
   line.Finish();
   if (!summary.ok()) return summary.status();
+  TILEGRAD_TRY(train::WarnWithoutList(job.run, line.Warnings()));
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: skipped: {}\n", warning);
   Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),

@@ -16,6 +16,7 @@
 #include "io/mesh_file.h"
 #include "io/webp_animation.h"
 #include "render/picture/composite.h"
+#include "train/data/trained_models.h"
 #include "train/named_weights.h"
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/scores.h"
@@ -180,6 +181,7 @@ Status Score(const SampleOptions& options, const SampleFiles& files, const Path&
              train::GeneratorModel& model, nlohmann::ordered_json* json) {
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
   ProgressLine line;
+  TILEGRAD_TRY(train::WarnWithoutList(run, line.Warnings()));
   const auto scores = train::ScoreGenerator(
       model, {run, data, options.score_count, options.seed, options.judge}, line.Watching());
   line.Finish();

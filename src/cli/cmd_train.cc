@@ -61,6 +61,11 @@ Status TakeFromRun(TrainOptions* options) {
                            options->out);
   if (!PathExists(run / "config.toml"))
     return NotFound("{}: not a run of tilegrad train: there is no config.toml in it", run.string());
+  if (options->data.empty() && !PathExists(run / "run.json"))
+    return NotFound(
+        "{0}: there is no run.json in it, which names its dataset; name that: tilegrad train "
+        "--resume {0} --data DATASET",
+        run.string());
   options->out = run.string();
   if (options->config.empty()) options->config = (run / "config.toml").string();
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options->data, run));

@@ -2,6 +2,7 @@
 #include "train/config.h"
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "train/tasks/registry.h"
 
 namespace tilegrad::train {
@@ -15,10 +16,20 @@ ConfigFields FieldsOfParts(std::string* name, std::string* kind, Schedule* sched
   return fields;
 }
 
+// Whether or not a task uses it: with stream.share = 0 a wrong one would be noticed late or never.
+Status CheckCache(const ConfigFields& fields) {
+  for (const ConfigField& field : fields) {
+    if (field.key == "stream.cache")
+      return ParseByteCount(*std::get<std::string*>(field.target)).status().Within(field.key);
+  }
+  return {};
+}
+
 Status ParseInto(std::string_view text, TrainConfig* config) {
   TILEGRAD_ASSIGN(config->kind, ReadStringKey(text, "task.kind", kDefaultTask));
   TILEGRAD_ASSIGN(config->task, MakeTask(config->kind));
-  return ReadFields(text, config->Fields());
+  TILEGRAD_TRY(ReadFields(text, config->Fields()));
+  return CheckCache(config->Fields());
 }
 
 }  // namespace
@@ -39,7 +50,8 @@ Result<TrainConfig> ParseConfig(std::string_view text, const std::string& name) 
 Status ApplyOverrides(const std::vector<std::string>& assignments, TrainConfig* config) {
   const std::string kind = config->kind;
   Status status = OverrideFields(assignments, config->Fields());
-  if (std::exchange(config->kind, kind) == kind) return status;
+  if (std::exchange(config->kind, kind) == kind)
+    return status.ok() ? CheckCache(config->Fields()) : status;
   return InvalidArgument("task.kind cannot be overridden: name the task in the configuration file");
 }
 

@@ -202,11 +202,13 @@ class Training : public RunWork {
   Status Begin(std::int64_t first_step) override {
     // First: a run that is killed from here on is one to resume.
     TILEGRAD_TRY(WriteTextAtomic(job_.run / kTrainSettings, WriteConfig(config_)));
-    TILEGRAD_TRY(task_.Begin(job_.run, first_step));
     header_ = task_.Header();
     header_.name = config_.name;
     header_.dataset = job_.data.string();
     header_.machine = DescribeMachine();
+    // Before the task's files, for which the disk may be full: --resume finds the dataset by it.
+    if (first_step == 0) TILEGRAD_TRY(WriteHeader(job_.run, header_));
+    TILEGRAD_TRY(task_.Begin(job_.run, first_step));
     const auto before = ReadHeader(job_.run);
     if (first_step > 0 && before.ok()) header_.labels = before->labels;
     TILEGRAD_TRY(WriteHeader(job_.run, header_));

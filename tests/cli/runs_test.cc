@@ -112,6 +112,8 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train --config quick --data none --out " + In("c") + " --live=9000", 2,
                 "train: --live takes no value");
   Write("run/config.toml", "name = \"a\"\n");
+  ExpectRefused("train --resume " + In("run"), 3, "no run.json",
+                "tilegrad train --resume " + In("run") + " --data DATASET");
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
 

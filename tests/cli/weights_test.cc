@@ -113,6 +113,20 @@ TEST_F(Weights, AreNotScoredOnWhatTheyLearnedFrom) {
                 "held-out models", "were trained on");
 }
 
+TEST_F(Weights, OfARunWithoutItsListAreScoredWithAWarning) {
+  std::filesystem::copy(Shared("image"), folder_ / "run", std::filesystem::copy_options::recursive);
+  const std::string on = " --run " + In("run") + " --data " + Shared("d");
+  const std::string eval = "eval --views-per-model 1" + on, list = "training_models.txt";
+  ExpectNotIn(ExpectDone(eval), list);
+  std::filesystem::remove(folder_ / "run" / list);
+  ExpectIn(ExpectDone("report --models 1" + on), "warning: " + In("run"), list);
+  ExpectNotIn(ExpectDone(eval + " --split train"), list);
+  // The scores are told even where they cannot be saved.
+  std::filesystem::remove(folder_ / "run/eval.json");
+  Write("run/eval.json/in_the_way", "x");
+  ExpectError(eval, "warning: " + In("run"), list, "3D IoU at 32^3", "eval.json: cannot");
+}
+
 TEST_F(Weights, ComeAlongByName) {
   const std::string to = " --refine 0 --out " + In("out") + " " + Shared("view.png");
   ExpectDone("predict --run furniture" + to, Alone());
@@ -182,6 +196,7 @@ TEST_F(Weights, AreWrittenAsOtherFilesAre) {
             ReadFile(folder_ / "b.safetensors").value());
   ExpectRefused("export --run " + In("a.safetensors") + " --out " + In("c.safetensors"), 3,
                 "names no dataset", "--credits");
+  ExpectNotIn(ExpectDone(run + "/dev/null --force --credits me"), " MB");  // has no size
   // A bit that changed is noticed.
   std::string text = ReadText(folder_ / "a.safetensors").value();
   text.back() = static_cast<char>(text.back() ^ 1);

@@ -124,6 +124,9 @@ TEST_F(RunTest, Overrides) {
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
   ExpectMessage(ApplyOverrides({"name=caf\xe9"}, &config), "name", "UTF-8");
   ExpectMessage(ApplyOverrides({"task.kind=other"}, &config), "task.kind");
+  EXPECT_EQ(ValueOf<double>(config, "stream.share"), 0);  // refused though nothing is streamed
+  ExpectMessage(ApplyOverrides({"stream.cache=lots"}, &config), "stream.cache", "\"lots\"");
+  ExpectMessage(ParseConfig("stream.cache = \"0\"\n", "c.toml").status(), "c.toml", "stream.cache");
   EXPECT_EQ(config.kind, "single_image");
 }
 

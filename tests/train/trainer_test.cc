@@ -169,6 +169,31 @@ TEST_F(TrainerTest, CheckpointsAloneAreARun) {
   ExpectFinishes();
 }
 
+TEST_F(TrainerTest, ARunWithoutItsCheckpointsDoesNotStartAnew) {
+  job_.config.schedule.steps = 7;  // checkpoints are due at 3 and 6
+  ExpectFinishes();
+  std::filesystem::remove_all(job_.run / "checkpoints");
+  const std::string curves = ReadText(job_.run / "metrics.jsonl").value();
+  ExpectMessage(Run().status(), job_.run.string(), "up to step 7", "--out", "--force");
+  EXPECT_EQ(ReadText(job_.run / "metrics.jsonl").value(), curves);
+  // As if it was killed while the first of them was saved.
+  Write("run/metrics.jsonl", curves.substr(0, curves.find("{\"step\":7")));
+  std::vector<std::string> warnings;
+  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  EXPECT_EQ(Ok(Run())->first_step, 0);
+  EXPECT_EQ(ReadLog(job_.run)->size(), 7u);
+  ASSERT_EQ(warnings.size(), 2u);  // the other one: of few models
+  ExpectIn(warnings[0], job_.run.string(), "starts anew", "step 6");
+}
+
+TEST_F(TrainerTest, ARunThatCannotWriteItsFirstFilesIsOneToResume) {
+  Write("run/training_models.txt/in_the_way", "x");
+  ExpectMessage(Run().status(), "training_models.txt");
+  EXPECT_TRUE(PathExists(job_.run / "run.json"));
+  std::filesystem::remove_all(job_.run / "training_models.txt");
+  ExpectFinishes();
+}
+
 TEST_F(TrainerTest, RefusesOtherTrainingModels) {
   StopAfter(2);
   job_.existing = ExistingRun::kContinue;

@@ -9,11 +9,14 @@
 #include "io/archive.h"
 #include "train/run/carried_files.h"
 #include "train/run/checkpoint.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
 
-constexpr const char* kModelList = "training_models.txt";  // of a run
+// Of a run.
+constexpr const char* kModelList = "training_models.txt";
+constexpr const char* kListOfPhotographs = "training_photographs.txt";
 
 std::string ModelLine(const Dataset& dataset, int index) {
   const ModelInfo& model = dataset.model(index);
@@ -88,6 +91,18 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
       "split anew since; make it with the seed, shares and limits it had then, or train again",
       run.string(), seen.size(), held_out.size(), dataset.folder().string(),
       seen[0].substr(seen[0].find(' ') + 1));
+}
+
+Status WarnWithoutList(const Path& run, const WarningSink& warn) {
+  for (const char* name : {kModelList, kListOfPhotographs}) {
+    TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, name));
+    if (list) return {};
+  }
+  warn(fmt::format(
+      "{}: has no {} (of photographs: {}), which lists what it was trained on: what is taken for "
+      "held out may be among it",
+      RunFolderOf(run).string(), kModelList, kListOfPhotographs));
+  return {};
 }
 
 }  // namespace tilegrad::train

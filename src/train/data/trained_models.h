@@ -8,6 +8,7 @@
 #pragma once
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "train/data/dataset.h"
 
 namespace tilegrad::train {
@@ -20,5 +21,9 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64
 // InvalidArgument if the run was trained on models of the dataset's `split`, or on other colours of
 // their meshes. OK for a run without a list. `run`: as for ReadRunFile.
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split = Split::kTest);
+
+// Tells `warn` of a run without a list, for which CheckHeldOut cannot tell. Runs on photographs
+// have a list of these instead.
+Status WarnWithoutList(const Path& run, const WarningSink& warn);
 
 }  // namespace tilegrad::train

@@ -127,7 +127,7 @@ constexpr const char* kPhotographNotes =
     "keypoints\" says what these leave to gain.";
 
 constexpr const char* kErrorNote =
-    " ±: standard error of the mean over held-out models, of which a class has few: differences "
+    " ±: standard error of the mean over models, of which a class has few: differences "
     "between runs on the same models are known better (eval --compare).";
 
 std::string Notes(const Evaluation& evaluation) {

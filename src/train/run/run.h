@@ -65,7 +65,8 @@ inline ConfigFields FieldsOf(Schedule* s) {
 
 enum class ExistingRun {
   kRefuse,    // an error that says what the choices are
-  kContinue,  // continues from its newest whole checkpoint; starts if there is no run yet
+  kContinue,  // continues from its newest whole checkpoint; starts if there has been none yet; an
+              // error if its log says that there were some
   kReplace,   // its files go (run_files.h), others stay; starts anew
 };
 
@@ -85,7 +86,7 @@ struct RunPlan {
   std::string may_differ = {};
   bool locked = false;         // the caller holds the folder's lock already
   double max_minutes = 0;      // > 0: save and stop after this long
-  WarningSink warn = nullptr;  // broken checkpoints that were passed over
+  WarningSink warn = nullptr;  // of broken checkpoints passed over, of steps before the first one
   PictureSink drawn = nullptr;
 };
 

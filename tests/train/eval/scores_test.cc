@@ -265,7 +265,8 @@ TEST_F(WrittenErrors, ComeBackAndAreShown) {
   constant.mean.light_angle = 60;
   evaluation.rows.insert(evaluation.rows.begin(), constant);
   const std::string table = FormatTable(evaluation);
-  ExpectIn(table, "60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50");
+  ExpectIn(table, "60.0 ± 10.0 / 50.0 ± 2.0", "30.0 ± 2.0", "light / constant", "0.50",
+           "error of the mean over models, ");  // of any split
   ASSERT_TRUE(WriteEvaluation(folder_, evaluation).ok());
   const auto back = Ok(ReadEvaluation(folder_));
   EXPECT_EQ((*back)->rows[1].error->light_angle, 2);
