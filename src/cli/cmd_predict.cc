@@ -222,6 +222,17 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   return masked.ok() ? std::move(masked) : masked.status().Within(file);
 }
 
+// Whether `predict` itself wrote the picture: results may lie beside the images.
+bool IsResult(const Path& picture) {
+  const std::string stem = picture.stem().string();
+  for (const std::string_view end : {"_turntable", "_match", "_relit"}) {
+    if (!stem.ends_with(end)) continue;
+    const std::string image = stem.substr(0, stem.size() - end.size());
+    if (PathExists(picture.parent_path() / (image + "_predicted.glb"))) return true;
+  }
+  return false;
+}
+
 // The files, and of folders their pictures.
 Result<std::vector<std::string>> PicturesOf(const std::vector<std::string>& paths) {
   std::vector<std::string> files;
@@ -236,7 +247,9 @@ Result<std::vector<std::string>> PicturesOf(const std::vector<std::string>& path
     if (names.read.empty())
       return InvalidArgument("{}: holds no picture{}", path, others.empty() ? "" : "; " + others);
     if (!others.empty()) PrintNote("tilegrad: warning: {}: skipped {}\n", path, others);
-    for (const Path& name : names.read) files.push_back((Path(path) / name).string());
+    for (const Path& name : names.read) {
+      if (!IsResult(Path(path) / name)) files.push_back((Path(path) / name).string());
+    }
   }
   return files;
 }

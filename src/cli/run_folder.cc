@@ -144,12 +144,16 @@ Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) 
 
 std::optional<Path> FindFromRun(const Path& name, const Path& run) {
   std::error_code error;
-  if (PathExists(name)) return name;
+  // A run is not its own input, even if both have the same name.
+  const auto is_input = [&](const Path& path) {
+    return PathExists(path) && !std::filesystem::equivalent(path, run, error);
+  };
+  if (is_input(name)) return name;
   if (name.is_absolute()) return std::nullopt;
   Path above = std::filesystem::canonical(run, error);
   while (!error && above.has_relative_path()) {
     above = above.parent_path();
-    if (PathExists(above / name)) return above / name;
+    if (is_input(above / name)) return above / name;
   }
   return std::nullopt;
 }

@@ -157,6 +157,11 @@ std::string WhyBlocked(const FitterOptions& options, const FitStep& step, const 
   if (!unseen.empty()) return unseen;
   if (OnlyColor(p)) return WhyNoColor(options, s, p);
   if (options.loss.silhouette_weight > 0 && s.lost_far > 0) return FarSentence(s, step);
+  const bool agree = s.lost == 0 && s.drawn == s.drawn_on_object;
+  if (options.loss.silhouette_weight > 0 && !agree) {
+    return "the silhouettes differ, but no image shows an outline of the mesh: the cameras may be "
+           "inside it";
+  }
   return "the loss does not depend on it: the silhouettes agree and colours are constant";
 }
 

@@ -99,8 +99,18 @@ Result<std::vector<InputFrame>> ReadTransforms(const Path& path) {
   return out;
 }
 
+// Smaller copies of images are rounded to whole pixels.
+Status CheckAspect(ImageSize own, ImageSize image) {
+  const double off = 1.0 * own.width * image.height - 1.0 * own.height * image.width;
+  if (std::abs(off) <= own.width + own.height + image.width + image.height) return {};
+  return InvalidArgument(
+      "it is for {} x {} pixels (\"w\", \"h\"), but the image has {} x {}, of another shape",
+      own.width, own.height, image.width, image.height);
+}
+
 Result<Camera> CameraOfFrame(const InputFrame& frame, ImageSize image) {
   const ImageSize own = frame.camera.size.value_or(image);
+  TILEGRAD_TRY(CheckAspect(own, image));
   io::NerfFrame from = frame.camera;
   if (frame.angle_long > 0)
     from.fl_x = 0.5 * std::max(own.width, own.height) / std::tan(0.5 * frame.angle_long);

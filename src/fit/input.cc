@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/text.h"
 #include "fit/colmap_run.h"
 #include "fit/frames.h"
 #include "fit/masks/floor.h"
@@ -238,6 +239,23 @@ Status FinishInput(const InputOptions& options, FitInput* input) {
   return {};
 }
 
+// Adds the frames of `test`, which are then not fitted, even if they were listed before.
+Status AddHeldOut(const Path& test, std::vector<InputFrame>* frames, FitInput* input) {
+  TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
+  const auto repeated = std::erase_if(*frames, [&](const InputFrame& frame) {
+    return std::ranges::find(more, frame.image, &InputFrame::image) != more.end();
+  });
+  if (repeated > 0) {
+    input->warnings.push_back(fmt::format("{}: {} among the images to fit, too; held out",
+                                          test.string(), Count(repeated, "image")));
+  }
+  for (InputFrame& frame : more) {
+    input->held_out.push_back(static_cast<int>(frames->size()));
+    frames->push_back(std::move(frame));
+  }
+  return {};
+}
+
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {
   FitInput input;
   TILEGRAD_ASSIGN(Frames read, ReadFrames(folder, options.fov));
@@ -250,13 +268,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
         "{}: already lists the held-out views; leave out --hold-out, or remove that file",
         test.string());
   }
-  if (PathExists(test) && input.posed) {
-    TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
-    for (InputFrame& frame : more) {
-      input.held_out.push_back(static_cast<int>(read.frames.size()));
-      read.frames.push_back(std::move(frame));
-    }
-  }
+  if (PathExists(test) && input.posed) TILEGRAD_TRY(AddHeldOut(test, &read.frames, &input));
   InputReader reader(&input);
   TILEGRAD_TRY(reader.AddAll(read.frames, options.watch));
   if (options.masks.empty()) {

@@ -76,7 +76,10 @@ class CameraFinder {
   Result<std::vector<FoundCamera>> Run() {
     const auto wanted =
         ExtentOf(picture_, [&](std::size_t p) { return picture_.alpha[p] >= kInsideAlpha; });
-    if (!wanted) return InvalidArgument("the picture shows no object: no pixel is opaque");
+    if (!wanted) {
+      return InvalidArgument("the picture shows no object: at {} x {}, no pixel is opaque",
+                             picture_.width, picture_.height);
+    }
     Start();
     for (int i = 0; i < kAlignments; ++i) {
       TILEGRAD_TRY(Render());

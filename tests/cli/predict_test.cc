@@ -64,6 +64,14 @@ TEST_F(Predict, TakesThePicturesOfFolders) {
   ExpectIn(Said("pictures"), "skipped 1 picture not in PNG, JPEG or WebP: c.heic");
   for (const char* name : {"a_predicted.glb", "b_predicted.glb"})
     EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / name)) << name;
+  // Results beside the pictures are no pictures.
+  for (int times = 0; times < 2; ++times) {
+    ExpectDone("predict --force --refine 1 --run " + In("r") + " --out " + In("pictures") + " " +
+               In("pictures"));
+  }
+  EXPECT_TRUE(std::filesystem::exists(pictures / "a_match.png"));
+  EXPECT_FALSE(std::filesystem::exists(pictures / "a_match_predicted.glb"));
+  EXPECT_FALSE(std::filesystem::exists(pictures / "a_turntable_predicted.glb"));
 }
 
 // The picture that was cut out, before a wall.

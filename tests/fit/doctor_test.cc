@@ -94,6 +94,13 @@ TEST(Doctor, OutsideOfTheImage) {
   ExpectBlocked(patient.Ask(Parameter::kColors), "outside of the image");
 }
 
+TEST(Doctor, CamerasInsideTheMesh) {
+  Patient patient;
+  patient.options.loss.color_weight = 0;
+  for (float& x : patient.scene.positions) x *= 8;
+  ExpectBlocked(patient.Ask(Parameter::kPositions), "inside it");
+}
+
 TEST(Doctor, AllLossFartherThanDeltaReaches) {
   Patient patient;
   patient.options.loss.color_weight = 0;

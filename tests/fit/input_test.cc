@@ -242,6 +242,26 @@ TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
   ExpectOnly(full->warnings, "7.png: its mask is full");
 }
 
+TEST_F(Input, FramesOfTheTestFileAreNotFitted) {
+  for (int i = 0; i < 10; ++i) Image("t/images/" + std::to_string(i) + ".png", 51);
+  Write("t/transforms.json", TenFrames(-1, ""));
+  Write("t/transforms_test.json",
+        R"({"fl_x":10,"frames":[{"file_path":"images/7.png",)" + std::string(kPose) + "}]}");
+  const auto input = Ok(ReadFitFolder(folder_ / "t", 0));
+  EXPECT_EQ(input->names.size(), 10u);
+  EXPECT_EQ(input->names[9], "7.png");
+  EXPECT_EQ(input->held_out, std::vector<int>{9});
+  ExpectOnly(input->warnings, "transforms_test.json", "1 image");
+}
+
+TEST_F(Input, CamerasOfImagesOfAnotherShapeAreRefused) {
+  Image("s/a.png", 51);
+  Transforms("s", "a.png", R"("fl_x":10,"w":40,"h":10,)");
+  ExpectMessage(ReadFitFolder(folder_ / "s", 0).status(), "a.png", "40 x 10", "8 x 6");
+  Transforms("s", "a.png", R"("fl_x":10,"w":33,"h":25,)");
+  EXPECT_TRUE(ReadFitFolder(folder_ / "s", 0).ok());
+}
+
 TEST_F(Input, ViewsThatShowNothingAreNamedAndLeftOut) {
   for (int i = 0; i < 10; ++i) {
     const ImageU8 image = CutOut(i == 2 || i == 3 ? 0 : i == 9 ? 5 : 4);

@@ -26,7 +26,8 @@ Result<Path> FindMask(const Path& folder, const std::string& name) {
        {folder / (name + ".png"), folder / Path(name).replace_extension(".png"), folder / name}) {
     if (IsFile(file)) return file;
   }
-  return NotFound("{}: no such mask; every image needs one", (folder / (name + ".png")).string());
+  return NotFound("{}: no such mask; every image needs one",
+                  (folder / Path(name).replace_extension(".png")).string());
 }
 
 double Mean(const std::vector<double>& values) {
