@@ -15,7 +15,7 @@ import os
 import threading
 import warnings
 import weakref
-from typing import Any, Optional, Sequence, Union
+from typing import Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -153,6 +153,12 @@ def check_indices(function: str, argument: str, indices: np.ndarray, count: int)
                          f"of [0, {count})")
 
 
+def check_finite(function: str, argument: str, array: Union[np.ndarray, float]) -> None:
+    """ValueError if `array` has NaN or infinity."""
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{function}: {argument} has numbers that are not finite")
+
+
 def as_names(function: str, argument: str, value: Any, choices: Sequence[str]) -> tuple[str, ...]:
     """One or several names of `choices`, as a tuple; TypeError for anything else, ValueError for an
     unknown name."""
@@ -183,6 +189,21 @@ def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
     return number
 
 
+def as_count(function: str, argument: str, value: Any) -> int:
+    """`value` as an int of 0 or more; errors as in `as_number`."""
+    number = as_number(function, argument, value, int)
+    if number < 0:
+        raise ValueError(f"{function}: {argument} is {number}, must be >= 0")
+    return number
+
+
+def as_items(function: str, argument: str, value: Any) -> list[tuple[Any, Any]]:
+    """The keys and values of a mapping; TypeError if it is none."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{function}: {argument} must be a mapping, got {type(value).__name__}")
+    return list(value.items())
+
+
 def as_limit(function: str, max_bytes: Any) -> int:
     """`max_bytes`, None or an int above 0, as C++ takes it: 0 for None."""
     if max_bytes is None:
@@ -193,7 +214,7 @@ def as_limit(function: str, max_bytes: Any) -> int:
         raise TypeError(f"{function}: max_bytes must be int or None, got {max_bytes!r} "
                         f"({type(max_bytes).__name__})") from None
     if not 0 < number < 2**63:
-        raise ValueError(f"{function}: max_bytes is {number}, must be above 0")
+        raise ValueError(f"{function}: max_bytes is {number}, must be above 0 and below 2**63")
     return number
 
 

@@ -242,6 +242,9 @@ class Camera(Packed):
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
         """Scales the camera of an image of width x height pixels to one of to_width x to_height."""
         size = size_of("Camera.resize", to_width, to_height)
+        if min(size) < 1:
+            raise ValueError(f"Camera.resize: to_width is {to_width}, to_height {to_height}; both "
+                             f"must be above 0")
         numbers = _core.camera_resize(self._rows(), self._sized("Camera.resize", width, height),
                                       size)
         return Camera.of_numbers(numbers.reshape(self.numbers.shape), size)
@@ -286,12 +289,12 @@ def _framed(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, marg
     slopes = free * np.array(size) / 2 / np.stack([camera.fx, camera.fy], axis=-1)
     needed = seen[..., 2:] + np.abs(seen[..., :2]) / slopes[..., None, :]
     extent = float(np.linalg.norm(high - low))
-    distance = needed.max(axis=(-1, -2)) + 1e-3 * extent + 1e-12
+    distance = needed.max(axis=(-1, -2)) + (1e-3 * extent or 1e-12)  # a point has no extent
     back = rotation[..., 2, :]  # the camera's z in the world
     camera = Camera.look_at(centre + distance[..., None] * back,
                             np.broadcast_to(centre, back.shape), fov_y=fov_y, width=width,
                             height=height)
-    camera.near_plane[...] = np.minimum(camera.near_plane, 5e-4 * extent + 1e-12)
+    camera.near_plane[...] = np.minimum(camera.near_plane, 5e-4 * extent or 1e-12)
     return camera
 
 

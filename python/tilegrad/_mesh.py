@@ -221,12 +221,23 @@ class Mesh:
                 "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
                 "corner_colors": self._rgba(function, "corner_colors", sizes, "F", 3),
                 "face_materials": array("face_materials", np.int32, "F"),
-                "origin": array("origin", np.float64, 3).tolist(),
-                "materials": [material.checked(function) for material in self.materials],
+                "origin": self._origin(function),
+                "materials": [material.checked(function) for material in self._materials(function)],
                 "textures": [{"name": _arrays.as_text(function, "texture name",
                                                       str(texture.name)),
                               "image": self._texels(function, texture)}
                              for texture in self.textures]}
+
+    def _origin(self, function: str) -> list[float]:
+        origin = _arrays.as_array(function, "origin", self.origin, np.float64, (3,))
+        _arrays.check_finite(function, "origin", origin)
+        return origin.tolist()
+
+    def _materials(self, function: str) -> list[Material]:
+        found = self.materials
+        if isinstance(found, (list, tuple)) and all(isinstance(m, Material) for m in found):
+            return list(found)
+        raise TypeError(f"{function}: materials is {found!r}, expected a list of Material")
 
     @staticmethod
     def _texels(function: str, texture: MeshTexture) -> np.ndarray:

@@ -38,7 +38,9 @@ def load_cameras(path: Path, *, width: int = 0, height: int = 0,
     OSError, ValueError: name the file, and the line or frame. Lens distortion is refused.
     """
     half = _arrays.check_choice("load_cameras", "opencv_centre", opencv_centre, _CENTRES) == 1
-    views = _tools.load_cameras(name_of(path), (width, height), half)
+    size = tuple(_arrays.as_count("load_cameras", name, value)
+                 for name, value in (("width", width), ("height", height)))
+    views = _tools.load_cameras(name_of(path), size, half)
     return [View(name, Camera.of_numbers(numbers, size if all(size) else None), *size)
             for name, numbers, size in views]
 
@@ -62,8 +64,9 @@ def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = N
 def rotation_from_vector(rvec: Any) -> np.ndarray:
     """(3, 3) from OpenCV's rotation vector (3,), axis times angle in radians, as solvePnP returns
     it."""
-    return _tools.rotation_from_vector(
-        _arrays.as_array("rotation_from_vector", "rvec", rvec, np.float64, (3,)))
+    array = _arrays.as_array("rotation_from_vector", "rvec", rvec, np.float64, (3,))
+    _arrays.check_finite("rotation_from_vector", "rvec", array)
+    return _tools.rotation_from_vector(array)
 
 
 def _numbers(camera: Camera) -> np.ndarray:

@@ -53,26 +53,35 @@ def laplacian(positions: Any, faces: Any, start: Optional[Any] = None) -> Any:
         paper.
     """
     if start is not None:
-        positions = positions - _like(positions, start)
+        positions = _movement(positions, start)
     return _of_mesh("laplacian", positions, faces)
 
 
 def iou(alpha: Any, truth: Any) -> Any:
     """Equation 12: the mean over images of 1 - |S S'|_1 / |S + S' - S S'|_1. alpha, truth: (N, H, W)
-    or (H, W), 0 to 1. The gradient is with respect to alpha."""
+    or (H, W), 0 to 1. The gradient is with respect to alpha. ValueError: a number beyond that."""
     def compute(a: np.ndarray, s: np.ndarray) -> tuple[float, np.ndarray]:
         if a.shape != s.shape or a.ndim not in (2, 3):
             raise ValueError(f"iou: alpha has shape {a.shape}, truth {s.shape}; expected the same, "
                              f"(N, H, W) or (H, W)")
+        _check_unit("alpha", a)
+        _check_unit("truth", s)
         images = 1 if a.ndim == 2 else len(a)
         rows = (images, a.size // max(images, 1))
         value, gradient = _tools.iou(a.reshape(rows), s.reshape(rows))
         return value, gradient.reshape(a.shape)
 
     if _torch_of(alpha):
-        return _on_tape(lambda a: compute(a, np.ascontiguousarray(_numpy(truth), a.dtype)), alpha)
+        return _on_tape("iou", lambda a: compute(a, _constant("iou", "truth", truth, a.dtype)),
+                        alpha=alpha)
     a = _floats("iou", "alpha", alpha)
-    return Loss(*compute(a, np.ascontiguousarray(_numpy(truth), a.dtype)))
+    return Loss(*compute(a, _constant("iou", "truth", truth, a.dtype)))
+
+
+def _check_unit(argument: str, values: np.ndarray) -> None:
+    """ValueError unless all values of a mask are in [0, 1]."""
+    if not ((values >= 0) & (values <= 1)).all():
+        raise ValueError(f"iou: {argument} has numbers outside of [0, 1]; divide bytes by 255")
 
 
 def chamfer(a: Any, b: Any, *, threads: int = 0) -> Any:
@@ -81,9 +90,9 @@ def chamfer(a: Any, b: Any, *, threads: int = 0) -> Any:
     predictions. Returns value and both gradients; for tensors a scalar."""
     count = thread_count("chamfer", threads)
     if _torch_of(a, b):
-        return _on_tape(lambda p, q: _chamfer(p, q, count), a, b)
+        return _on_tape("chamfer", lambda p, q: _chamfer(p, q, count), a=a, b=b)
     p = _floats("chamfer", "a", a)
-    return PairLoss(*_chamfer(p, np.ascontiguousarray(_numpy(b), p.dtype), count))
+    return PairLoss(*_chamfer(p, _constant("chamfer", "b", b, p.dtype), count))
 
 
 def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
@@ -92,6 +101,7 @@ def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
         _arrays.check_shape("chamfer", name, points.shape, ("N" if name == "a" else "M", 3))
         if not len(points):
             raise ValueError(f"chamfer: {name} has no points")
+        _arrays.check_finite("chamfer", name, points)
     value, gradients = 0.0, [np.zeros_like(a), np.zeros_like(b)]
     for p, q, d_p, d_q in ((a, b, *gradients), (b, a, *reversed(gradients))):
         nearest = _tools.nearest_points(p[None], q[None], threads)[0]
@@ -99,17 +109,25 @@ def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
         value += float(np.square(gap, dtype=np.float64).sum() / len(p))
         d_p += 2 / len(p) * gap
         np.subtract.at(d_q, nearest, 2 / len(p) * gap)
-    return value, gradients[0], gradients[1]
+    return _in_range("chamfer", "a or b", (value, *gradients))
 
 
 def _of_mesh(name: str, positions: Any, faces: Any) -> Any:
-    if _numpy(faces).dtype.kind not in "iu":
-        raise TypeError(f"{name}: faces has dtype {_numpy(faces).dtype}, expected whole numbers")
     triangles = _arrays.as_indices(name, "faces", faces, ("F", 3))
-    compute = getattr(_tools, name)
+
+    def compute(p: np.ndarray) -> tuple:
+        return _in_range(name, "positions", getattr(_tools, name)(p, triangles))
+
     if _torch_of(positions):
-        return _on_tape(lambda p: compute(p, triangles), positions)
-    return Loss(*compute(_floats(name, "positions", positions), triangles))
+        return _on_tape(name, compute, positions=positions)
+    return Loss(*compute(_floats(name, "positions", positions)))
+
+
+def _in_range(name: str, arguments: str, found: tuple) -> tuple:
+    """`found`, a value and its gradients; ValueError if they overflowed."""
+    if not all(np.isfinite(part).all() for part in found):
+        raise ValueError(f"{name}: {arguments} has numbers so large that the loss overflows")
+    return found
 
 
 def _floats(function: str, argument: str, value: Any) -> np.ndarray:
@@ -123,29 +141,58 @@ def _torch_of(*values: Any) -> Any:
     return torch if torch and any(isinstance(value, torch.Tensor) for value in values) else None
 
 
-def _numpy(value: Any) -> np.ndarray:
-    return value.detach().cpu().numpy() if _torch_of(value) else np.asarray(value)
+def _constant(function: str, argument: str, value: Any, dtype: Any) -> np.ndarray:
+    """As an array of `dtype`, without its gradient; masks may be bool."""
+    torch = _torch_of(value)
+    if torch:
+        value = value.detach().byte() if value.dtype == torch.bool else value.detach()
+    array = _arrays.foreign(function, argument, value)
+    return _arrays.contiguous(function, argument,
+                              array.astype(dtype) if array.dtype == bool else array, dtype)
 
 
-def _like(tensor: Any, value: Any) -> Any:
-    torch = _torch_of(tensor)
-    if not torch or isinstance(value, torch.Tensor):
-        return value if torch else np.asarray(value)
-    return torch.as_tensor(np.ascontiguousarray(value), dtype=tensor.dtype)
+def _movement(positions: Any, start: Any) -> Any:
+    """positions - start, (V, 3) each."""
+    torch = _torch_of(positions, start)
+    ends = {"positions": positions, "start": start}
+    if torch:
+        ends = _tensors("laplacian", ends)
+    else:
+        ends = {name: _floats("laplacian", name, value) for name, value in ends.items()}
+    sizes: dict[str, int] = {}
+    for name, value in ends.items():
+        _arrays.check_shape("laplacian", name, value.shape, ("V", 3), sizes)
+    return ends["positions"] - ends["start"]
 
 
-def _on_tape(compute: Callable[..., tuple], *inputs: Any) -> Any:
+def _tensors(function: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Tensors of float32 or float64 on the CPU; arrays get the dtype of the first tensor."""
+    from tilegrad._dense import widened
+    from tilegrad.compat._tensors import check_floats
+    torch = _torch_of(*values.values())
+    like = next(value for value in values.values() if isinstance(value, torch.Tensor))
+    found = {}
+    for name, value in values.items():
+        if not isinstance(value, torch.Tensor):
+            value = torch.as_tensor(_floats(function, name, value), dtype=like.dtype)
+        found[name] = widened(value)
+        check_floats(function, name, found[name], tuple(value.shape))
+    return found
+
+
+def _on_tape(function: str, compute: Callable[..., tuple], **inputs: Any) -> Any:
     """The value as a scalar tensor whose backward gives the gradients. First derivatives only."""
-    from tilegrad._dense import first_derivative_only, widened
-    torch = _torch_of(*inputs)
-    tensors = [widened(torch.as_tensor(value)) for value in inputs]
+    from tilegrad._dense import first_derivative_only
+    torch = _torch_of(*inputs.values())
+    tensors = list(_tensors(function, inputs).values())
+    if len({tensor.dtype for tensor in tensors}) > 1:
+        raise TypeError(f"{function}: {' and '.join(inputs)} have dtypes "
+                        f"{' and '.join(str(tensor.dtype) for tensor in tensors)}, expected one")
 
     class Node(torch.autograd.Function):
         @staticmethod
         def forward(context, *values):
             context.save_for_backward(*values)
-            if any(value.device.type != "cpu" for value in values):
-                raise TypeError("tilegrad.losses: tensors must be on the CPU")
             value, *gradients = compute(*(np.ascontiguousarray(v.detach().numpy())
                                           for v in values))
             context.gradients = [torch.from_numpy(gradient) for gradient in gradients]

@@ -19,6 +19,8 @@ from tilegrad._mesh import Material, Mesh, mesh_of_dict, MeshCamera, MeshTables,
 __all__ = ["Material", "Mesh", "MeshCamera", "MeshTables", "MeshTexture", "as_mesh", "load_mesh",
            "mesh_endings", "mesh_of_dict", "save_mesh"]
 
+_FAR = 256  # times the size of a mesh, as in files
+
 
 def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
     """Reads a mesh: glTF and GLB with materials and textures, OBJ with MTL, PLY, OFF, STL, AC3D,
@@ -35,6 +37,9 @@ def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
 
 def save_mesh(path: Path, mesh: Mesh) -> None:
     """`Mesh.save`."""
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"save_mesh: mesh is {type(mesh).__name__}, expected a Mesh (as_mesh makes "
+                        f"one)")
     mesh.save(path)
 
 
@@ -48,7 +53,8 @@ def as_mesh(mesh: Any) -> Mesh:
     (vertices, faces) or Open3D (vertices, triangles), with its colours and normals per vertex and,
     for trimesh, its texture. Neither library is imported.
 
-    TypeError: it is none of them. ValueError: polygons other than triangles.
+    TypeError: it is none of them. ValueError: polygons other than triangles, or float64 positions
+        farther from the origin than 256 times their size.
     """
     if isinstance(mesh, (str, bytes, os.PathLike)):
         return load_mesh(mesh)
@@ -77,13 +83,22 @@ def _of_object(mesh: Any) -> Mesh:
 
 
 def _positions_faces(positions: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:
-    indices = np.asarray(faces)
-    if indices.ndim != 2 or indices.shape[-1] != 3 or indices.dtype.kind not in "iu":
-        raise ValueError(f"as_mesh: faces have shape {indices.shape} and dtype {indices.dtype}, "
-                         f"expected (F, 3) whole numbers: triangles")
-    array = _arrays.as_array("as_mesh", "positions", np.asarray(positions, np.float32), np.float32,
-                             ("V", 3))
-    return array, np.ascontiguousarray(indices, np.int32)
+    dtype = _arrays.float_dtype("as_mesh", "positions", positions)
+    array = _arrays.as_array("as_mesh", "positions", positions, dtype, ("V", 3))
+    if dtype == np.float64 and len(array):
+        _refuse_far(array)
+    return (array.astype(np.float32, copy=False),
+            _arrays.as_array("as_mesh", "faces", faces, np.int32, ("F", 3)))
+
+
+def _refuse_far(positions: np.ndarray) -> None:
+    """ValueError where float32 would lose the shape. Files are moved to the origin then; arrays
+    are not, since cameras of the caller would look past them."""
+    size = np.ptp(positions, axis=0).max()
+    farthest = np.abs(positions).max()
+    if np.isfinite(farthest) and size > 0 and farthest > _FAR * size:
+        raise ValueError(f"as_mesh: positions are up to {farthest:g} from the origin, too far for "
+                         f"a size of {size:g} in float32: subtract their middle")
 
 
 def _vertex_rows(mesh: Mesh, values: Any, widths: tuple[int, ...]) -> Optional[np.ndarray]:

@@ -97,5 +97,33 @@ class Errors(unittest.TestCase):
                 (lambda: losses.iou(TRUTH, TRUTH[:1]), "expected the same"),
                 (lambda: losses.chamfer(POSITIONS, POINTS[:0]), "b has no points")):
             self.assertRaisesRegex(ValueError, message, call)
-        with self.assertRaisesRegex(TypeError, "whole numbers"):
+        with self.assertRaisesRegex(TypeError, "faces has dtype float32, expected int32"):
             losses.edge_length(POSITIONS, FACES.astype(np.float32))
+
+    def test_arrays_that_would_be_misread(self):
+        masked = np.ma.masked_less(POSITIONS, 0)
+        for call, error, message in (
+                (lambda: losses.iou(TRUTH, np.uint8(255 * TRUTH)), ValueError, "iou: truth.*255"),
+                (lambda: losses.iou(-TRUTH, TRUTH), ValueError, "iou: alpha has numbers outside"),
+                (lambda: losses.laplacian(POSITIONS, FACES, POSITIONS[:, :1]), ValueError,
+                 r"laplacian: start has shape \(42, 1\)"),
+                (lambda: losses.laplacian(POSITIONS, FACES, 1), ValueError, "laplacian: start"),
+                (lambda: losses.laplacian(POSITIONS, FACES, masked), TypeError, "start.*masked"),
+                (lambda: losses.chamfer(POSITIONS, POINTS * 1j), TypeError, "b has dtype complex"),
+                (lambda: losses.chamfer(POSITIONS, masked), TypeError, "b is a masked array"),
+                (lambda: losses.chamfer(POSITIONS, "a"), TypeError, "chamfer: b is not an array"),
+                (lambda: losses.edge_length(np.float32(1e20 * POSITIONS), FACES), ValueError,
+                 "edge_length: positions.*overflows")):
+            self.assertRaisesRegex(error, message, call)
+
+    @needs_torch
+    def test_tensors(self):
+        p = torch.tensor(POSITIONS)
+        for call, message in (
+                (lambda: losses.chamfer(p, "a"), "chamfer: b is not an array"),
+                (lambda: losses.chamfer(p, p.float()), "a and b have dtypes torch.float64 and"),
+                (lambda: losses.chamfer(p, p.bfloat16()), "b has dtype torch.bfloat16"),
+                (lambda: losses.iou(p.bfloat16(), p), "iou: alpha has dtype torch.bfloat16")):
+            self.assertRaisesRegex(TypeError, message, call)
+        mask = torch.ones(4, 4)
+        self.assertAlmostEqual(losses.iou(mask, mask > 0).item(), 0, places=6)

@@ -28,7 +28,7 @@ def decoded(png):
 
 class Framing(unittest.TestCase):
     def test_the_object_touches_the_margin_at_any_size_and_place(self):
-        for scale, shift in ((1, 0), (1e-4, 3e-4), (1e4, 2e4)):
+        for scale, shift in ((1, 0), (1e-4, 3e-4), (1e4, 2e4), (1e-13, 0)):
             points = LONG * np.float32(scale) + np.float32(shift)
             frame = tilegrad.render((points, FACES), azimuth=[0, 90, 60], elevation=[0, 0, 40],
                                     width=300, height=200)
@@ -121,8 +121,25 @@ class Others(unittest.TestCase):
 
     def test_what_is_no_mesh(self):
         self.assertRaisesRegex(TypeError, "got int, expected a Mesh", tilegrad.render, 3)
-        self.assertRaisesRegex(ValueError, "triangles", meshes.as_mesh, (POSITIONS, [[0, 1, 2, 3]]))
+        self.assertRaisesRegex(ValueError, r"faces has shape \(1, 4\), expected \(F, 3\)",
+                               meshes.as_mesh, (POSITIONS, [[0, 1, 2, 3]]))
+        self.assertRaisesRegex(TypeError, "save_mesh: mesh is NoneType", meshes.save_mesh, "a.glb",
+                               None)
         self.assertRaises(OSError, tilegrad.render, "none.glb")
+
+    def test_arrays_that_would_change(self):
+        exact = POSITIONS.astype(np.float64)
+        for positions, faces, error, message in (
+                (POSITIONS, FACES.astype(np.int64) + 2**32, ValueError, "faces.*int32's range"),
+                (POSITIONS * 1j, FACES, TypeError, "positions has dtype complex64"),
+                (POSITIONS.astype(str), FACES, TypeError, "positions has dtype <U"),
+                (POSITIONS.astype(object), FACES, TypeError, "positions has dtype object"),
+                (POSITIONS > 0, FACES, TypeError, "positions has dtype bool"),
+                (np.ma.masked_less(POSITIONS, 0), FACES, TypeError, "positions is a masked array"),
+                (exact + 4.6e6, FACES, ValueError, "positions are up to .*from the origin")):
+            self.assertRaisesRegex(error, "as_mesh: " + message, meshes.as_mesh, (positions, faces))
+        near = meshes.as_mesh((exact + 100, FACES))
+        np.testing.assert_allclose(near.positions, exact + 100, rtol=1e-7)
 
 
 # What the package shows: every public name is documented; and its modules import each other in one
