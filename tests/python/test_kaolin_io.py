@@ -97,6 +97,16 @@ class ImportMesh(FileTest):
             red = (names.index(material["material_name"]) + 1) / 10
             self.assertAlmostEqual(float(material["Kd"][0]), red, places=6)
 
+    def test_materials_of_a_batch(self):
+        """Runs end with their mesh, though the next one begins with the same material."""
+        corners, faces = torch.zeros(3, 3), torch.tensor(4 * [[0, 1, 2]])
+        each = [kaolin.rep.SurfaceMesh(corners, faces, material_assignments=torch.tensor(of_faces),
+                                       materials=[{}, {}])
+                for of_faces in ([0, 0, 1, 1], [1, 0, 0, -1])]
+        order = kaolin.rep.SurfaceMesh.cat(each).materials_order
+        self.assertEqual([runs.tolist() for runs in order], [[[0, 0], [1, 2]], [[1, 0], [0, 1]]])
+        self.assertEqual(each[1].materials_order.tolist(), order[1].tolist())
+
     def test_only_what_was_asked_for(self):
         mesh = kaolin.io.obj.import_mesh(self.path)
         for name in ("materials", "material_assignments", "materials_order", "normals",

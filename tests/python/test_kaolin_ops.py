@@ -58,6 +58,40 @@ class Meshes(unittest.TestCase):
             lambda f: ops.mesh.average_face_vertex_features(TETRAHEDRON, f), features))
 
 
+class Refused(unittest.TestCase):
+    def test_positions_that_are_not_finite(self):
+        bad = tetrahedron() * math.nan
+        mask = torch.ones(1, 2, 2)
+        for call, argument in (
+                (lambda: ops.mesh.face_areas(bad, TETRAHEDRON), "face_areas: vertices"),
+                (lambda: kaolin.metrics.trianglemesh.average_edge_length(bad, TETRAHEDRON),
+                 "average_edge_length: vertices"),
+                (lambda: kaolin.metrics.render.mask_iou(mask, mask / 0), "mask_iou: rhs_mask"),
+                (lambda: kaolin.render.mesh.prepare_vertices(
+                    bad, TETRAHEDRON, double([[1.], [1], [-1]]), torch.eye(3).double()[None],
+                    torch.zeros(1, 3).double()), "prepare_vertices: vertices")):
+            self.assertRaisesRegex(ValueError, argument + " has numbers that are not finite", call)
+
+    def test_types(self):
+        for faces in (TETRAHEDRON + 0.5, TETRAHEDRON > 0):
+            with self.assertRaisesRegex(TypeError, "adjacency_matrix: faces has dtype"):
+                ops.mesh.adjacency_matrix(4, faces)
+        with self.assertRaisesRegex(TypeError, "average_edge_length: vertices has dtype"):
+            kaolin.metrics.trianglemesh.average_edge_length(tetrahedron().half(), TETRAHEDRON)
+
+    def test_rasterize(self):
+        image, z = double([[[[-1., -1], [1, -1], [0, 1]]]]), torch.ones(1, 1, 3).double()
+        draw = kaolin.render.mesh.rasterize
+        for valid in (256, 0.5):  # not cut to a byte, which would be 0
+            face_idx = draw(4, 4, z, image, z[..., None], torch.tensor([[valid]]))[1]
+            self.assertEqual(int(face_idx.max()), 0)
+        with self.assertRaisesRegex(ValueError, "rasterize: face_features is empty"):
+            draw(4, 4, z, image, [])
+        with self.assertRaisesRegex(TypeError, "knum must be int"):
+            kaolin.render.mesh.dibr_soft_mask(image, torch.zeros(1, 4, 4, dtype=torch.int64),
+                                              knum=1.5, exact_kaolin=True)
+
+
 class Subdivision(unittest.TestCase):
     def test_closed_by_hand(self):
         vertices, faces = ops.mesh.subdivide_trianglemesh(tetrahedron(), TETRAHEDRON, 1)

@@ -86,6 +86,13 @@ class Constructors(CameraTest):
         with self.assertRaisesRegex(ValueError, "extrinsics of 2 cameras, intrinsics of 1"):
             camera(eye=double([[0., 0, 4], [3, 0, 0]]), num_cameras=1)
 
+    def test_cameras_of_a_batch(self):
+        cameras = camera(eye=[[0., 0, 4], [0, 0, 5]])
+        self.assertEqual([float(c.cam_pos()[0, 2]) for c in cameras], [4, 5])
+        self.assertEqual(float(cameras[-2].cam_pos()[0, 2]), 4)
+        for item in (2, -3):
+            self.assertRaisesRegex(IndexError, f"item {item} of 2", cameras.__getitem__, item)
+
     def test_an_up_along_the_view_is_an_error(self):
         """Such cameras have no rotation: they would show nothing, in silence."""
         older = kaolin.render.camera
@@ -259,6 +266,18 @@ class SphericalGaussians(unittest.TestCase):
         self.assertTrue(torch.autograd.gradcheck(
             lighting.sg_warp_specular_term,
             (*self.lights, self.normal, roughness, view.requires_grad_(), albedo)))
+
+    def test_lobes_that_cancel(self):
+        """The integral of exp(-2 sharpness), for a light opposite the normal as sharp as the cosine
+        lobe; and beside it, where the quotient is a series."""
+        inputs = [t.requires_grad_() for t in (double([[1., 1, 1]]), double([[0., 0, -1]]),
+                                               double([2.133]), double([[0., 0, 1]]))]
+        value = lighting.sg_irradiance_inner_product(*inputs)
+        self.assertAlmostEqual(value[0, 0].item(), 4 * math.pi * 1.17 * math.exp(-4.266))
+        value.sum().backward()
+        self.assertTrue(all(torch.isfinite(t.grad).all() for t in inputs))
+        length = double([0., 1e-9, 0.99e-4, 1.01e-4, 1]).requires_grad_()
+        self.assertTrue(torch.autograd.gradcheck(lighting._decay_ratio, length))
 
     def test_errors(self):
         with self.assertRaisesRegex(ValueError, "sg_irradiance_fitted: sharpness has shape"):

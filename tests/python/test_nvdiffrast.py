@@ -372,8 +372,11 @@ class Errors(unittest.TestCase):
                    dr.interpolate, attr.double(), self.rast, self.tri)
         self.check(ValueError, "diff_attrs is 'some'", dr.interpolate, attr, self.rast, self.tri,
                    self.rast_db, "some")
-        self.check(ValueError, r"diff_attrs is \[2\], must be in 0..1", dr.interpolate, attr,
-                   self.rast, self.tri, self.rast_db, [2])
+        for wrong, error, message in (([2], ValueError, r"diff_attrs\[0\] is 2, outside of"),
+                                      (1, ValueError, r"diff_attrs has shape \(\)"),
+                                      ([1.7], TypeError, "diff_attrs has dtype float64")):
+            self.check(error, message, dr.interpolate, attr, self.rast, self.tri, self.rast_db,
+                       wrong)
         for wrong in (9, 0.5, -1, -0.5, 3, 3e38, math.nan):
             self.check(ValueError, "pixel 0 of rast names triangle", dr.interpolate, attr,
                        torch.full_like(self.rast, wrong), self.tri)

@@ -37,6 +37,22 @@ def check_floats(function: str, argument: str, value: Any, shape: Sequence[Axis]
                         f"{like.dtype}")
 
 
+def check_positions(function: str, argument: str, value: Any, shape: Sequence[Axis],
+                    sizes: Optional[Sizes] = None, like: Optional[torch.Tensor] = None) -> None:
+    """As check_floats, and ValueError unless all of `value` is finite."""
+    check_floats(function, argument, value, shape, sizes, like)
+    if not torch.isfinite(value).all():
+        raise ValueError(f"{function}: {argument} has numbers that are not finite")
+
+
+def check_whole(function: str, argument: str, value: Any, shape: Sequence[Axis],
+                sizes: Optional[Sizes] = None) -> None:
+    """As check_tensor, and TypeError unless `value` is of an integer type."""
+    check_tensor(function, argument, value, shape, sizes)
+    if value.is_floating_point() or value.dtype == torch.bool:
+        raise TypeError(f"{function}: {argument} has dtype {value.dtype}, expected torch.int64")
+
+
 def check_not_empty(function: str, argument: str, tensor: torch.Tensor, things: str) -> None:
     """ValueError if the second axis of `tensor`, [B,N,...], has length 0: what would be a mean over
     it, or a least one, is NaN."""

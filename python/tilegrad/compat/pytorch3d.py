@@ -20,9 +20,9 @@ from typing import Any, Optional, Sequence, Union
 import torch
 
 from tilegrad import _core, fragments
-from tilegrad._arrays import check_indices
+from tilegrad._arrays import as_number, check_finite, check_indices
 from tilegrad._dense import first_derivative_only, widened
-from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
+from tilegrad.compat._tensors import check_floats, check_whole, threads, to_numpy
 
 Fragments = fragments.Fragments
 
@@ -77,10 +77,7 @@ def rasterize_meshes(meshes: Any, image_size: Union[int, Sequence[int]] = 256,
     name = "rasterize_meshes"
     vertices, faces = widened(meshes.verts_packed()), meshes.faces_packed()
     check_floats(name, "meshes.verts_packed()", vertices, ("V", 3))
-    check_tensor(name, "meshes.faces_packed()", faces, ("F", 3))
-    if faces.dtype not in (torch.int32, torch.int64):
-        raise TypeError(f"{name}: meshes.faces_packed() has dtype {faces.dtype}, expected "
-                        f"torch.int64")
+    check_whole(name, "meshes.faces_packed()", faces, ("F", 3))
     check_indices(name, "meshes.faces_packed()", faces.numpy(), len(vertices))
     size = (image_size, image_size) if isinstance(image_size, int) else image_size
     if not isinstance(size, (tuple, list)) or len(size) != 2:
@@ -91,7 +88,9 @@ def rasterize_meshes(meshes: Any, image_size: Union[int, Sequence[int]] = 256,
                                         cull_backfaces)
     corners = vertices.index_select(0, faces.reshape(-1)).reshape(-1, 3, 3)
     if z_clip_value is not None:
-        corners = _without_cut_faces(corners, z_clip_value)
+        nearest = as_number(name, "z_clip_value", z_clip_value, float)
+        check_finite(name, "z_clip_value", nearest)
+        corners = _without_cut_faces(corners, nearest)
     ranges = list(zip(meshes.mesh_to_faces_packed_first_idx().tolist(),
                       meshes.num_faces_per_mesh().tolist()))
     return _Rasterize.apply(corners, ranges, options)

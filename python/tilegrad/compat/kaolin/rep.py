@@ -34,7 +34,8 @@ class SurfaceMesh:
     vertex_normals, else flat; vertex_normals, the mean of face_normals; face_colors and
     face_features from those of vertices; materials_order [M,2] of Kaolin before 0.13, (material,
     first face) of each run of faces.
-    In a batch all but faces have a leading axis B, and materials is a list of lists.
+    In a batch all but faces have a leading axis B, materials is a list of lists, and
+    materials_order a list of [M,2].
     """
 
     class Batching(str, enum.Enum):
@@ -195,16 +196,23 @@ def _vertex_normals(mesh: SurfaceMesh) -> torch.Tensor:
     return mean.reshape(mesh.vertices.shape)
 
 
-def _materials_order(mesh: SurfaceMesh) -> Optional[torch.Tensor]:
+def _materials_order(mesh: SurfaceMesh) -> Union[torch.Tensor, list[torch.Tensor], None]:
     of_faces = mesh.material_assignments
     if of_faces is None:
         return None
+    if of_faces.ndim == 1:
+        return _runs(of_faces)
+    return [_runs(of_mesh) for of_mesh in of_faces]
+
+
+def _runs(of_faces: torch.Tensor) -> torch.Tensor:
+    """(material, first face) of each run of faces, of the materials [F] of one mesh."""
     materials, counts = of_faces.long().unique_consecutive(return_counts=True)
     order = torch.stack([materials, counts.cumsum(0) - counts], dim=1)
     return order[materials >= 0]  # -1: faces without one
 
 
-_COMPUTED: dict[str, Callable[[SurfaceMesh], Optional[torch.Tensor]]] = {
+_COMPUTED: dict[str, Callable[[SurfaceMesh], Any]] = {
     "face_vertices": lambda mesh: _look_up(mesh.vertices, mesh.faces),
     "face_uvs": lambda mesh: _look_up(mesh.uvs, mesh.face_uvs_idx),
     "face_normals": _face_normals,

@@ -62,12 +62,14 @@ def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: t
     Vertices that triangles share must be the same index, or every edge is a silhouette. Returns
     an image like color. Gradients flow to color, and to x, y and w of pos.
 
-    TypeError, ValueError: an argument is not as above, or an index is out of range.
+    TypeError, ValueError: an argument is not as above, an index is out of range, or pos is not
+    finite.
     """
     sizes: Sizes = {}
     _tensors.check_floats("antialias", "color", color, ("N", "H", "W", "C"), sizes)
     _tensors.check_floats("antialias", "rast", rast, ("N", "H", "W", 4), sizes, color)
     _tensors.vertex_rows("antialias", "pos", pos, 4, sizes, color)
+    _tensors.check_positions("antialias", "pos", pos, pos.shape)
     triangles = _tensors.triangles("antialias", tri)
     if topology_hash is None:
         topology_hash = TopologyHash(triangles)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from tilegrad import _core
-from tilegrad._arrays import Sizes
+from tilegrad._arrays import as_array, check_indices, Sizes
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
 
@@ -82,7 +82,6 @@ def _diff_attrs(diff_attrs: Any, rast_db: Any, attributes: int) -> np.ndarray:
             raise ValueError(f"interpolate: diff_attrs is {diff_attrs!r}, expected 'all' or a list "
                              f"of numbers")
         return np.arange(attributes, dtype=np.int32)
-    numbers = [int(i) for i in diff_attrs]
-    if any(not 0 <= i < attributes for i in numbers):
-        raise ValueError(f"interpolate: diff_attrs is {numbers}, must be in 0..{attributes - 1}")
-    return np.array(numbers, np.int32)
+    numbers = as_array("interpolate", "diff_attrs", diff_attrs, np.int32, ("D",))
+    check_indices("interpolate", "diff_attrs", numbers, attributes)
+    return numbers

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from tilegrad import _core
-from tilegrad._arrays import as_array, MOST_PIXELS, Sizes
+from tilegrad._arrays import as_array, as_flag, MOST_PIXELS, Sizes
 from tilegrad._dense import first_derivative_only, full_precision
 from tilegrad.compat import _tensors
 
@@ -183,7 +183,8 @@ def _checked(function: str, glctx: Any, pos: Any, tri: Any, resolution: Any, ran
     else:
         ranges = None  # ignored in instanced mode, as nvdiffrast does
     height, width = _resolution(function, resolution)
-    return _Call(glctx, _tensors.triangles(function, tri), ranges, (height, width), bool(grad_db))
+    return _Call(glctx, _tensors.triangles(function, tri), ranges, (height, width),
+                 as_flag(function, "grad_db", grad_db))
 
 
 def _resolution(function: str, resolution: Any) -> tuple[int, int]:

@@ -7,7 +7,8 @@ from typing import Optional, Union
 
 import torch
 
-from tilegrad.compat._tensors import check_floats, check_tensor, surface_tools, threads, to_numpy
+from tilegrad.compat._tensors import (check_floats, check_positions, check_tensor, check_whole,
+                                      surface_tools, threads, to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.ops._subdivide import subdivide_trianglemesh
 
@@ -25,7 +26,7 @@ def index_vertices_by_faces(vertices_features: torch.Tensor, faces: torch.Tensor
     Returns [B,F,3,C]."""
     name = "index_vertices_by_faces"
     check_tensor(name, "vertices_features", vertices_features, ("B", "V", "C"))
-    check_tensor(name, "faces", faces, ("F", "corners"))
+    check_whole(name, "faces", faces, ("F", "corners"))
     batch, _, channels = vertices_features.shape
     return vertices_features.index_select(1, faces.reshape(-1)).reshape(batch, *faces.shape,
                                                                        channels)
@@ -50,7 +51,8 @@ def face_normals(face_vertices: torch.Tensor, unit: bool = False) -> torch.Tenso
 
 def face_areas(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
     """vertices: [B,V,3]. faces: [F,3] int64. Returns [B,F]."""
-    check_tensor("face_areas", "faces", faces, ("F", 3))
+    check_positions("face_areas", "vertices", vertices, ("B", "V", 3))
+    check_whole("face_areas", "faces", faces, ("F", 3))
     return face_normals(index_vertices_by_faces(vertices, faces)).norm(dim=2) / 2
 
 
@@ -59,7 +61,7 @@ def average_face_vertex_features(faces: torch.Tensor, face_features: torch.Tenso
     """The mean over the corners at each vertex; 0 where there is none. faces: [F,3] int64.
     face_features: [B,F,3,C]. num_vertices: the largest index + 1 if None. Returns [B,V,C]."""
     name, sizes = "average_face_vertex_features", {}
-    check_tensor(name, "faces", faces, ("F", "corners"), sizes)
+    check_whole(name, "faces", faces, ("F", "corners"), sizes)
     check_floats(name, "face_features", face_features, ("B", "F", "corners", "C"), sizes)
     if num_vertices is None and not len(faces):
         raise ValueError(f"{name}: there are no faces to tell how many vertices; give num_vertices")
@@ -80,7 +82,7 @@ def compute_vertex_normals(faces: torch.Tensor, face_normals: torch.Tensor,
 
 def adjacency_matrix(num_vertices: int, faces: torch.Tensor, sparse: bool = True) -> torch.Tensor:
     """[V,V] float32: 1 where an edge joins two vertices. faces: [F,3] int64."""
-    check_tensor("adjacency_matrix", "faces", faces, ("F", "corners"))
+    check_whole("adjacency_matrix", "faces", faces, ("F", "corners"))
     following = faces.roll(-1, dims=1)
     ends = torch.stack([torch.stack([faces, following]), torch.stack([following, faces])])
     indices = ends.transpose(0, 1).reshape(2, -1).unique(dim=1)
@@ -92,7 +94,7 @@ def adjacency_matrix(num_vertices: int, faces: torch.Tensor, sparse: bool = True
 def uniform_laplacian(num_vertices: int, faces: torch.Tensor) -> torch.Tensor:
     """[V,V]: row v is 1 / degree at the neighbours of v and -1 at v; 0 if v has no neighbour.
     faces: [F,3] int64."""
-    check_tensor("uniform_laplacian", "faces", faces, ("F", "corners"))
+    check_whole("uniform_laplacian", "faces", faces, ("F", "corners"))
     adjacency = adjacency_matrix(num_vertices, faces, sparse=False)
     degree = adjacency.sum(dim=1, keepdim=True)
     return adjacency / degree.clamp(min=1) - torch.diag((degree > 0).float().squeeze(1))
@@ -111,8 +113,8 @@ def sample_points(vertices: torch.Tensor, faces: torch.Tensor, num_samples: int,
         [B,num_samples,C] if given. ValueError: a mesh has no area.
     """
     name = "sample_points"
-    check_floats(name, "vertices", vertices, ("B", "V", 3))
-    check_tensor(name, "faces", faces, ("F", 3))
+    check_positions(name, "vertices", vertices, ("B", "V", 3))
+    check_whole(name, "faces", faces, ("F", 3))
     areas = face_areas(vertices, faces) if areas is None else areas
     check_floats(name, "areas", areas, (len(vertices), len(faces)))
     corners = index_vertices_by_faces(vertices, faces)
@@ -144,8 +146,8 @@ def check_sign(verts: torch.Tensor, faces: torch.Tensor, points: torch.Tensor,
     hash_resolution: of Kaolin's search; accepted, and without meaning here. Returns [B,P] bool."""
     del hash_resolution
     sizes: dict = {}
-    check_floats("check_sign", "verts", verts, ("B", "V", 3), sizes)
-    check_floats("check_sign", "points", points, ("B", "P", 3), sizes, verts)
+    check_positions("check_sign", "verts", verts, ("B", "V", 3), sizes)
+    check_positions("check_sign", "points", points, ("B", "P", 3), sizes, verts)
     corners = index_vertices_by_faces(verts, faces)
     return torch.from_numpy(surface_tools().enclosed(to_numpy(points), to_numpy(corners),
                                                      threads()))

@@ -446,7 +446,10 @@ class Camera:
                              f"available")
 
     def __getitem__(self, item: Any) -> Camera:
-        item = slice(item, item + 1 or None) if isinstance(item, int) else item
+        if isinstance(item, int):
+            if not -len(self) <= item < len(self):
+                raise IndexError(f"Camera: item {item} of {len(self)}")
+            item = slice(item, item + 1 or None)
         lens = self.intrinsics
         return Camera(CameraExtrinsics(self.view_matrix()[item]),
                       PinholeIntrinsics(lens.width, lens.height, lens.params[item], lens.near,

@@ -227,8 +227,16 @@ def _sum_of_products(ours: _Gaussians, others: _Gaussians) -> torch.Tensor:
     joint = sharpness[:, None, None] * direction[:, None] + sharp[:, None] * towards
     length = joint.norm(dim=-1)
     falloff = torch.exp(length - sharpness[:, None] - sharp)
-    weight = 2 * math.pi * falloff * -torch.expm1(-2 * length) / length
+    weight = 2 * math.pi * falloff * _decay_ratio(length)
     return amplitude * (weight @ other)
+
+
+def _decay_ratio(length: torch.Tensor) -> torch.Tensor:
+    """(1 - exp(-2 length)) / length; near 0, where lobes cancel and that is 0 / 0, its series."""
+    small = length < 1e-4
+    near, large = length.masked_fill(~small, 0), length.masked_fill(small, 1)
+    series = 2 - near * (2 - near * (4 - 2 * near) / 3)
+    return torch.where(small, series, -torch.expm1(-2 * large) / large)
 
 
 def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:

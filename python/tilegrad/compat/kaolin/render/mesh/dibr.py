@@ -15,8 +15,9 @@ from typing import Any, Optional, Union
 import torch
 
 from tilegrad import _core
+from tilegrad._arrays import as_number
 from tilegrad._dense import first_derivative_only, full_precision
-from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
+from tilegrad.compat._tensors import check_floats, check_tensor, check_whole, threads, to_numpy
 from tilegrad.compat.kaolin.render.mesh.rasterization import (
     DEFAULT_MULTIPLIER, Features, check_multiplier, rasterize)
 
@@ -129,10 +130,7 @@ def _check_mask_input(face_vertices_image: torch.Tensor, face_idx: torch.Tensor,
     name = "dibr_soft_mask"
     sizes: dict = {}
     check_floats(name, "face_vertices_image", face_vertices_image, ("B", "F", 3, 2), sizes)
-    check_tensor(name, "selected_face_idx", face_idx, ("B", "H", "W"), sizes)
-    if face_idx.is_floating_point() or face_idx.dtype == torch.bool:
-        raise TypeError(f"{name}: selected_face_idx has dtype {face_idx.dtype}, expected "
-                        f"torch.int64")
+    check_whole(name, "selected_face_idx", face_idx, ("B", "H", "W"), sizes)
     if not sigmainv > 0:
         raise ValueError(f"{name}: sigmainv is {sigmainv}, expected a number > 0")
     check_multiplier(name, multiplier)
@@ -150,7 +148,8 @@ def _as_int32(face_idx: torch.Tensor) -> torch.Tensor:
 def _kaolins_numbers(boxlen: float, knum: int, exact_kaolin: Optional[bool]) -> Optional[dict]:
     """What Kaolin's rule needs; None for our own rule."""
     if _exact_kaolin if exact_kaolin is None else exact_kaolin:
-        return {"boxlen": boxlen, "knum": knum}
+        return {"boxlen": as_number("dibr_soft_mask", "boxlen", boxlen, float),
+                "knum": as_number("dibr_soft_mask", "knum", knum, int)}
     _say_once_what_is_ignored()
     return None
 

@@ -26,7 +26,7 @@ class _Rasterize(torch.autograd.Function):
     def forward(ctx: Any, face_vertices_image: torch.Tensor, face_features: torch.Tensor,
                 face_vertices_z: torch.Tensor, valid_faces: Optional[torch.Tensor],
                 size: tuple[int, int], eps: float) -> tuple[torch.Tensor, torch.Tensor]:
-        valid = None if valid_faces is None else to_numpy(valid_faces.to(torch.uint8))
+        valid = None if valid_faces is None else to_numpy(valid_faces.bool().byte())
         image, face_idx = map(torch.from_numpy, _core.rasterize_projected(
             to_numpy(face_vertices_image), to_numpy(face_vertices_z), to_numpy(face_features),
             valid, *size, eps, threads()))
@@ -61,7 +61,7 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
         (faces with the same corners in any order, or whose corners have one z). It has no gradient.
     face_vertices_image: [B,F,3,2] NDC, y up.
     face_features: [B,F,3,C], or a list of such tensors.
-    valid_faces: [B,F] bool; the others are not drawn.
+    valid_faces: [B,F] bool, or numbers, of which 0 is False; the others are not drawn.
     multiplier, eps: weights are W_k / (S + sign(S) eps), W_k and S areas in coordinates times
         multiplier; None is 1000 and 1e-8.
     backend: Kaolin's names are accepted and mean the same thing here.
@@ -78,6 +78,8 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
                  face_vertices_image)
     several = isinstance(face_features, (list, tuple))
     features = list(face_features) if several else [face_features]
+    if not features:
+        raise ValueError(f"{name}: face_features is empty, expected at least one tensor")
     for i, feature in enumerate(features):
         argument = f"face_features[{i}]" if several else "face_features"
         check_floats(name, argument, feature, ("B", "F", 3, f"C{i}"), sizes, face_vertices_image)
