@@ -60,10 +60,14 @@ def known_size(function: str, size: Any) -> Optional[Size]:
             _arrays.as_pixels(function, "height", height))
 
 
-def common_size(sizes: Iterable[Optional[Size]]) -> Optional[Size]:
-    """The only known size; None if none is known, or several are."""
-    known = set(sizes) - {None}
-    return known.pop() if len(known) == 1 else None
+def common_size(function: str, sizes: Iterable[Optional[Size]]) -> Optional[Size]:
+    """The only known size; None if none is known. ValueError, naming `function`: several are."""
+    known = sorted({size for size in sizes if size is not None})
+    if len(known) > 1:
+        several = " and ".join("{} x {}".format(*size) for size in known)
+        raise ValueError(f"{function}: the scenes' cameras are for images of {several} pixels; "
+                         f"make them one size, with camera.resize")
+    return known[0] if known else None
 
 
 def checked_size(function: str, own: Optional[Size], size: Size) -> Size:

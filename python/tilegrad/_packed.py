@@ -43,6 +43,11 @@ class Packed:
     @classmethod
     def of_numbers(cls: type[Record], numbers: np.ndarray) -> Record:
         """From an array (..., size), without a copy."""
+        shape = numbers.shape if isinstance(numbers, np.ndarray) else None
+        if shape is None or shape[-1:] != (cls._SIZE,):
+            got = type(numbers).__name__ if shape is None else f"shape {shape}"
+            raise ValueError(f"{cls.__name__}: numbers have {got}, expected an array "
+                             f"{_arrays.shape_text(('...', cls._SIZE))}")
         record = cls.__new__(cls)
         record.numbers = numbers
         return record

@@ -28,8 +28,10 @@ class Pictured:
         from tilegrad.images import save_image
         save_image(path, self.picture(index))
 
-    def _repr_png_(self) -> bytes:
-        """The display in notebooks: up to eight images side by side."""
+    def _repr_png_(self) -> Optional[bytes]:
+        """The display in notebooks: up to eight images side by side; None: there are none."""
+        if not len(self):
+            return None
         return _encoded(np.hstack([self.picture(i) for i in range(min(len(self), 8))]))
 
 

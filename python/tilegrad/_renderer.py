@@ -220,7 +220,8 @@ class Renderer:
         single = isinstance(scenes, Scene)
         checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
         sizes = [scene._arguments["camera"].size for scene in checked]
-        size = filled_size(width, height, common_size(sizes) or (_D["width"], _D["height"]))
+        known = common_size("render", sizes) or (_D["width"], _D["height"])
+        size = filled_size(width, height, known)
         options = options_of(*size, delta, max_alpha_error, interpolation, culling, alpha_rule,
                            paper_box, paper_faces)
         for own in sizes:

@@ -99,7 +99,8 @@ class Texture:
         (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
     wrap: "repeat", "clamp" (the border extends) or "mirror"; "repeat clamp" and the like: one way
         along u, another along v.
-    filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid).
+    filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid; gradients hold
+        the level constant).
     """
 
     __slots__ = ("texels", "wrap", "filter")
@@ -282,6 +283,10 @@ class Scene:
         if name not in _FIELDS:
             raise KeyError(f"Scene has no array {name!r}, but " + ", ".join(_FIELDS))
         return self._fields.get(name)
+
+    def __contains__(self, name: Any) -> bool:
+        """Whether the scene has an array of that name."""
+        return self._fields.get(name) is not None
 
     def replace(self, **changes: Any) -> "Scene":
         """The same scene with some arguments changed: scene.replace(positions=moved). Arguments set

@@ -39,13 +39,6 @@ class ModelInfo:
     source_faces: int
 
 
-def _counting(function: str, argument: str, value: int) -> int:
-    number = _arrays.as_number(function, argument, value, int)
-    if number < 0:
-        raise ValueError(f"{function}: {argument} is {number}, must be >= 0")
-    return number
-
-
 class Truth:
     """The ground truth of a model. occupancy: (32, 32, 32) bool as [x, y, z]; points: (2500, 3)
     float32 on the surface, largest half-extent 0.45; mesh: with colours, at most 5,000 faces. The
@@ -85,10 +78,11 @@ class Dataset:
         self.models: list[ModelInfo] = [ModelInfo(**model) for model in self._files.models]
         self._indices = [i for i, model in enumerate(self.models) if split in (None, model.split)]
         self._views = self._checked_views(views)
-        self._seed = _counting("Dataset", "seed", seed)
+        self._seed = _arrays.as_count("Dataset", "seed", seed)
         self._epoch = 0
-        self._images = self._files.load_all_images(
-            self._indices, thread_count("Dataset", threads)) if in_memory else None
+        threads = thread_count("Dataset", threads)
+        self._images = self._files.load_all_images(self._indices, threads) \
+            if _arrays.as_flag("Dataset", "in_memory", in_memory) else None
 
     @property
     def classes(self) -> list[str]:
@@ -109,7 +103,7 @@ class Dataset:
     def set_epoch(self, epoch: int) -> None:
         """Selects the epoch, >= 0, and with it the views of items. Workers of a DataLoader use the
         epoch set before they started."""
-        self._epoch = _counting("set_epoch", "epoch", epoch)
+        self._epoch = _arrays.as_count("set_epoch", "epoch", epoch)
 
     def __len__(self) -> int:
         return len(self._indices)
@@ -138,8 +132,10 @@ class Dataset:
         if size < 1 or first < 0 or not len(self):
             raise ValueError(f"batches: size is {size}, first_step {first}, of {len(self)} models; "
                              f"expected size >= 1, first_step >= 0 and a model")
-        return self._batches(size, range(first, first + steps) if steps is not None
-                             else itertools.count(first))
+        if steps is None:
+            return self._batches(size, itertools.count(first))
+        end = first + _arrays.as_count("batches", "steps", steps)
+        return self._batches(size, range(first, end))
 
     def truth(self, index: int) -> Truth:
         """Occupancy, surface points and mesh of item `index`."""

@@ -60,6 +60,8 @@ def to_fragments(source: Union[Frame, Scene, Sequence[Scene]], faces_per_pixel: 
     options = layered_options("to_fragments", height, width, faces_per_pixel, blur_radius,
                               perspective_correct, clip_barycentric_coords, cull_backfaces)
     images = [image for scene in scenes for image in _face_vertices(scene, width, height)]
+    if not images:
+        raise ValueError("to_fragments: source has scenes of no image")
     counts = [len(image) for image in images]
     firsts = np.cumsum([0, *counts[:-1]]).tolist()
     return Fragments(*_core.rasterize_layers(np.concatenate(images), list(zip(firsts, counts)),
@@ -78,9 +80,11 @@ def layered_options(function: str, height: int, width: int, faces_per_pixel: int
     layers = _arrays.as_number(function, "faces_per_pixel", faces_per_pixel, int)
     if not 1 <= layers <= 1024:
         raise ValueError(f"{function}: faces_per_pixel is {layers}, expected 1..1024")
-    return _core.LayeredOptions(**size, faces_per_pixel=layers, blur_radius=blur_radius,
-                                perspective_correct=bool(perspective_correct),
-                                clip_barycentrics=bool(clip), cull_backfaces=bool(cull_backfaces))
+    return _core.LayeredOptions(
+        **size, faces_per_pixel=layers, blur_radius=blur_radius,
+        perspective_correct=_arrays.as_flag(function, "perspective_correct", perspective_correct),
+        clip_barycentrics=_arrays.as_flag(function, "clip_barycentric_coords", clip),
+        cull_backfaces=_arrays.as_flag(function, "cull_backfaces", cull_backfaces))
 
 
 def _scenes_of(source: Any, width: Optional[int],
@@ -96,7 +100,7 @@ def _scenes_of(source: Any, width: Optional[int],
     if not scenes:
         raise ValueError("to_fragments: source has no scene")
     sizes = [scene.camera.size for scene in scenes]
-    width, height = filled_size(width, height, common_size(sizes) or (None, None))
+    width, height = filled_size(width, height, common_size("to_fragments", sizes) or (None, None))
     if width is None or height is None:
         raise ValueError("to_fragments: scenes need width and height")
     for own in sizes:

@@ -19,7 +19,8 @@ def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
     """Reads an image.
 
     PNG, JPEG, BMP, TGA, PNM, SGI: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
-    float32, of its channels R, G, B, A or Y, A or its only one. NPY: the array as it is.
+    float32, of its channels R, G, B, A or Y, A or its only one. NPY: the array as it is, float16 as
+    float32.
     max_bytes: as in `load_mesh`.
     OSError, ValueError: name the file and what is wrong with it.
     """
@@ -58,6 +59,7 @@ def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
     ValueError: another ending, shape, or a number that is not finite (PNG). OSError: not written.
     """
     ending = ending_of(path)
+    planar = _arrays.as_flag("save_image", "planar", planar)
     if ending == ".npy":
         array = _arrays.plain("save_image", "image", image)
         return _tools.save_npy(name_of(path), np.ascontiguousarray(array).reshape(array.shape))
@@ -71,7 +73,9 @@ def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
 
 
 def save_layers(path: Path, layers: dict[str, Any]) -> None:
-    """Writes an EXR image of channels by name, (H, W) each: R, G, B, A, Z and others."""
+    """Writes an image of channels by name, (H, W) each: R, G, B, A, Z and others. path: .exr."""
+    if ending_of(path) != ".exr":
+        raise ValueError(f"save_layers: {os.fsdecode(path)!r} must end in .exr")
     if not layers:
         raise ValueError(f"save_layers: no layer for {os.fsdecode(path)!r}")
     sizes: dict[str, int] = {}

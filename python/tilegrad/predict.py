@@ -71,8 +71,7 @@ class Predictor:
             the object is centred and scaled as in the training images.
         ValueError: no alpha and no mask, nothing or everything opaque, sizes that differ.
         """
-        pixels, cutout = self._pixels(image, mask)
-        return _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))
+        return self._prepared("prepare", image, mask, keep_framing, self.image_size)
 
     def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False,
                 refine: Optional[int] = None) -> Mesh:
@@ -82,20 +81,24 @@ class Predictor:
         refine: gradient-descent steps that refine the prediction on the picture, 0 to 100,000;
             0: the network's output, with the faces of the template. None: 800, or 0 for a network
             that predicts texture maps."""
-        refine = self._loaded.refine_steps if refine is None else refine
+        refine = self._loaded.refine_steps if refine is None else \
+            _arrays.as_number("predict", "refine", refine, int)
         if not 0 <= refine <= 100_000:
             raise ValueError(f"predict: refine is {refine}, must be in 0..100000")
-        pixels, cutout = self._pixels(image, mask)
-        seen = _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))[None]
+        shown = ("predict", image, mask, keep_framing)
+        seen = self._prepared(*shown, self.image_size)[None]
         if refine == 0:
             return self.predict_prepared(seen)[0]
-        picture = _tools.prepare_cutout(pixels, cutout, _tools.REFINE_SIZE, bool(keep_framing))
-        return mesh_of_dict(self._model().predict_refined(seen, picture, int(refine)))
+        picture = self._prepared(*shown, _tools.REFINE_SIZE)
+        return mesh_of_dict(self._model().predict_refined(seen, picture, refine))
 
     @staticmethod
-    def _pixels(image: Any, mask: Any) -> tuple[np.ndarray, np.ndarray | None]:
-        pixels = as_bytes("prepare", "image", image)
-        return pixels, None if mask is None else as_bytes("prepare", "mask", mask)
+    def _prepared(function: str, image: Any, mask: Any, keep_framing: bool,
+                  size: int) -> np.ndarray:
+        """The picture with that side."""
+        return _tools.prepare_cutout(as_bytes(function, "image", image),
+                                     None if mask is None else as_bytes(function, "mask", mask),
+                                     size, _arrays.as_flag(function, "keep_framing", keep_framing))
 
     def predict_prepared(self, images: Any) -> list[Mesh]:
         """The meshes of N pictures (N, 4, size, size) uint8, as from `prepare` or a dataset. All

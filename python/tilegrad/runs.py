@@ -9,12 +9,12 @@ import json
 import os
 import pathlib
 import tempfile
-from typing import Any, Callable, Mapping, Optional, Sequence
+from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
-from tilegrad._arrays import name_of, Path, thread_count
+from tilegrad._arrays import as_count, as_flag, name_of, Path, thread_count
 from tilegrad._camera import Camera
 from tilegrad._camera_arguments import checked_size
 from tilegrad._progress import Progress, watched_line
@@ -67,10 +67,10 @@ class TrainResult:
 
 def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
         background: str = "auto", fov: float = 65, up: str = "", find_cameras: bool = False,
-        hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
-        material: str = "unlit", lighting: str = "none", quality: str = "",
-        out: Optional[Path] = None, resume: bool = False, callback: Optional[Callback] = None,
-        threads: int = 0, **options: Any) -> FitResult:
+        hold_out: int = 0, start: Any = None, truth: Any = None,
+        optimize: Union[str, Sequence[str]] = (), material: str = "unlit", lighting: str = "none",
+        quality: str = "", out: Optional[Path] = None, resume: bool = False,
+        callback: Optional[Callback] = None, threads: int = 0, **options: Any) -> FitResult:
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
     images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or on a plain background;
@@ -102,15 +102,15 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     ValueError, OSError: name the faulty argument or file. KeyboardInterrupt: Ctrl-C; all is
         saved.
     """
-    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
-             "find_cameras": bool(find_cameras), "fov": _degrees("fov", fov),
+    views = {"hold_out": as_count("fit", "hold_out", hold_out), "fov": _degrees("fov", fov),
+             "find_cameras": as_flag("fit", "find_cameras", find_cameras),
              **_texts(background=background, up=up), **_pictures(images, cameras, masks, model)}
     if quality and "steps" in options:
         raise ValueError("fit: quality and steps both set the number of steps; give one of them")
-    request = {"options": _words(options), "start": _mesh_dict(start), "truth": _mesh_dict(truth),
-               "optimize": [_arrays.as_text("fit", "optimize", name) for name in optimize],
+    request = {"options": _words("fit", "options", options), "start": _mesh_dict(start),
+               "truth": _mesh_dict(truth), "optimize": _optimized(optimize),
                **_texts(lighting=lighting, material=material, quality=quality),
-               "resume": bool(resume), "threads": thread_count("fit", threads)}
+               "resume": as_flag("fit", "resume", resume), "threads": thread_count("fit", threads)}
     if out is not None:
         return _fit(views, request, pathlib.Path(name_of(out)), callback, keep=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -127,9 +127,13 @@ def train(config: Path = "quick", *, data: Path, out: Path,
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
     resume, callback, threads, errors: as in `fit`; more steps: set={"schedule.steps": ...}.
     """
+    minutes = _arrays.as_number("train", "max_minutes", max_minutes, float)
+    if not minutes >= 0:
+        raise ValueError(f"train: max_minutes is {minutes}, must be >= 0")
     request = {"config": name_of(config), "data": name_of(data), "out": name_of(out),
-               "overrides": _words(set or {}), "resume": bool(resume),
-               "max_minutes": float(max_minutes), "threads": thread_count("train", threads)}
+               "overrides": _words("train", "set", set or {}),
+               "resume": as_flag("train", "resume", resume),
+               "max_minutes": minutes, "threads": thread_count("train", threads)}
     with _Listener(pathlib.Path(request["out"]), callback) as listener:
         done = _tools.train(request, listener)
     return TrainResult(pathlib.Path(request["out"]), done["finished"],
@@ -210,6 +214,11 @@ def _texts(**words: Any) -> dict[str, str]:
     return {name: _arrays.as_text("fit", name, word) for name, word in words.items()}
 
 
+def _optimized(names: Union[str, Sequence[str]]) -> list[str]:
+    return [_arrays.as_text("fit", "optimize", name)
+            for name in ((names,) if isinstance(names, str) else names)]
+
+
 def _degrees(argument: str, value: Any) -> float:
     """Of a field of view."""
     degrees = _arrays.as_number("fit", argument, value, float)
@@ -260,12 +269,12 @@ def _unit(argument: str, value: Any) -> np.ndarray:
     return array
 
 
-def _words(options: Mapping[str, Any]) -> list[str]:
+def _words(function: str, argument: str, options: Any) -> list[str]:
     def text(value: Any) -> str:
         return str(value).lower() if isinstance(value, (bool, np.bool_)) else str(value)
 
-    return [_arrays.as_text("options", "value", f"{key}={text(value)}")
-            for key, value in options.items()]
+    return [_arrays.as_text(function, argument, f"{key}={text(value)}")
+            for key, value in _arrays.as_items(function, argument, options)]
 
 
 def _mesh_dict(mesh: Any) -> Optional[dict[str, Any]]:

@@ -106,7 +106,8 @@ def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
            translation: Value = (0.0, 0.0, 0.0), fx: Value = _core.CAMERA[12],
            fy: Value = _core.CAMERA[13], cx: Value = _core.CAMERA[14],
            cy: Value = _core.CAMERA[15], near_plane: Value = _core.CAMERA[16]) -> torch.Tensor:
-    """A camera from tensors, ([N,] 17), differentiable with respect to each of them.
+    """A camera from tensors, ([N,] 17), differentiable with respect to each of them; the gradient
+    of near_plane is 0, since it only says where faces are cut.
 
     rotation: ([N,] 3, 3), for example from `rotation_6d`; translation: ([N,] 3); fx, fy, cx, cy:
     numbers or (N,). Meanings as in `tilegrad.Camera`. Numbers may replace tensors.
@@ -197,14 +198,20 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     return torch.cat([tensor.expand(*lead, -1) for tensor in flat], dim=-1)
 
 
+def _scaled(vectors: torch.Tensor) -> torch.Tensor:
+    """With a largest number of 1, so that no length overflows or vanishes; 0 stays."""
+    largest = vectors.detach().abs().amax(dim=-1, keepdim=True)
+    return vectors / largest.masked_fill(largest == 0, 1)
+
+
 @full_precision
 def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     """Rotations (..., 3, 3) from six unconstrained numbers (..., 6): their first two rows, made
     orthonormal (Y. Zhou et al.: On the continuity of rotation representations in neural networks,
     2019).
 
-    TypeError if they are not real numbers, ValueError if they are not six, or where the first three
-    are 0 or the last three parallel to them.
+    TypeError if they are not real numbers, ValueError if they are not six or not finite, or where
+    the first three are 0 or the last three parallel to them.
     """
     if not isinstance(numbers, torch.Tensor) or numbers.dtype not in (torch.float32, torch.float64):
         kind = getattr(numbers, "dtype", type(numbers).__name__)
@@ -214,7 +221,9 @@ def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     if numbers.ndim < 1 or numbers.shape[-1] != 6:
         raise ValueError(f"rotation_6d: numbers have shape {tuple(numbers.shape)}, expected "
                          f"(..., 6)")
-    first, second = numbers[..., :3], numbers[..., 3:]
+    if not torch.isfinite(numbers).all():
+        raise ValueError("rotation_6d: numbers has values that are not finite")
+    first, second = _scaled(numbers[..., :3]), _scaled(numbers[..., 3:])
     x = torch.nn.functional.normalize(first, dim=-1)
     across = second - (x * second).sum(-1, keepdim=True) * x
     y = torch.nn.functional.normalize(across, dim=-1)

@@ -40,7 +40,7 @@ def save_weights(path: Path, weights: Mapping[str, Any],
     int64. metadata: texts, safetensors only; by default those of `Weights`.
     """
     arrays = {_arrays.as_text("save_weights", "name", name): _plain(name, value)
-              for name, value in weights.items()}
+              for name, value in _arrays.as_items("save_weights", "weights", weights)}
     if metadata is None:
         metadata = getattr(weights, "metadata", {})
     if _ending("save_weights", path) == ".npz":
@@ -49,7 +49,7 @@ def save_weights(path: Path, weights: Mapping[str, Any],
         return _tools.save_npz(name_of(path), arrays)
     texts = {_arrays.as_text("save_weights", "metadata key", key):
              _arrays.as_text("save_weights", "metadata", value)
-             for key, value in metadata.items()}
+             for key, value in _arrays.as_items("save_weights", "metadata", metadata)}
     return _tools.save_safetensors(name_of(path), arrays, texts)
 
 

@@ -128,6 +128,10 @@ class Batches(unittest.TestCase):
     def test_errors(self) -> None:
         data = files.Dataset(dataset())
         self.assertRaisesRegex(ValueError, "batches: size is 0", data.batches, 0)
+        self.assertRaisesRegex(ValueError, "batches: steps is -1", data.batches, 1, steps=-1)
+        self.assertRaisesRegex(ValueError, "threads is -1", files.Dataset, dataset(), threads=-1)
+        self.assertRaisesRegex(TypeError, "in_memory must be bool", files.Dataset, dataset(),
+                               in_memory="no")
         with self.assertRaisesRegex(ValueError, "views is 5, the dataset has 4"):
             files.Dataset(dataset(), views=5)
         self.assertRaisesRegex(ValueError, "split is 'dev'", files.Dataset, dataset(), "dev")

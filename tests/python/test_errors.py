@@ -190,6 +190,25 @@ class Errors(unittest.TestCase):
         self.expect(TypeError, "Renderer: threads must be int, got 'all' (str)",
                     lambda: Renderer("all"))
 
+    def test_cameras(self):
+        cameras = Camera(fx=[1, 2])
+        for numbers, got in (([0] * 17, "list"), (np.zeros(5), "shape (5,)")):
+            self.expect(ValueError, f"Camera: numbers have {got}, expected an array (..., 17)",
+                        lambda: Camera.of_numbers(numbers))
+        self.expect(ValueError, "Camera: numbers have shape (2,), expected an array (..., 17)",
+                    lambda: cameras[:, 0])
+        self.expect(ValueError, "Camera.resize: to_width is 0, to_height 4; both must be above 0",
+                    lambda: cameras.resize(4, 4, 0, 4))
+        scenes = [patch(camera=Camera(size=(side, side))) for side in (16, 8)]
+        self.expect(ValueError, "render: the scenes' cameras are for images of 8 x 8 and 16 x 16 "
+                    "pixels; make them one size, with camera.resize",
+                    lambda: Renderer().render(scenes))
+
+    def test_names_in_a_scene(self):
+        self.assertIn("colors", patch())
+        self.assertNotIn("sh", patch())
+        self.assertNotIn(3, patch())
+
     def test_the_engine_goes_on_after_an_error(self):
         renderer, scene = Renderer(), patch()
         expected = np.array(renderer.render(scene, **IMAGE).color)

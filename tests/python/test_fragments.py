@@ -93,6 +93,12 @@ class ToFragments(unittest.TestCase):
         def fails(error, message, *arguments, **options):
             self.assertRaisesRegex(error, message, fragments.to_fragments, *arguments, **options)
 
+        size = {"width": 8, "height": 8}
+        fails(TypeError, "clip_barycentric_coords must be bool", scene, **size,
+              clip_barycentric_coords="no")
+        none = scene.replace(camera=tilegrad.Camera(translation=np.zeros((0, 3))))
+        fails(ValueError, "source has scenes of no image", none, **size)
+
         fails(TypeError, "to_fragments: source must be a Frame, a Scene or a list", 3)
         fails(ValueError, "to_fragments: source has no scene", [])
         for wrong in (-1, len(scene.positions)):
@@ -206,6 +212,8 @@ class RasterizeMeshes(unittest.TestCase):
             pytorch3d.rasterize_meshes(Meshes(corners.half()))
         with self.assertRaisesRegex(ValueError, "rasterize_meshes: width is 0"):
             pytorch3d.rasterize_meshes(Meshes(corners), (4, 0))
+        with self.assertRaisesRegex(ValueError, "rasterize_meshes: z_clip_value"):
+            pytorch3d.rasterize_meshes(Meshes(corners), z_clip_value=float("nan"))
         with self.assertRaisesRegex(ValueError, r"image_size is \(1, 2, 3\), expected pixels or"):
             pytorch3d.rasterize_meshes(Meshes(corners), (1, 2, 3))
         meshes = Meshes(corners)

@@ -144,6 +144,9 @@ class Predict(FolderTest):
                 (image, image[:9, :9, 3], "mask is 9 x 9"), (image[0, 0], None, "image has shape")):
             self.assertRaisesRegex(ValueError, message, predictor.predict, wrong, mask)
         self.assertRaisesRegex(ValueError, "refine is -1", predictor.predict, image, refine=-1)
+        for wrong in ({"refine": 1.5}, {"refine": "3"}, {"keep_framing": "no"}):
+            self.assertRaisesRegex(TypeError, f"predict: {next(iter(wrong))} must be",
+                                   predictor.predict, image, **wrong)
         with self.assertRaisesRegex(ValueError, r"predict_prepared: images has shape \(4, 8, 8\)"):
             predictor.predict_prepared(np.zeros((4, 8, 8), np.uint8))
         self.assertRaisesRegex(FileNotFoundError, "none", files.Predictor, self.folder / "none")

@@ -33,6 +33,20 @@ class Numbers(FolderTest):
         mesh.materials[1].base_color = (0, np.nan, 1, 1)
         self.assertRaisesRegex(ValueError, "blue.*base_color", mesh.scene, TRIANGLE["camera"])
 
+    def test_places_that_are_not_finite(self) -> None:
+        mesh = textured_mesh()
+        for origin, error in (([np.nan, 0, 0], ValueError), (None, TypeError)):
+            mesh.origin = origin
+            self.assertRaisesRegex(error, "save_mesh: origin", mesh.save, self.folder / "a.glb")
+        for bad in (np.nan, np.inf):
+            self.assertRaisesRegex(ValueError, "rvec", files.rotation_from_vector, (bad, 0, 0))
+
+    def test_materials_that_are_none(self) -> None:
+        mesh = textured_mesh()
+        mesh.materials = None
+        self.assertRaisesRegex(TypeError, "save_mesh: materials is None", mesh.save,
+                               self.folder / "a.glb")
+
     def test_what_the_lighting_does_not_use(self) -> None:
         nan = np.nan
         for parts, name in (({"lights": [Light(intensity=nan)]}, "lights"),
@@ -117,6 +131,21 @@ class Names(FolderTest):
             self.assertFalse(path.exists())
         with self.assertRaisesRegex(ValueError, "line break"):
             files.save_cameras(path, [files.View("a\nb", camera, 5, 5)], format="colmap")
+
+
+class Arguments(FolderTest):
+    def test_of_files(self) -> None:
+        plane = np.ones((2, 2), np.float32)
+        for error, message, call in (
+                (TypeError, "planar must be bool, got 'no'",
+                 lambda: files.save_image("a.png", plane, planar="no")),
+                (ValueError, "a.png' must end in .exr",
+                 lambda: files.save_layers("a.png", {"R": plane})),
+                (TypeError, "width must be int", lambda: files.load_cameras("a", width="a")),
+                (ValueError, "height is -1", lambda: files.load_cameras("a", height=-1)),
+                (ValueError, "below 2", lambda: files.load_image("a.png", max_bytes=2**63)),
+                (TypeError, "weights must be a mapping", lambda: files.save_weights("a.npz", [1]))):
+            self.assertRaisesRegex(error, message, call)
 
 
 class Memory(FolderTest):

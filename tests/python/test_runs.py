@@ -131,6 +131,8 @@ class Fit(FolderTest):
                 (lambda: tilegrad.fit(IMAGES[:3], CAMERAS), "cameras has shape"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, optimize=["shape"]), '"shape" cannot'),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, lighting="neon"), "expected one of"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, optimize="shape"), '"shape" cannot'),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, hold_out=-3), "hold_out is -3"),
                 (lambda: tilegrad.fit("photos", CAMERAS), "a folder has its own"),
                 (lambda: tilegrad.fit(IMAGES / 100, CAMERAS), "outside of")):
             self.assertRaisesRegex(ValueError, message, call)
@@ -308,3 +310,9 @@ class Train(unittest.TestCase):
     def test_errors(self):
         with self.assertRaisesRegex(OSError, "there are best, "):
             tilegrad.train("qick", data="x", out="y")
+        for error, message, changes in (
+                (ValueError, "max_minutes is nan", {"max_minutes": float("nan")}),
+                (ValueError, "max_minutes is -1", {"max_minutes": -1}),
+                (TypeError, "train: resume must be bool", {"resume": "no"}),
+                (TypeError, "train: set must be a mapping", {"set": ["a"]})):
+            self.assertRaisesRegex(error, message, tilegrad.train, data="x", out="y", **changes)

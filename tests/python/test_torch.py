@@ -320,6 +320,13 @@ class Errors(unittest.TestCase):
                 with self.assertRaisesRegex(ValueError, "rotation_6d"):
                     tg.rotation_6d(torch.tensor([[1, 0, 0, 0, 1, 0], numbers], dtype=dtype))
 
+    def test_six_numbers_of_any_size(self):
+        for numbers in ([1e30, 0, 0, 0, 1e-30, 0], [1e-40, 0, 0, 1, 1, 0]):
+            found = tilegrad.torch.rotation_6d(torch.tensor(numbers))
+            self.assertTrue(torch.equal(found, torch.eye(3)))
+        with self.assertRaisesRegex(ValueError, "rotation_6d: numbers .* not finite"):
+            tilegrad.torch.rotation_6d(torch.tensor([math.nan, 0, 0, 0, 1, 0]))
+
     def test_six_numbers_of_another_kind(self):
         with self.assertRaisesRegex(ValueError, r"numbers have shape \(5,\), expected \(..., 6\)"):
             tg.rotation_6d(torch.ones(5))
