@@ -46,7 +46,7 @@ Status Run(int argc, char** argv) {
   AnnotationNoise noise;
   if (argc > 6 && argv[6] != std::string_view("exact"))
     return InvalidArgument("{}: the last argument is \"exact\" or nothing", argv[6]);
-  noise.cameras = argc <= 6;
+  noise.exact_cameras = argc > 6;
   return MakeRenderedSet(job, noise, argv[3], workers, {});
 }
 

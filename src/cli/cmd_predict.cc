@@ -222,13 +222,22 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   return masked.ok() ? std::move(masked) : masked.status().Within(file);
 }
 
+// Ends of the results' names, after the image's.
+constexpr std::string_view kPredicted = "_predicted.glb";
+constexpr std::string_view kTurntable = "_turntable", kMatch = "_match", kRelit = "_relit";
+
+Path ResultPath(const Path& folder, const std::string& image, std::string_view end,
+                std::string_view ending = "") {
+  return folder / fmt::format("{}{}{}", image, end, ending);
+}
+
 // Whether `predict` itself wrote the picture: results may lie beside the images.
 bool IsResult(const Path& picture) {
   const std::string stem = picture.stem().string();
-  for (const std::string_view end : {"_turntable", "_match", "_relit"}) {
+  for (const std::string_view end : {kTurntable, kMatch, kRelit}) {
     if (!stem.ends_with(end)) continue;
     const std::string image = stem.substr(0, stem.size() - end.size());
-    if (PathExists(picture.parent_path() / (image + "_predicted.glb"))) return true;
+    if (PathExists(ResultPath(picture.parent_path(), image, kPredicted))) return true;
   }
   return false;
 }
@@ -341,11 +350,11 @@ Status Relight(const Prediction& p, std::span<const std::uint8_t> picture, const
 // Where the results of an image go.
 struct ResultFiles {
   ResultFiles(const PredictOptions& options, const std::string& stem)
-      : glb(Path(options.out) / (stem + "_predicted.glb")),
-        turntable(Path(options.out) / (stem + "_turntable.png")),
-        animation(Path(options.out) / (stem + "_turntable.webp")),
-        match(Path(options.out) / (stem + "_match.png")),
-        relit(Path(options.out) / (stem + "_relit.webp")),
+      : glb(ResultPath(options.out, stem, kPredicted)),
+        turntable(ResultPath(options.out, stem, kTurntable, ".png")),
+        animation(ResultPath(options.out, stem, kTurntable, ".webp")),
+        match(ResultPath(options.out, stem, kMatch, ".png")),
+        relit(ResultPath(options.out, stem, kRelit, ".webp")),
         all({glb, turntable, animation}) {
     if (options.relight) all.push_back(relit);
     if (options.refine > 0) all.insert(all.end(), {match, RecordOf(match)});

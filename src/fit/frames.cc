@@ -84,6 +84,15 @@ Path FindFile(const Path& folder, const std::string& name) {
   return portable;
 }
 
+// Up to a pixel of each side, to which smaller copies of images are rounded.
+Status CheckAspect(ImageSize own, ImageSize image) {
+  const double off = 1.0 * own.width * image.height - 1.0 * own.height * image.width;
+  if (std::abs(off) <= own.width + own.height + image.width + image.height) return {};
+  return InvalidArgument(
+      "it is for {} x {} pixels (\"w\", \"h\"), but the image has {} x {}, of another shape",
+      own.width, own.height, image.width, image.height);
+}
+
 }  // namespace
 
 Result<std::vector<InputFrame>> ReadTransforms(const Path& path) {
@@ -97,15 +106,6 @@ Result<std::vector<InputFrame>> ReadTransforms(const Path& path) {
     one.camera = std::move(frame);
   }
   return out;
-}
-
-// Smaller copies of images are rounded to whole pixels.
-Status CheckAspect(ImageSize own, ImageSize image) {
-  const double off = 1.0 * own.width * image.height - 1.0 * own.height * image.width;
-  if (std::abs(off) <= own.width + own.height + image.width + image.height) return {};
-  return InvalidArgument(
-      "it is for {} x {} pixels (\"w\", \"h\"), but the image has {} x {}, of another shape",
-      own.width, own.height, image.width, image.height);
 }
 
 Result<Camera> CameraOfFrame(const InputFrame& frame, ImageSize image) {

@@ -204,6 +204,23 @@ Result<int> FindModel(const Dataset& dataset, const std::string& name) {
                   dataset.folder().string(), name);
 }
 
+// Adds the frames of `test`, which are then not fitted, even if they were listed before.
+Status AddHeldOut(const Path& test, std::vector<InputFrame>* frames, FitInput* input) {
+  TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
+  const auto repeated = std::erase_if(*frames, [&](const InputFrame& frame) {
+    return std::ranges::find(more, frame.image, &InputFrame::image) != more.end();
+  });
+  if (repeated > 0) {
+    input->warnings.push_back(fmt::format("{}: {} among the images to fit, too; held out",
+                                          test.string(), Count(repeated, "image")));
+  }
+  for (InputFrame& frame : more) {
+    input->held_out.push_back(static_cast<int>(frames->size()));
+    frames->push_back(std::move(frame));
+  }
+  return {};
+}
+
 }  // namespace
 
 TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
@@ -236,23 +253,6 @@ Status FinishInput(const InputOptions& options, FitInput* input) {
   if (input->training.empty())
     return InvalidArgument("all views are held out; none is left to fit");
   if (input->posed) TurnInputUpright(options.up, input);
-  return {};
-}
-
-// Adds the frames of `test`, which are then not fitted, even if they were listed before.
-Status AddHeldOut(const Path& test, std::vector<InputFrame>* frames, FitInput* input) {
-  TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
-  const auto repeated = std::erase_if(*frames, [&](const InputFrame& frame) {
-    return std::ranges::find(more, frame.image, &InputFrame::image) != more.end();
-  });
-  if (repeated > 0) {
-    input->warnings.push_back(fmt::format("{}: {} among the images to fit, too; held out",
-                                          test.string(), Count(repeated, "image")));
-  }
-  for (InputFrame& frame : more) {
-    input->held_out.push_back(static_cast<int>(frames->size()));
-    frames->push_back(std::move(frame));
-  }
   return {};
 }
 

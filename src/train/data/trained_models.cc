@@ -14,10 +14,6 @@
 namespace tilegrad::train {
 namespace {
 
-// Of a run.
-constexpr const char* kModelList = "training_models.txt";
-constexpr const char* kListOfPhotographs = "training_photographs.txt";
-
 std::string ModelLine(const Dataset& dataset, int index) {
   const ModelInfo& model = dataset.model(index);
   return fmt::format("{:016x} {}/{}", model.geometry, dataset.ClassOf(model), model.id);
@@ -57,7 +53,7 @@ bool HasContents(const std::string& list) { return list.find("\ncamera ") != std
 }  // namespace
 
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64_t first_step) {
-  const Path file = run / kModelList;
+  const Path file = run / kTrainedModels;
   const std::string models = TextOf(dataset);
   TILEGRAD_ASSIGN(const std::string contents, ContentsOf(dataset));
   const std::string now = models + contents;
@@ -74,7 +70,7 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64
 }
 
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
-  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kModelList));
+  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kTrainedModels));
   if (!list) return {};
   std::unordered_set<std::string> trained;
   std::istringstream lines(std::string(list->bytes.begin(), list->bytes.end()));
@@ -94,14 +90,14 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
 }
 
 Status WarnWithoutList(const Path& run, const WarningSink& warn) {
-  for (const char* name : {kModelList, kListOfPhotographs}) {
+  for (const char* name : {kTrainedModels, kTrainedPhotographs}) {
     TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, name));
     if (list) return {};
   }
   warn(fmt::format(
       "{}: has no {} (of photographs: {}), which lists what it was trained on: what is taken for "
       "held out may be among it",
-      RunFolderOf(run).string(), kModelList, kListOfPhotographs));
+      RunFolderOf(run).string(), kTrainedModels, kTrainedPhotographs));
   return {};
 }
 

@@ -10,8 +10,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr const char* kCarried[] = {"thumbnails.npz", "training_models.txt",
-                                    "training_photographs.txt"};
+constexpr const char* kCarried[] = {"thumbnails.npz", kTrainedModels, kTrainedPhotographs};
 
 std::string TensorName(const std::string& file) { return "file." + file; }
 

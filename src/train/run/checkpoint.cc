@@ -154,11 +154,6 @@ std::vector<Path> ListCheckpoints(const Path& run) {
   return files.ok() ? std::move(files).value() : std::vector<Path>();
 }
 
-Result<bool> HasCheckpoints(const Path& run) {
-  TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
-  return !files.empty();
-}
-
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
   TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
   if (files.empty())

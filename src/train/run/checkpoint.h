@@ -60,8 +60,6 @@ void SetAside(const std::vector<Path>& broken);
 
 // All checkpoint files of a run, oldest first: step_NUMBER.safetensors, nothing else.
 std::vector<Path> ListCheckpoints(const Path& run);
-// Whether there are any; an error where they cannot be listed.
-Result<bool> HasCheckpoints(const Path& run);
 // Removes all but the newest `keep`.
 void PruneCheckpoints(const Path& run, std::int64_t keep);
 // Removes half-written files that a killed run left in its folder.

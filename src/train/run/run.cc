@@ -51,21 +51,6 @@ Result<std::int64_t> LastLogged(const Path& folder) {
   return log.ok() && !log->empty() ? log->back().step : std::int64_t{0};
 }
 
-// A run that was killed before its first checkpoint has none, and starts anew; one whose
-// checkpoints were removed must not, because it would write over the curves of what they held.
-Status CheckCheckpointsAreThere(const RunPlan& plan) {
-  TILEGRAD_ASSIGN(const bool there, HasCheckpoints(plan.folder));
-  if (there) return {};
-  TILEGRAD_ASSIGN(const std::int64_t last, LastLogged(plan.folder));
-  // The first is saved beside the steps, and awaited when the second is due.
-  if (last <= 2 * plan.schedule.checkpoint_every) return {};
-  return DataLoss(
-      "{}: its metrics.jsonl goes up to step {}, but its checkpoints are gone: there is nothing to "
-      "resume; start anew in another folder with --out, or in this one with --force, which removes "
-      "the run",
-      plan.folder.string(), last);
-}
-
 class Session {
  public:
   Session(const RunPlan& plan, RunWork* work, nn::Context& context)
@@ -105,7 +90,7 @@ class Session {
  private:
   Status Restore() {
     auto found = LoadNewestCheckpoint(context_, plan_.folder);
-    if (found.status().code() == StatusCode::kNotFound) return WarnOfForgottenSteps();
+    if (found.status().code() == StatusCode::kNotFound) return StartAnew();
     if (!found.ok()) return found.status();
     for (const auto& warning : found->warnings) {
       if (plan_.warn) plan_.warn("skipped: " + warning);
@@ -130,11 +115,23 @@ class Session {
     return {};
   }
 
-  Status WarnOfForgottenSteps() const {
+  // A run that was killed before its first checkpoint has none; one whose checkpoints were removed
+  // must not write over the curves of what they held.
+  Status StartAnew() const {
     TILEGRAD_ASSIGN(const std::int64_t last, LastLogged(plan_.folder));
-    if (last > 0 && plan_.warn)
+    const std::string folder = plan_.folder.string();
+    // The first checkpoint is saved beside the steps, and awaited when the second is due.
+    if (last > 2 * plan_.schedule.checkpoint_every) {
+      return DataLoss(
+          "{}: its metrics.jsonl goes up to step {}, but its checkpoints are gone: there is "
+          "nothing to resume; start anew in another folder with --out, or in this one with "
+          "--force, which removes the run",
+          folder, last);
+    }
+    if (last > 0 && plan_.warn) {
       plan_.warn(fmt::format("{}: has no checkpoint: starts anew, although its log went to step {}",
-                             plan_.folder.string(), last));
+                             folder, last));
+    }
     return {};
   }
 
@@ -260,10 +257,8 @@ Status CheckExistingRun(const Path& folder, ExistingRun existing) {
 
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
   TILEGRAD_TRY(CheckExistingRun(plan.folder, plan.existing));
-  if (plan.existing != ExistingRun::kContinue) return {};
-  TILEGRAD_TRY(CheckCheckpointsAreThere(plan));
   const Path settings = plan.folder / kTrainSettings;
-  if (!PathExists(settings)) return {};
+  if (plan.existing != ExistingRun::kContinue || !PathExists(settings)) return {};
   TILEGRAD_ASSIGN(const std::string before, ReadText(settings));
   return CheckSettings(plan, work, before, settings, plan.may_differ);
 }

@@ -16,6 +16,9 @@ namespace tilegrad::train {
 
 inline constexpr const char* kTrainSettings = "config.toml";  // of a training
 inline constexpr const char* kFitSettings = "fit.txt";        // of a fit
+// What a run was trained on, a line each.
+inline constexpr const char* kTrainedModels = "training_models.txt";
+inline constexpr const char* kTrainedPhotographs = "training_photographs.txt";
 
 // Files BEGINNING00001500ENDING of a folder by their step; ignores others. An error if the folder
 // exists and cannot be read.

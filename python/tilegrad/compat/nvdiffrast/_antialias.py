@@ -69,7 +69,7 @@ def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: t
     _tensors.check_floats("antialias", "color", color, ("N", "H", "W", "C"), sizes)
     _tensors.check_floats("antialias", "rast", rast, ("N", "H", "W", 4), sizes, color)
     _tensors.vertex_rows("antialias", "pos", pos, 4, sizes, color)
-    _tensors.check_positions("antialias", "pos", pos, pos.shape)
+    _tensors.check_finite("antialias", "pos", pos, pos.shape)
     triangles = _tensors.triangles("antialias", tri)
     if topology_hash is None:
         topology_hash = TopologyHash(triangles)

@@ -360,7 +360,7 @@ Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, 
       set.photographs.push_back(std::move(photo));
   }
   TILEGRAD_TRY(FindCameras(&set));
-  TellTruth(!noise.cameras, &set);
+  TellTruth(noise.exact_cameras, &set);
   return WriteCmrLayout(folder, set);
 }
 

@@ -27,17 +27,17 @@ struct RenderedSetJob {
 
 // The noise of the training part's annotations.
 struct AnnotationNoise {
-  double mask = 2.0;       // pixels by which a mask's outline wanders, one standard deviation
-  double keypoint = 0.02;  // standard deviation of each coordinate, relative to the box
-  double hidden = 0.1;     // share of visible keypoints that are not annotated
-  bool cameras = true;     // found from the keypoints; else exact, as the test part's
+  double mask = 2.0;           // pixels by which a mask's outline wanders, one standard deviation
+  double keypoint = 0.02;      // standard deviation of each coordinate, relative to the box
+  double hidden = 0.1;         // share of visible keypoints that are not annotated
+  bool exact_cameras = false;  // as the test part's; else found from the keypoints
 };
 
 // Writes <folder>/Images and <folder>/{data,sfm}. An object is a model stretched by up to 15 %
 // along each axis, seen from all around at elevations from -5 to 30 degrees by a pinhole camera a
 // few lengths away, under the light of datasets. Keypoints: FindExtremePoints, visible where
-// nothing hides them. Cameras of the training part: factorization.h, from the keypoints alone, if
-// noise.cameras. The same for any number of workers.
+// nothing hides them. Cameras of the training part: factorization.h, from the keypoints alone,
+// unless noise.exact_cameras. The same for any number of workers.
 Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
                        const Workers& workers, const Watch& watch);
 

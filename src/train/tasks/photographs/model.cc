@@ -23,6 +23,7 @@
 #include "train/ranks/process_group.h"
 #include "train/run/carried_files.h"
 #include "train/run/checkpoint.h"
+#include "train/run/run_files.h"
 #include "train/tasks/photographs/step.h"
 
 namespace tilegrad::train {
@@ -85,8 +86,6 @@ constexpr double kPckThreshold = 0.1;
 enum CameraMethod { kCeiling, kMean, kOwnCamera, kOurs, kMethods };
 constexpr const char* kRowNames[kMethods] = {"true keypoints", "mean shape", "predicted camera",
                                              "tilegrad"};
-
-constexpr const char* kPhotographList = "training_photographs.txt";  // of a run
 
 std::string TextOf(const PhotographSet& set) {
   std::string text;
@@ -379,15 +378,15 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
 
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
   const std::string now = TextOf(set);
-  if (is_new) return WriteTextAtomic(run / kPhotographList, now);
-  TILEGRAD_ASSIGN(const std::string then, ReadText(run / kPhotographList));
+  if (is_new) return WriteTextAtomic(run / kTrainedPhotographs, now);
+  TILEGRAD_ASSIGN(const std::string then, ReadText(run / kTrainedPhotographs));
   if (then == now) return {};
   return InvalidArgument("{}: this run was started with other photographs than those of {}: {}",
                          run.string(), set.folder.string(), FirstDifference(then, now));
 }
 
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
-  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kPhotographList));
+  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kTrainedPhotographs));
   if (!list) return {};
   std::set<std::string> trained;
   std::istringstream lines(std::string(list->bytes.begin(), list->bytes.end()));

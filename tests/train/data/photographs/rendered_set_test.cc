@@ -67,8 +67,8 @@ TEST_F(RenderedSet, TestCamerasAreExact) {
 // The training part's, on demand: all objects are stretched boxes here, so that keypoints of the
 // mean shape are near those of each.
 TEST_F(RenderedSet, TrainingCamerasAreExactIfWished) {
-  const auto error = [&](const std::string& name, bool found) {
-    EXPECT_TRUE(Make(name, 2, {.cameras = found}).ok());
+  const auto error = [&](const std::string& name, bool exact) {
+    EXPECT_TRUE(Make(name, 2, {.exact_cameras = exact}).ok());
     const auto set = Ok(OpenPhotographs(folder_ / name));
     double sum = 0;
     for (const int i : set->Select(Split::kTrain)) {
@@ -79,7 +79,7 @@ TEST_F(RenderedSet, TrainingCamerasAreExactIfWished) {
     }
     return sum / static_cast<double>(set->Select(Split::kTrain).size());
   };
-  const double found = error("found", true), exact = error("exact", false);
+  const double found = error("found", false), exact = error("exact", true);
   EXPECT_LT(exact, 0.08);
   EXPECT_NE(exact, found);
 }

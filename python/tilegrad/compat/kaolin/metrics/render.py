@@ -4,7 +4,7 @@
 import torch
 
 from tilegrad._dense import full_precision
-from tilegrad.compat._tensors import check_positions, check_tensor
+from tilegrad.compat._tensors import check_finite, check_tensor
 from tilegrad.compat.kaolin._missing import missing_from
 
 __getattr__ = missing_from(__name__)
@@ -25,7 +25,7 @@ def mask_iou(lhs_mask: torch.Tensor, rhs_mask: torch.Tensor) -> torch.Tensor:
     dtype = torch.promote_types(torch.promote_types(lhs_mask.dtype, rhs_mask.dtype), torch.float32)
     lhs_mask, rhs_mask = lhs_mask.to(dtype), rhs_mask.to(dtype)
     for argument, mask in (("lhs_mask", lhs_mask), ("rhs_mask", rhs_mask)):
-        check_positions("mask_iou", argument, mask, mask.shape)
+        check_finite("mask_iou", argument, mask, mask.shape)
     both = lhs_mask * rhs_mask
     union = (lhs_mask + rhs_mask - both).sum(dim=(1, 2)) + _EPS
     return 1 - (both.sum(dim=(1, 2)) / union).mean()

@@ -8,7 +8,7 @@ from typing import Any, Optional
 import torch
 
 from tilegrad._dense import first_derivative_only, full_precision
-from tilegrad.compat._tensors import (check_floats, check_not_empty, check_positions, check_whole,
+from tilegrad.compat._tensors import (check_floats, check_not_empty, check_finite, check_whole,
                                       surface_tools, threads, to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.ops.mesh import index_vertices_by_faces, uniform_laplacian
@@ -67,7 +67,7 @@ def _gap(points: torch.Tensor, corners: torch.Tensor, weights: torch.Tensor) -> 
 def average_edge_length(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
     """The mean length of each face's three edges. vertices: [B,V,3]. faces: [F,3] int64. Returns
     [B,F]."""
-    check_positions("average_edge_length", "vertices", vertices, ("B", "V", 3))
+    check_finite("average_edge_length", "vertices", vertices, ("B", "V", 3))
     check_whole("average_edge_length", "faces", faces, ("F", 3))
     corners = index_vertices_by_faces(vertices, faces)
     return (corners - corners.roll(-1, dims=2)).norm(dim=-1).mean(dim=-1)
@@ -76,5 +76,5 @@ def average_edge_length(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Te
 @full_precision
 def uniform_laplacian_smoothing(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
     """Each vertex moved to the mean of its neighbours. vertices: [B,V,3]. faces: [F,3] int64."""
-    check_positions("uniform_laplacian_smoothing", "vertices", vertices, ("B", "V", 3))
+    check_finite("uniform_laplacian_smoothing", "vertices", vertices, ("B", "V", 3))
     return uniform_laplacian(vertices.shape[1], faces).to(vertices.dtype) @ vertices + vertices

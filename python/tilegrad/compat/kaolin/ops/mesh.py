@@ -7,7 +7,7 @@ from typing import Optional, Union
 
 import torch
 
-from tilegrad.compat._tensors import (check_floats, check_positions, check_tensor, check_whole,
+from tilegrad.compat._tensors import (check_floats, check_finite, check_tensor, check_whole,
                                       surface_tools, threads, to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.ops._subdivide import subdivide_trianglemesh
@@ -51,7 +51,7 @@ def face_normals(face_vertices: torch.Tensor, unit: bool = False) -> torch.Tenso
 
 def face_areas(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
     """vertices: [B,V,3]. faces: [F,3] int64. Returns [B,F]."""
-    check_positions("face_areas", "vertices", vertices, ("B", "V", 3))
+    check_finite("face_areas", "vertices", vertices, ("B", "V", 3))
     check_whole("face_areas", "faces", faces, ("F", 3))
     return face_normals(index_vertices_by_faces(vertices, faces)).norm(dim=2) / 2
 
@@ -113,7 +113,7 @@ def sample_points(vertices: torch.Tensor, faces: torch.Tensor, num_samples: int,
         [B,num_samples,C] if given. ValueError: a mesh has no area.
     """
     name = "sample_points"
-    check_positions(name, "vertices", vertices, ("B", "V", 3))
+    check_finite(name, "vertices", vertices, ("B", "V", 3))
     check_whole(name, "faces", faces, ("F", 3))
     areas = face_areas(vertices, faces) if areas is None else areas
     check_floats(name, "areas", areas, (len(vertices), len(faces)))
@@ -146,8 +146,8 @@ def check_sign(verts: torch.Tensor, faces: torch.Tensor, points: torch.Tensor,
     hash_resolution: of Kaolin's search; accepted, and without meaning here. Returns [B,P] bool."""
     del hash_resolution
     sizes: dict = {}
-    check_positions("check_sign", "verts", verts, ("B", "V", 3), sizes)
-    check_positions("check_sign", "points", points, ("B", "P", 3), sizes, verts)
+    check_finite("check_sign", "verts", verts, ("B", "V", 3), sizes)
+    check_finite("check_sign", "points", points, ("B", "P", 3), sizes, verts)
     corners = index_vertices_by_faces(verts, faces)
     return torch.from_numpy(surface_tools().enclosed(to_numpy(points), to_numpy(corners),
                                                      threads()))

@@ -10,7 +10,7 @@ import torch
 from tilegrad._arrays import check_choice
 from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin import ops
-from tilegrad.compat._tensors import check_floats, check_positions
+from tilegrad.compat._tensors import check_floats, check_finite
 from tilegrad.compat.kaolin.render import camera
 
 _MODES = ("nearest", "bilinear", "bicubic")
@@ -33,7 +33,7 @@ def prepare_vertices(vertices: torch.Tensor, faces: torch.Tensor, camera_proj: t
     name = "prepare_vertices"
     if isinstance(vertices, torch.Tensor) and vertices.ndim == 2:
         vertices = vertices[None]
-    check_positions(name, "vertices", vertices, ("B", "V", 3))
+    check_finite(name, "vertices", vertices, ("B", "V", 3))
     if camera_transform is None:
         if camera_rot is None or camera_trans is None:
             raise ValueError(f"{name}: expected camera_transform, or camera_rot and camera_trans")
