@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -114,13 +115,10 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
 }
 
-// Faces whose 1/depth varies by more than this factor are set up in double. The image shows the far
-// end of such a face (clipped at the near plane, say), where perspective attributes are the
-// quotient of two small differences of large terms: float rounding at the near end would swamp
-// them. In either mode the near corners have small weights there but move far on the screen with
-// their vertices, so the gradient needs the digits of small weights.
-inline constexpr float kSteepDepth = 8;
-
+// Such faces are set up in double: perspective attributes of their far end are the quotient of two
+// small differences of large terms, which float rounding at the near end would swamp. In either
+// mode the near corners have small weights there but move far on the screen with their vertices, so
+// the gradient needs the digits of small weights.
 HWY_INLINE hn::Mask<LaneTag> IsSteep(const Lane (&inverse_depth)[3]) {
   const auto& z = inverse_depth;
   const auto least = hn::Min(hn::Min(z[0], z[1]), z[2]);
@@ -136,7 +134,7 @@ struct WeightLanes {
 inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, Lane origin_y,
                                          hn::Mask<LaneTag> steep, Plane out[3]) {
   const LaneTag d;
-  HWY_ALIGN float x[3][kMostFaceLanes], y[3][kMostFaceLanes];
+  HWY_ALIGN float x[3][kMostFaceLanes], y[3][kMostFaceLanes], z[3][kMostFaceLanes];
   HWY_ALIGN float origin[2][kMostFaceLanes];
   HWY_ALIGN WeightLanes lanes[3];
   hn::Store(origin_x, d, origin[0]);
@@ -144,6 +142,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   for (int k = 0; k < 3; ++k) {
     hn::Store(c.x[k], d, x[k]);
     hn::Store(c.y[k], d, y[k]);
+    hn::Store(c.inverse_depth[k], d, z[k]);
     hn::Store(out[k].value, d, lanes[k].value);
     hn::Store(out[k].dx, d, lanes[k].dx);
     hn::Store(out[k].dy, d, lanes[k].dy);
@@ -152,10 +151,12 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   hn::StoreMaskBits(d, steep, bits);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
-    // Thin, or too large to decide in float: stays flat.
-    if (lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0) continue;
-    const FacePlane<double> plane = MakeFacePlane(
-        ScreenCorners<double>{{x[0][i], x[1][i], x[2][i]}, {y[0][i], y[1][i], y[2][i]}, {0, 0, 0}});
+    // Flat, since thin or too large to decide in float: stays so where Q would be 0.
+    const auto [least, largest] = std::minmax({z[0][i], z[1][i], z[2][i]});
+    const bool is_flat = lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0;
+    if (is_flat && least < largest * 1e-30f) continue;
+    const FacePlane<double> plane = MakeFacePlane(ScreenCorners<double>{
+        {x[0][i], x[1][i], x[2][i]}, {y[0][i], y[1][i], y[2][i]}, {z[0][i], z[1][i], z[2][i]}});
     const auto value = plane.Weights(origin[0][i], origin[1][i]);
     for (std::size_t k = 0; k < 3; ++k) {
       lanes[k].value[i] = static_cast<float>(value[k]);

@@ -18,6 +18,11 @@
 
 namespace tilegrad::raster {
 
+// Faces whose 1/depth varies by more than this factor lose digits at their far end, which is the
+// one that the image shows, unless planes start there (FarCorner) and are set up in double: a face
+// clipped at the near plane, say.
+inline constexpr float kSteepDepth = 8;
+
 // b_k(p) = base[k] + gx[k] * (p.x - x0) + gy[k] * (p.y - y0); the three sum to 1. A face thinner
 // than kFlatHeight has constant weights 1/3 (conventions.h, rule 8).
 template <class T>
@@ -73,24 +78,43 @@ ScreenCorners<double> Wide(const ScreenCorners<T>& c) {
   return out;
 }
 
+// The corner where a plane over the face starts: of a steep face the farthest, of others the first.
+// Its near corners lie up to far / near times farther out, and weigh that much more in 1/depth.
 template <class T>
-FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
-  const T x1 = c.x[1] - c.x[0], y1 = c.y[1] - c.y[0];
-  const T x2 = c.x[2] - c.x[0], y2 = c.y[2] - c.y[0];
+int FarCorner(const ScreenCorners<T>& c) {
+  int least = 0, largest = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (RealPart(c.z[k]) < RealPart(c.z[least])) least = k;
+    if (RealPart(c.z[k]) > RealPart(c.z[largest])) largest = k;
+  }
+  return RealPart(c.z[least] * T(kSteepDepth)) < RealPart(c.z[largest]) ? least : 0;
+}
+
+template <class T>
+FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c, int k0) {
+  const int k1 = (k0 + 1) % 3, k2 = (k0 + 2) % 3;
+  const T x1 = c.x[k1] - c.x[k0], y1 = c.y[k1] - c.y[k0];
+  const T x2 = c.x[k2] - c.x[k0], y2 = c.y[k2] - c.y[k0];
   const T area = x1 * y2 - x2 * y1;
-  FacePlane<T> plane{c.x[0], c.y[0], {T(1), T(0), T(0)}, {}, {}};
+  FacePlane<T> plane{c.x[k0], c.y[k0], {T(0), T(0), T(0)}, {}, {}};
+  plane.base[k0] = T(1);
   if (IsSliver(RealPart(x1), RealPart(y1), RealPart(x2), RealPart(y2), RealPart(area))) {
     for (T& weight : plane.base) weight = T(1) / T(3);
     return plane;
   }
   const T inverse = T(1) / area;
-  plane.gx[1] = y2 * inverse;
-  plane.gy[1] = -x2 * inverse;
-  plane.gx[2] = -y1 * inverse;
-  plane.gy[2] = x1 * inverse;
-  plane.gx[0] = -(plane.gx[1] + plane.gx[2]);
-  plane.gy[0] = -(plane.gy[1] + plane.gy[2]);
+  plane.gx[k1] = y2 * inverse;
+  plane.gy[k1] = -x2 * inverse;
+  plane.gx[k2] = -y1 * inverse;
+  plane.gy[k2] = x1 * inverse;
+  plane.gx[k0] = -(plane.gx[k1] + plane.gx[k2]);
+  plane.gy[k0] = -(plane.gy[k1] + plane.gy[k2]);
   return plane;
+}
+
+template <class T>
+FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
+  return MakeFacePlane(c, FarCorner(c));
 }
 
 template <class T>
@@ -135,8 +159,8 @@ ScreenCorners<T> OrderedCorners(const ScreenMeshT<T>& mesh, std::size_t face) {
 }
 
 template <class T>
-DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
-  const FacePlane<T> weights = MakeFacePlane(c);
+DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c, int start) {
+  const FacePlane<T> weights = MakeFacePlane(c, start);
   DepthPlane<T> plane{weights.x0, weights.y0, T(0), T(0), T(0), c.z[0], c.z[0]};
   for (int k = 0; k < 3; ++k) {
     plane.base += weights.base[k] * c.z[k];
@@ -153,7 +177,8 @@ DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
 // to a corner out there, float would leave few digits.
 inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face) {
   const ScreenCorners<float> c = OrderedCorners(mesh, face);
-  const DepthPlane<double> plane = NarrowDepthPlane(Wide(c));
+  const ScreenCorners<double> wide = Wide(c);
+  const DepthPlane<double> plane = NarrowDepthPlane(wide, FarCorner(wide));
   const auto middle = [](const float(&v)[3], int size) {
     const auto [low, high] = std::minmax({v[0], v[1], v[2]});
     const auto end = static_cast<float>(size);
@@ -163,7 +188,7 @@ inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face
   const double base = plane.base + (plane.gx * (x0 - plane.x0) + plane.gy * (y0 - plane.y0));
   constexpr double kMost = std::numeric_limits<float>::max();
   for (const double v : {base, plane.gx, plane.gy}) {
-    if (!(std::abs(v) <= kMost)) return NarrowDepthPlane(c);
+    if (!(std::abs(v) <= kMost)) return NarrowDepthPlane(c, 0);
   }
   return {x0,
           y0,
@@ -177,9 +202,12 @@ inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face
 template <class T>
 DepthPlane<T> MakeDepthPlane(const ScreenMeshT<T>& mesh, std::size_t face) {
   if constexpr (std::is_same_v<T, float>) {
-    if (!SnapFace(mesh, face).small()) return WideDepthPlane(mesh, face);
+    return SnapFace(mesh, face).small() ? NarrowDepthPlane(OrderedCorners(mesh, face), 0)
+                                        : WideDepthPlane(mesh, face);
+  } else {
+    const ScreenCorners<T> c = OrderedCorners(mesh, face);
+    return NarrowDepthPlane(c, FarCorner(c));
   }
-  return NarrowDepthPlane(OrderedCorners(mesh, face));
 }
 
 }  // namespace tilegrad::raster

@@ -254,8 +254,10 @@ void Truth::CheckForeground(const Images& frame, std::size_t pixel, Comparison* 
     const std::size_t i = c * e_.pixels() + pixel;
     check("attributes", i, frame.attributes[i], values[c]);
   }
+  // Kernels keep two weights of a piece, and the first one is what these leave of 1.
+  const Bounded *w = at.weights.w, pieces[3] = {Bounded(1.0) - (w[1] + w[2]), w[1], w[2]};
   Bounded source[3];
-  raster::SourceWeights<Bounded>(prepared_.mesh, scene_.faces, at.face, at.weights.w, source);
+  raster::SourceWeights<Bounded>(prepared_.mesh, scene_.faces, at.face, pieces, source);
   for (std::size_t k = 0; k < 2; ++k) {
     const std::size_t i = k * e_.pixels() + pixel;
     check("barycentrics", i, frame.barycentrics[i], source[k + 1]);
@@ -267,9 +269,15 @@ void Truth::CheckForeground(const Images& frame, std::size_t pixel, Comparison* 
   const Bounded z =
       plane.base + (plane.gx * (column + 0.5 - plane.x0) + plane.gy * (row + 0.5 - plane.y0));
   const double kept = std::clamp(z.value, plane.low.value, plane.high.value);
+  // Kernels start in the image or at the leftmost corner of a small face, 30 pixels away at most:
+  // the plane is as large there as it is away.
+  const double steps = 4 * kBits *
+                       (std::abs(plane.gx.value) * (e_.options.width + 30) +
+                        std::abs(plane.gy.value) * (e_.options.height + 30));
   const auto d = static_cast<double>(frame.depth[pixel]);
   comparison->Require(d > 0 && std::isfinite(d), fmt::format("depth[{}] is {}", pixel, d));
-  check("inverse depth", pixel, static_cast<float>(1 / d), {kept, z.error + 2 * kBits * kept});
+  check("inverse depth", pixel, static_cast<float>(1 / d),
+        {kept, z.error + steps + 2 * kBits * kept});
 }
 
 void Truth::CheckForward(const Images& frame, Comparison* comparison) {

@@ -2,6 +2,10 @@
 // The task of section 5.1: sizes of objects, the oracle, and the configurations of the paper.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/config.h"
@@ -223,7 +227,9 @@ class PaperConfigs : public TempFolderTest {
   }
   void RunOn(const Path& data, const std::string& name, std::vector<std::string> settings = {}) {
     auto config = Ok(FindConfig(name));
-    settings.insert(settings.end(), {"schedule.steps=20", "schedule.batch=2"});
+    const auto portions = std::min<std::int64_t>(2, config->schedule.portions);
+    settings.insert(settings.end(), {"schedule.steps=20", "schedule.batch=2",
+                                     "schedule.portions=" + std::to_string(portions)});
     Ok(OverrideFields(settings, config->Fields()));
     TrainJob job;
     job.config = std::move(*config);
