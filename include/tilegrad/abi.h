@@ -4,4 +4,8 @@
 // another version fails to link instead of misbehaving.
 #pragma once
 
+#if __cplusplus <= 201703L
+#error "tilegrad needs C++20: compile with -std=c++20"
+#endif
+
 #define TILEGRAD_API [[gnu::visibility("default")]]  // exported by the shared library

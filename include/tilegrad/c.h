@@ -34,7 +34,8 @@ typedef struct tilegrad_frame tilegrad_frame;       /* images, and what backward
 
 TILEGRAD_C_API const char* tilegrad_version(void); /* "0.2.0" */
 
-/* threads: 0: one per core; 1: only the caller's. Returns NULL if out of memory. */
+/* threads: 0..1024; 0: one per core; 1: only the caller's. Other numbers are an error of the first
+ * call. Returns NULL if out of memory. */
 TILEGRAD_C_API tilegrad_renderer* tilegrad_renderer_create(int32_t threads);
 TILEGRAD_C_API void tilegrad_renderer_destroy(tilegrad_renderer* renderer);
 TILEGRAD_C_API tilegrad_frame* tilegrad_frame_create(void);
@@ -82,7 +83,7 @@ typedef struct tilegrad_scene {
   size_t face_count;
   tilegrad_camera camera;
   tilegrad_stream colors, uvs, normals, attributes; /* C = 3, 2, 3, channels */
-  int32_t channels;
+  int32_t channels;                                 /* > 0 with attributes */
   const tilegrad_texture* textures;
   size_t texture_count;
   const tilegrad_surface* surfaces; /* NULL: the default, with texture 0 if there is one */

@@ -18,10 +18,11 @@ namespace tilegrad::inline v0 {
 // Axes as OpenGL: x right, y up, looking along -z; depth = -p_cam.z. Pixel (column j, row i) has
 // its centre at (j + 0.5, i + 0.5); row 0 is the top.
 //
-// Render checks that the numbers are finite and in range, but not that `rotation` is a rotation: it
-// applies any 3 x 3 matrix unchanged. A reflection (determinant -1, or one negative focal length)
-// renders the mirror image and swaps front and back faces; with scale or shear, specular light
-// still takes -rotation^T * translation as the eye, which is then not the point with p_cam = 0.
+// Render checks that the numbers are finite and in range (focal lengths: to 1e30), but not that
+// `rotation` is a rotation: it applies any 3 x 3 matrix unchanged. A reflection (determinant -1, or
+// one negative focal length) renders the mirror image and swaps front and back faces; with scale or
+// shear, specular light still takes -rotation^T * translation as the eye, which is then not the
+// point with p_cam = 0.
 template <class T>
 struct CameraT {
   T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
@@ -46,12 +47,22 @@ struct Orbit {
   double distance = 1;                // world units, > 0
 };
 
+// A camera at `eye` looking at `target`, in world coordinates. `up` need not be perpendicular to
+// the view; if it is parallel, another axis replaces it.
+struct LookAt {
+  double eye[3] = {0, 0, 1};
+  double target[3] = {0, 0, 0};
+  double up[3] = {0, 1, 0};
+};
+
 // In the functions below T is float or double; both compute in double.
 
 // MakeCamera<double>(lens, orbit) is for SceneT<double>. Errors: a number that is not finite or out
-// of range.
+// of range, an eye at its target.
 template <class T = float>
 TILEGRAD_API Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit);
+template <class T = float>
+TILEGRAD_API Result<CameraT<T>> MakeLookAtCamera(const Lens& lens, const LookAt& look_at);
 
 // A camera as free parameters for an optimiser. The rotation is six numbers, the first two rows of
 // a matrix before orthonormalisation (Y. Zhou et al.: On the continuity of rotation representations

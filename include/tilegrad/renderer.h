@@ -32,7 +32,7 @@ struct ImagesT {
   std::span<const T> alpha;                // [N,H,W]; 1 where there is a face
   std::span<const T> attributes;           // [N,C,H,W]; 0 at background pixels
   std::span<const T> depth;                // [N,H,W] world units; +infinity at background pixels
-  std::span<const T> normals;              // [N,3,H,W] used for shading: unit, world
+  std::span<const T> normals;              // [N,3,H,W] used for shading: world; unit, or 0
   std::span<const T> uv;                   // [N,2,H,W]
   std::span<const T> barycentrics;         // [N,2,H,W] weights of corners 1 and 2 of the face
   double alpha_error_bound = 0;  // no alpha differs from equation 6 by more; infinite with
@@ -80,7 +80,8 @@ struct RendererOptions {
 
 enum class GradientMode {
   kOverwrite,
-  kAdd,  // adds to what the arrays hold; leaves them unchanged on an error
+  kAdd,  // adds to what arrays and records hold (a Camera, Surface or Light does not start as 0);
+         // leaves them unchanged on an error
 };
 
 // Owns threads, which start with the first call, and scratch memory, which it reuses: rendering

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/array_checks.h"
+#include "base/default_floats.h"
 #include "base/parallel.h"
 #include "bindings/arrays.h"
 
@@ -92,6 +93,7 @@ void Run(const char* function, const Work& work) {
   Status status;
   {
     const py::gil_scoped_release released;
+    const DefaultFloats floats;
     if constexpr (std::is_void_v<decltype(work())>) {
       work();
     } else {

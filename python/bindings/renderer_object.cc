@@ -147,6 +147,41 @@ class GradientRecord {
   std::vector<LightT<T>> lights_;
 };
 
+template <class T>
+using Records = std::vector<std::shared_ptr<SceneRecord<T>>>;
+
+// The record that has image `image` of a batch.
+template <class T>
+const SceneRecord<T>* RecordOf(const Records<T>& records, std::size_t image) {
+  for (const auto& record : records) {
+    if (image < record->count()) return record.get();
+    image -= record->count();
+  }
+  return nullptr;
+}
+
+// "options.width" is the argument `width` in Python, "d_frame.color" is `color`, and in "scene 0:
+// faces[7] is 9" faces have two axes.
+template <class T>
+std::string InPython(const std::string& message, const Records<T>& records) {
+  for (const std::string_view prefix : {"options.", "d_frame."}) {
+    if (message.starts_with(prefix)) return message.substr(prefix.size());
+  }
+  std::size_t image = 0, number = 0;
+  char name[24];
+  int end = 0;
+  std::sscanf(message.c_str(), "scene %zu: %23[a-z_][%zu]%n", &image, name, &number, &end);
+  const SceneRecord<T>* const record = end > 0 ? RecordOf(records, image) : nullptr;
+  if (record == nullptr) return message;
+  return fmt::format("scene {}: {}{}", image, record->PlaceOf(name, number), message.substr(end));
+}
+
+template <class T>
+void ThrowInPython(const char* function, const Status& status, const Records<T>& records) {
+  if (status.ok()) return ThrowIfError(status);
+  ThrowIfError(Status(status.code(), InPython(status.message(), records)).Within(function));
+}
+
 }  // namespace
 
 // The session copied from another process is neither used nor destroyed: a thread that does not
@@ -186,44 +221,6 @@ Status RendererObject::Run(const Call& call) {
   const std::lock_guard lock(mine.mutex);
   return call(EngineOf<T>(mine));
 }
-
-namespace {
-
-template <class T>
-using Records = std::vector<std::shared_ptr<SceneRecord<T>>>;
-
-// The record that has image `image` of a batch.
-template <class T>
-const SceneRecord<T>* RecordOf(const Records<T>& records, std::size_t image) {
-  for (const auto& record : records) {
-    if (image < record->count()) return record.get();
-    image -= record->count();
-  }
-  return nullptr;
-}
-
-// "options.width" is the argument `width` in Python, and in "scene 0: faces[7] is 9" faces have two
-// axes.
-template <class T>
-std::string InPython(const std::string& message, const Records<T>& records) {
-  constexpr std::string_view prefix = "options.";
-  if (message.starts_with(prefix)) return message.substr(prefix.size());
-  std::size_t image = 0, number = 0;
-  char name[24];
-  int end = 0;
-  std::sscanf(message.c_str(), "scene %zu: %23[a-z_][%zu]%n", &image, name, &number, &end);
-  const SceneRecord<T>* const record = end > 0 ? RecordOf(records, image) : nullptr;
-  if (record == nullptr) return message;
-  return fmt::format("scene {}: {}{}", image, record->PlaceOf(name, number), message.substr(end));
-}
-
-template <class T>
-void ThrowInPython(const char* function, const Status& status, const Records<T>& records) {
-  if (status.ok()) return ThrowIfError(status);
-  ThrowIfError(Status(status.code(), InPython(status.message(), records)).Within(function));
-}
-
-}  // namespace
 
 template <class T>
 std::unique_ptr<FrameObject<T>> RendererObject::Render(

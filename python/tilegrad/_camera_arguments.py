@@ -74,6 +74,8 @@ def checked_size(function: str, own: Optional[Size], size: Size) -> Size:
     """`size`; ValueError, naming `function`, if `own`, a camera's, is known and different."""
     if own in (None, size):
         return size
+    for name, pixels in zip(("width", "height"), size):
+        _arrays.as_pixels(function, name, pixels)
     here, there = ("{} x {}".format(*numbers) for numbers in (own, size))
     call = ", ".join(map(str, (*own, *size)))
     raise ValueError(f"{function}: the camera is for images of {here} pixels, not {there}: give "

@@ -109,8 +109,11 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
                 const tilegrad_frame_gradients* d_frame, const tilegrad_scene_gradients* d_scenes,
                 std::size_t count, bool add) {
   if (frame == nullptr) return InvalidArgument("frame is NULL");
+  if (frame->frame.images().width == 0) {
+    return InvalidArgument("the frame holds nothing: Render into it first");
+  }
   if (count != frame->count) {
-    return InvalidArgument("{} scenes, but {} d_scenes", frame->count, count);
+    return InvalidArgument("count is {}, expected {}: one per scene", count, frame->count);
   }
   tilegrad_frame_gradients d_images = {};
   TILEGRAD_TRY(api::ReadSized("d_frame", d_frame, &d_images));

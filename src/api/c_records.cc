@@ -112,7 +112,8 @@ Status CheckCounts(const tilegrad_scene& scene) {
     if (a.given || a.count == 0) continue;
     return InvalidArgument("{} is NULL, but {} is {}", a.array, a.name, a.count);
   }
-  return {};
+  if (scene.attributes.values == nullptr || scene.channels != 0 || scene.vertices == 0) return {};
+  return InvalidArgument("attributes is given, but channels is 0");
 }
 
 Status CheckRequested(const tilegrad_scene_gradients& wanted, const Scene& scene) {

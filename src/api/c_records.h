@@ -55,7 +55,8 @@ Status ReadEntry(const char* name, const S* array, std::size_t n, S* to) {
 
 // Rejects counts that were negative before conversion to size_t.
 Status CheckCount(const char* name, std::size_t count);
-// A NULL array has no entries: a count > 0 means that the caller forgot the pointer.
+// A NULL array has no entries: a count > 0 means that the caller forgot the pointer, and attributes
+// without `channels` that the caller forgot these.
 Status CheckCounts(const tilegrad_scene& scene);
 // An error for a gradient of an array that the scene does not have: it would be left unwritten.
 Status CheckRequested(const tilegrad_scene_gradients& wanted, const Scene& scene);

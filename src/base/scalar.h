@@ -17,3 +17,8 @@ T RealPart(const std::complex<T>& x) {
 }
 
 }  // namespace tilegrad
+
+// Compiles a function template, defined above in the same .cc, for float and for double.
+#define TILEGRAD_INSTANTIATE(Function)                \
+  template decltype(Function<float>) Function<float>; \
+  template decltype(Function<double>) Function<double>

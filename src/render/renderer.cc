@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/default_floats.h"
 #include "base/error.h"
 #include "render/engine.h"
 
@@ -115,8 +116,7 @@ Status RendererT<T>::Start() {
   constexpr int kMostThreads = 1024;
   if (impl_ == nullptr) {
     if (options_.threads < 0 || options_.threads > kMostThreads) {
-      return InvalidArgument("options.threads is {}, must be in 0..{}", options_.threads,
-                             kMostThreads);
+      return InvalidArgument("threads is {}, must be in 0..{}", options_.threads, kMostThreads);
     }
     impl_ = std::make_unique<Impl>(options_.threads);
   }
@@ -129,6 +129,7 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
                             const Outputs& outputs, FrameT<T>* frame) {
   if (frame == nullptr) return Guarded([] { return InvalidArgument("frame is null"); });
   frame->images_ = {};
+  const DefaultFloats floats;
   Status status = Guarded([&]() -> Status {
     TILEGRAD_TRY(Start());
     if (frame->impl_ == nullptr) frame->impl_ = std::make_unique<typename FrameT<T>::Impl>();
@@ -145,6 +146,7 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
 template <class T>
 Status RendererT<T>::Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
                               std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode) {
+  const DefaultFloats floats;
   Status status = Guarded([&]() -> Status {
     if (frame.images_.width == 0) {
       return InvalidArgument("the frame holds nothing: Render into it first");

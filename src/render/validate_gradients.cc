@@ -6,6 +6,7 @@
 
 #include "base/array_checks.h"
 #include "base/error.h"
+#include "base/scalar.h"
 #include "raster/conventions.h"
 #include "render/scene_fields.h"
 #include "render/validate.h"
@@ -44,7 +45,8 @@ Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& 
                         const FrameImagesT<T>& frame, const FrameGradientsT<T>& d_frame,
                         std::span<const SceneGradientsT<T>> d_scenes) {
   if (d_scenes.size() != scenes.size()) {
-    return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
+    return InvalidArgument("d_scenes has {} entries, expected {}: one per scene", d_scenes.size(),
+                           scenes.size());
   }
   Status status;
   ForEachImage(
@@ -56,11 +58,11 @@ Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& 
       },
       d_frame);
   TILEGRAD_TRY(status);
-  if (!d_frame.alpha.empty()) {
-    TILEGRAD_TRY(CheckSize("frame.alpha", frame.alpha.size(), d_frame.alpha.size()));
+  if (!d_frame.alpha.empty() && frame.alpha.empty()) {
+    return InvalidArgument("d_frame.alpha is given, but alpha was not rendered");
   }
   if (!d_frame.depth.empty() && options.interpolation != Interpolation::kPerspective) {
-    return InvalidArgument("d_frame.depth needs options.interpolation kPerspective");
+    return InvalidArgument("d_frame.depth needs perspective interpolation");
   }
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     status = CheckGradients(scenes[n], d_scenes[n]);
@@ -97,14 +99,8 @@ Status ValidateImages(const FrameImages& frame) {
   return {};
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                       \
-  template Status ValidateBackward(std::span<const SceneT<T>>, const RenderOptions&,  \
-                                   const FrameImagesT<T>&, const FrameGradientsT<T>&, \
-                                   std::span<const SceneGradientsT<T>>);              \
-  template Status ValidateCotangents(const FrameGradientsT<T>&, std::span<const std::int32_t>);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(ValidateBackward);
+TILEGRAD_INSTANTIATE(ValidateCotangents);
 
 namespace {
 

@@ -17,6 +17,7 @@ namespace tilegrad {
 namespace {
 
 constexpr float kMostShininess = 1e6f;
+constexpr float kMostFocalLength = 1e30f;  // pixels; weights of corners overflow from 1e34 on
 
 template <class Enum>
 Status CheckEnumerator(const char* name, Enum value, Enum last) {
@@ -55,12 +56,7 @@ Status CheckEnumerators(const SceneT<T>& scene) {
   TILEGRAD_TRY(status);
   TILEGRAD_TRY(
       CheckEnumerator("shading.lighting", scene.shading.lighting, Lighting::kSphericalHarmonics));
-  TILEGRAD_TRY(CheckEnumerator("shading.normals", scene.shading.normals, Normals::kGiven));
-  for (const TextureT<T>& texture : scene.textures) {
-    TILEGRAD_TRY(CheckEnumerator("texture.wrap", texture.wrap, Wrap::kMirrorClamp));
-    TILEGRAD_TRY(CheckEnumerator("texture.filter", texture.filter, Filter::kTrilinear));
-  }
-  return {};
+  return CheckEnumerator("shading.normals", scene.shading.normals, Normals::kGiven);
 }
 
 template <class T>
@@ -96,8 +92,9 @@ Status CheckCamera(const Camera& camera) {
   TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
   using Number = std::pair<const char*, float>;
   for (const auto& [name, value] : {Number("fx", camera.fx), Number("fy", camera.fy)}) {
-    if (value != 0 && std::isfinite(value)) continue;
-    return InvalidArgument("camera.{} is {}, must be finite and not 0", name, value);
+    if (value != 0 && std::abs(value) <= kMostFocalLength) continue;
+    return InvalidArgument("camera.{} is {}, must be in -{}..{} and not 0", name, value,
+                           kMostFocalLength, kMostFocalLength);
   }
   if (!(camera.near_plane > 0) || !std::isfinite(camera.near_plane)) {
     return InvalidArgument("camera.near_plane is {}, must be finite and > 0", camera.near_plane);
@@ -178,16 +175,20 @@ Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known, bool* large)
   TILEGRAD_TRY(status);
   if (scene.shading.normals != Normals::kGiven || !scene.normals.values.empty()) return {};
   if (StreamOf(scene, Varying::kNormal).rows(scene) == 0) return {};
-  return InvalidArgument("model.normals is kGiven, but the scene has no normals");
+  return InvalidArgument("shading.normals is kGiven, but the scene has no normals");
+}
+
+Status CheckTextureSide(const char* name, int texels) {
+  if (texels >= 1 && texels <= shade::kMaxTextureSize) return {};
+  return InvalidArgument("{} is {}, must be in 1..{} texels", name, texels, shade::kMaxTextureSize);
 }
 
 template <class T>
 Status CheckTexture(const TextureT<T>& texture, std::span<const T> known, bool* large) {
-  const auto in_range = [](int n) { return n >= 1 && n <= shade::kMaxTextureSize; };
-  if (!in_range(texture.width) || !in_range(texture.height)) {
-    return InvalidArgument("is {} x {} texels; each side must be in 1..{}", texture.width,
-                           texture.height, shade::kMaxTextureSize);
-  }
+  TILEGRAD_TRY(CheckEnumerator("wrap", texture.wrap, Wrap::kMirrorClamp));
+  TILEGRAD_TRY(CheckEnumerator("filter", texture.filter, Filter::kTrilinear));
+  TILEGRAD_TRY(CheckTextureSide("width", texture.width));
+  TILEGRAD_TRY(CheckTextureSide("height", texture.height));
   TILEGRAD_TRY(CheckSize(
       "texels", texture.texels.size(),
       3 * static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height)));
@@ -211,7 +212,7 @@ Status CheckTextures(const SceneT<T>& scene, const SceneT<T>& known, bool* large
 template <class T>
 Status CheckSurface(const SurfaceT<T>& surface, std::size_t textures, bool* large) {
   if (surface.texture < -1 || surface.texture >= static_cast<int>(textures)) {
-    return InvalidArgument("texture is {}, but the scene has {}", surface.texture, textures);
+    return InvalidArgument("texture is {}, outside of [-1, {})", surface.texture, textures);
   }
   if (!(surface.shininess >= 0 && surface.shininess <= T(kMostShininess))) {
     return InvalidArgument("shininess is {}, must be in [0, {}]", InFloat(surface.shininess),
@@ -244,6 +245,12 @@ Status CheckSurfaces(const SceneT<T>& scene, bool* large) {
 }
 
 template <class T>
+Status CheckLight(const LightT<T>& light, bool* large) {
+  TILEGRAD_TRY(CheckValues<T>("direction", light.direction, large));
+  return CheckValues("intensity", std::span(&light.intensity, 1), large);
+}
+
+template <class T>
 Status CheckLights(const SceneT<T>& scene, bool* large) {
   const bool harmonics = scene.shading.lighting == Lighting::kSphericalHarmonics;
   if (harmonics || !scene.sh.empty()) TILEGRAD_TRY(CheckSize("sh", scene.sh.size(), 9));
@@ -253,9 +260,7 @@ Status CheckLights(const SceneT<T>& scene, bool* large) {
                            scene.lights.empty() ? "neither" : "both");
   }
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
-    const LightT<T>& l = scene.lights[i];
-    const T numbers[4] = {l.direction[0], l.direction[1], l.direction[2], l.intensity};
-    const Status status = CheckValues<T>("direction, intensity", numbers, large);
+    const Status status = CheckLight(scene.lights[i], large);
     if (!status.ok()) return status.Within(fmt::format("lights[{}]", i));
   }
   return CheckDirections(scene);

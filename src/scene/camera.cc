@@ -7,8 +7,11 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 #include "base/error.h"
+#include "base/scalar.h"
 #include "scene/camera_conventions.h"
 #include "scene/camera_ref.h"
 
@@ -68,12 +71,8 @@ CameraT<T> LookAtCamera(const Lens& lens, const T eye[3], const T target[3], con
   return CameraCast<T>(LookAlong(lens, e, e - t, glm::dvec3(up[0], up[1], up[2])));
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                            \
-  template CameraT<T> OrbitCamera<T>(const Lens&, double, double, double); \
-  template CameraT<T> LookAtCamera(const Lens&, const T[3], const T[3], const T[3]);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(OrbitCamera);
+TILEGRAD_INSTANTIATE(LookAtCamera);
 
 }  // namespace tilegrad
 
@@ -125,6 +124,30 @@ Status CheckOrbit(const Orbit& orbit) {
   return InvalidArgument("orbit.distance is {}, must be finite and > 0", orbit.distance);
 }
 
+Status CheckLookAt(const LookAt& look_at) {
+  const std::pair<const char*, std::span<const double, 3>> points[] = {
+      {"eye", look_at.eye}, {"target", look_at.target}, {"up", look_at.up}};
+  for (const auto& [name, p] : points) {
+    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])) continue;
+    return InvalidArgument("look_at.{} is {} {} {}, must be finite", name, p[0], p[1], p[2]);
+  }
+  if (!std::equal(std::begin(look_at.eye), std::end(look_at.eye), look_at.target)) return {};
+  return InvalidArgument(
+      "look_at.eye and look_at.target coincide: the viewing direction is undefined");
+}
+
+// Errors: a number that T cannot hold.
+template <class T>
+Result<CameraT<T>> InRange(const Camera64& camera) {
+  const auto& t = camera.translation;
+  for (const double x : {camera.fx, t[0], t[1], t[2]}) {
+    if (std::abs(x) <= std::numeric_limits<T>::max()) continue;
+    return InvalidArgument("the camera has focal length {} and translation {} {} {}: out of range",
+                           camera.fx, t[0], t[1], t[2]);
+  }
+  return CameraCast<T>(camera);
+}
+
 template <class T>
 Result<CameraT<T>> MakeChecked(const CameraParametersT<T>& parameters, T near_plane) {
   const auto p = ParametersCast<double>(parameters);
@@ -145,7 +168,16 @@ Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit) {
   return GuardedResult<CameraT<T>>([&]() -> Result<CameraT<T>> {
     TILEGRAD_TRY(CheckLens(lens));
     TILEGRAD_TRY(CheckOrbit(orbit));
-    return OrbitCamera<T>(lens, orbit.azimuth, orbit.elevation, orbit.distance);
+    return InRange<T>(OrbitCamera<double>(lens, orbit.azimuth, orbit.elevation, orbit.distance));
+  });
+}
+
+template <class T>
+Result<CameraT<T>> MakeLookAtCamera(const Lens& lens, const LookAt& look_at) {
+  return GuardedResult<CameraT<T>>([&]() -> Result<CameraT<T>> {
+    TILEGRAD_TRY(CheckLens(lens));
+    TILEGRAD_TRY(CheckLookAt(look_at));
+    return InRange<T>(LookAtCamera(lens, look_at.eye, look_at.target, look_at.up));
   });
 }
 
@@ -176,13 +208,10 @@ CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
   return ParametersCast<T>(d);
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                     \
-  template Result<CameraT<T>> MakeCamera<T>(const Lens&, const Orbit&);             \
-  template CameraParametersT<T> ParametersOf(const CameraT<T>&);                    \
-  template Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>&, T); \
-  template CameraParametersT<T> PullBack(const CameraParametersT<T>&, const CameraT<T>&);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(MakeCamera);
+TILEGRAD_INSTANTIATE(MakeLookAtCamera);
+TILEGRAD_INSTANTIATE(ParametersOf);
+TILEGRAD_INSTANTIATE(CameraFromParameters);
+TILEGRAD_INSTANTIATE(PullBack);
 
 }  // namespace tilegrad::inline v0

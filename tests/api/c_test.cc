@@ -5,6 +5,7 @@
 #include <tilegrad/c.h>
 
 #include <algorithm>
+#include <cfenv>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -162,6 +163,33 @@ TEST_F(CApi, GivesTheBitsOfTheCppInterface) {
   ExpectGradients(d_cpp, g);
 }
 
+// Threads of the renderer may round otherwise than the caller's: then the bits would say which of
+// them computed what.
+TEST_F(CApi, TheCallersRoundingIsNotTheRenderers) {
+  const auto step = [&] {
+    tilegrad_images images;
+    tilegrad_images_init(&images);
+    tilegrad_frame_gradients d_frame;
+    tilegrad_frame_gradients_init(&d_frame);
+    tilegrad_scene_gradients d_scene;
+    tilegrad_scene_gradients_init(&d_scene);
+    std::vector<float> out(48);
+    d_scene.positions = out.data();
+    EXPECT_EQ(Render(), TILEGRAD_OK);
+    EXPECT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+    d_frame.color = images.color;
+    EXPECT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK);
+    out.insert(out.end(), images.color, images.color + 3 * 34 * 29);
+    return out;
+  };
+  const std::vector<float> expected = step();
+  std::fesetround(FE_UPWARD);
+  const std::vector<float> upward = step();
+  EXPECT_EQ(std::fegetround(), FE_UPWARD);
+  std::fesetround(FE_TONEAREST);
+  EXPECT_EQ(upward, expected);
+}
+
 // A caller of an older version has shorter structs: what it does not know has its default. Here
 // options end behind `delta`, and scenes behind `camera`.
 TEST_F(CApi, ShorterStructsHaveDefaultsForTheRest) {
@@ -220,7 +248,8 @@ TEST_F(CApi, WrongScenesAreNamed) {
        "vertices is 9223372036854775807, must be in 0..2147483647"},
       {[](CScene& of) { of.scene.lighting = 4; }, "shading.lighting is 4, must be in 0..3"},
       {[](CScene& of) { of.texture.width = -5; },
-       "textures[0]: is -5 x 4 texels; each side must be in 1..16384"},
+       "textures[0]: width is -5, must be in 1..16384 texels"},
+      {[](CScene& of) { of.scene.channels = 0; }, "attributes is given, but channels is 0"},
       {[](CScene& of) { of.scene.struct_size = 0; },
        "scene.struct_size is 0: call tilegrad_..._init first"}};
   for (const auto& [spoil, message] : cases) {
@@ -317,8 +346,13 @@ TEST_F(CApi, SaysWhatIsWrong) {
   EXPECT_EQ(images.alpha, nullptr);
   tilegrad_frame_gradients d_frame;
   tilegrad_frame_gradients_init(&d_frame);
-  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, nullptr, 0, 0)),
+  tilegrad_scene_gradients d_scene;
+  tilegrad_scene_gradients_init(&d_scene);
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
             "the frame holds nothing: Render into it first");
+  ASSERT_EQ(Render(), TILEGRAD_OK);
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 2, 0)),
+            "count is 2, expected 1: one per scene");
 }
 
 // The C interface under random calls (c_caller.h). What must not happen shows under valgrind or the

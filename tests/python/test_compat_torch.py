@@ -113,6 +113,18 @@ class Determinism(unittest.TestCase):
             torch.set_num_threads(count)
             self.assertTrue(self.bits() == self.expected, count)
 
+    def test_small_numbers_where_the_caller_flushes_them(self):
+        pos, tri = wavy_grid(2, dtype=torch.float32)
+        attr = torch.full((1, 9, 1), 1e-39)
+        rast, _ = dr.rasterize(dr.RasterizeCpuContext(), pos, tri, (64, 64))
+        expected = dr.interpolate(attr, rast, tri)[0].numpy().view(np.int32)
+        self.assertTrue(expected.any())
+        if not torch.set_flush_denormal(True):
+            self.skipTest("torch cannot flush on this processor")
+        self.addCleanup(torch.set_flush_denormal, False)
+        got = dr.interpolate(attr, rast, tri)[0].numpy().view(np.int32)
+        np.testing.assert_array_equal(got, expected)
+
     def test_python_threads_and_a_fork(self):
         with concurrent.futures.ThreadPoolExecutor(4) as pool:
             for got in [pool.submit(self.bits) for _ in range(4)]:

@@ -166,8 +166,8 @@ class Errors(unittest.TestCase):
         ]
         for error, text, call in cases:
             self.expect(error, text, call)
-        with self.assertRaisesRegex(ValueError, "^backward: .*alpha"):
-            renderer.backward(frame, alpha=np.full_like(ones, np.nan))
+        self.expect(ValueError, "backward: alpha[0] is nan",
+                    lambda: renderer.backward(frame, alpha=np.full_like(ones, np.nan)))
         small = renderer.backward(renderer.render(patch(positions=np.zeros((16, 3), "f4")),
                                                   **IMAGE), alpha=ones)
         small._arrays["positions"] = np.zeros((4, 3), np.float32)
@@ -203,6 +203,8 @@ class Errors(unittest.TestCase):
         self.expect(ValueError, "render: the scenes' cameras are for images of 8 x 8 and 16 x 16 "
                     "pixels; make them one size, with camera.resize",
                     lambda: Renderer().render(scenes))
+        self.expect(ValueError, "render: width is 0, expected 1..16384 pixels",
+                    lambda: Renderer().render(scenes[0], width=0, height=16))
 
     def test_names_in_a_scene(self):
         self.assertIn("colors", patch())
@@ -331,22 +333,6 @@ class Refused(unittest.TestCase):
             take(*args, **kwargs)
         self.assertEqual(str(caught.exception), text)
 
-    def test_shapes(self):
-        self.expect(ValueError, "render: positions has shape (4, 2), expected (V, 3)",
-                    np.zeros((4, 2)))
-        self.expect(ValueError, "render: positions has shape (3,), expected (V, 3) with V = 7",
-                    np.zeros(3), sizes={"V": 7})
-        self.expect(ValueError, "render: positions has shape (2,), expected (3,)",
-                    np.zeros(2), shape=(3,))
-
-    def test_dtypes(self):
-        self.expect(TypeError, "render: positions has dtype complex64, expected float32",
-                    np.zeros((4, 3), np.complex64))
-        self.expect(TypeError, "render: positions has dtype float32, expected int32",
-                    np.zeros((4, 3), np.float32), np.int32)
-        self.expect(ValueError, "render: positions has values of 0 to 2147483648, out of int32's "
-                    "range", np.array([[0, 1, 2**31]]), np.int32)
-
     def test_no_arrays(self):
         for value in (None, "abc", {"a": 1}, [[1, 2, 3], [4, 5]], object()):
             with self.assertRaisesRegex(TypeError, "^render: positions is not an array of numbers"):
@@ -378,9 +364,3 @@ class Refused(unittest.TestCase):
     def test_other_devices(self):
         with self.assertRaisesRegex(TypeError, "^render: positions is on another device"):
             take(DlpackOnly(np.zeros((4, 3), np.float32), device=2))
-
-    def test_choices(self):
-        with self.assertRaises(ValueError) as caught:
-            _arrays.check_choice("render", "culling", "front", ("none", "back"))
-        self.assertEqual(str(caught.exception),
-                         "render: culling is 'front', expected one of 'none', 'back'")
