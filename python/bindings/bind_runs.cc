@@ -172,6 +172,7 @@ py::dict Fit(const py::dict& views, const py::dict& request, const py::object& l
   for (const std::string& warning : job.input.warnings) WarnUser("fit: " + warning);
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
+  if (!outcome->doubt.empty()) WarnUser("fit: " + outcome->doubt);
   py::dict out(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,
                py::arg("seconds") = outcome->seconds,
                py::arg("training") = ScoresToDict(outcome->training),
@@ -201,24 +202,7 @@ py::dict Train(const py::dict& request, const py::object& listener) {
                   py::arg("seconds") = outcome->seconds);
 }
 
-}  // namespace
-
-void BindRuns(py::module_& m) {
-  m.def("fit", &Fit, "listener(stage, done, total) is called at each step; returning True stops.");
-  m.def("train", &Train, "As fit.");
-  m.def(
-      "config_names",
-      [] {
-        Words names;
-        for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
-        return names;
-      },
-      "Names of the built-in configurations.");
-}
-
 // A trained network that predicts meshes from images.
-
-namespace {
 
 // image: [height,width,4], or any number of channels with a mask [height,width,channels].
 py::array PrepareCutout(const py::object& image, const py::object& mask, int size,
@@ -291,6 +275,19 @@ class Model {
 };
 
 }  // namespace
+
+void BindRuns(py::module_& m) {
+  m.def("fit", &Fit, "listener(stage, done, total) is called at each step; returning True stops.");
+  m.def("train", &Train, "As fit.");
+  m.def(
+      "config_names",
+      [] {
+        Words names;
+        for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
+        return names;
+      },
+      "Names of the built-in configurations.");
+}
 
 void BindPredictor(py::module_& m) {
   m.def("prepare_cutout", &PrepareCutout, "(4, size, size) uint8 of a picture (H, W, C) uint8.");

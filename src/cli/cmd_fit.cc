@@ -107,6 +107,7 @@ void PrintDiagnosis(const std::vector<train::Finding>& findings) {
 void PrintFit(const train::FitOutcome& outcome, const train::FitInput& input, const Path& out,
               std::int64_t steps) {
   PrintFindings(outcome.findings, false);
+  if (!outcome.doubt.empty()) PrintNote("tilegrad: warning: {}\n", outcome.doubt);
   PrintOutcome(outcome, input, out, steps);
   PrintJson(outcome, out);
 }
@@ -275,6 +276,8 @@ Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, Out
   if (!options.pictures.masks.empty()) guard->AddInput(options.pictures.masks);
   TILEGRAD_ASSIGN(job.input, ReadInput(options, watch));
   PrintWarnings(job.input, 0);
+  if (job.input.posed && options.given.contains("--fov"))
+    PrintNote("tilegrad: warning: --fov has no effect, since the images have cameras\n");
   if (!options.light_direction.empty()) TurnLight(job.input.up, &job.config);
   static const std::map<std::string, train::StartShape> shapes = {
       {"auto", train::StartShape::kAuto},

@@ -2,6 +2,7 @@
 // tilegrad render: pictures of mesh files.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -271,11 +272,13 @@ class RenderRun {
     const std::string stem = stems_.Take(Path(file).stem().string());
     TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
     const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
+    empty_.clear();
     for (std::size_t i = 0; i < views->size(); ++i) {
       if (stop_) return Cancelled("stopped after {}", Count(rendered_.size(), "file"));
       line_.Sink()({"rendering " + stem, i, views->size(), ""});
       TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
     }
+    if (!empty_.empty()) WarnOfEmptyImages(file, views->size());
     return {};
   }
 
@@ -294,6 +297,13 @@ class RenderRun {
   }
 
  private:
+  void WarnOfEmptyImages(const std::string& file, std::size_t images) const {
+    PrintNote(
+        "tilegrad: warning: {}: is not seen in {} of {}, such as {}: it may lie behind the camera "
+        "or outside the image, show its back (--cull none), or have no area\n",
+        file, empty_.size(), Count(images, "image"), empty_.front());
+  }
+
   Result<std::vector<PictureName>> NamePictures(const std::string& stem,
                                                 const std::vector<io::CameraView>& views) {
     const bool single = settings_.meshes.size() == 1 && views.size() == 1;
@@ -338,6 +348,9 @@ class RenderRun {
     TILEGRAD_TRY(RequestOutputs(settings_.file, &request));
     Picture picture;
     TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
+    const auto transparent = [](float alpha) { return alpha == 0; };
+    if (!picture.alpha.empty() && std::ranges::all_of(picture.alpha, transparent))
+      empty_.push_back(name.stem.filename().string() + name.ending);
     TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
     const std::vector<Path> files = PictureFiles(settings_.file, name);
     rendered_.insert(rendered_.end(), files.begin(), files.end());
@@ -374,6 +387,7 @@ class RenderRun {
   UniqueNames stems_;
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
   glm::dvec3 origin_{0};               // of the mesh that is rendered, see LoadedMesh
+  std::vector<std::string> empty_;     // images that show nothing of that mesh
   std::set<Path> files_;               // that are written, or will be
   std::vector<Path> rendered_;         // those that are there
 };

@@ -10,9 +10,13 @@ namespace tilegrad::cli {
 
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
   // OneOf has checked it.
-  return {hold_out,     *train::BackgroundNamed(pictures.background),
-          pictures.fov, pictures.up,
-          watch,        pictures.masks};
+  return {.hold_out = hold_out,
+          .background = *train::BackgroundNamed(pictures.background),
+          .fov = pictures.fov,
+          .up = pictures.up,
+          .watch = watch,
+          .masks = pictures.masks,
+          .image_side = pictures.image_side};
 }
 
 void AddPictureOptions(Command* command, FitPictures* o) {
@@ -39,6 +43,10 @@ void AddPictureOptions(Command* command, FitPictures* o) {
   command->Add("--fov", &o->fov,
                "field of view of images without cameras along their longer side, degrees",
                {Range{5, 150}});
+  command->Add("--image-side", &o->image_side,
+               "images with more pixels along their longer side are reduced by a whole factor; 0: "
+               "none are",
+               {NotNegative()});
 }
 
 Status TryColmap(const FitPictures& pictures, const Path& folder, const Watch& watch) {

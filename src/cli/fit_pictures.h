@@ -13,6 +13,7 @@ namespace tilegrad::cli {
 struct FitPictures {
   std::string background = "auto", masks;
   double fov = train::kUsualFov;
+  int image_side = train::kUsualSide;
   bool find_cameras = false;
   std::optional<UpAxis> up;
 };

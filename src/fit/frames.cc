@@ -26,20 +26,23 @@ std::vector<Path> TakePictures(const Path& folder, std::vector<std::string>* war
   return std::move(found.read);
 }
 
-// The folder that the names of images count from.
-Result<Path> FindImages(const Path& model, const std::string& first) {
+// The folder that the names of images count from: some may have been deleted.
+Result<Path> FindImages(const Path& model, const std::vector<io::CameraView>& views) {
   std::error_code error;
   Path folder = std::filesystem::absolute(model, error).lexically_normal();
   if (folder.filename().empty()) folder = folder.parent_path();  // "model/"
   for (int up = 0; up < 4; ++up, folder = folder.parent_path()) {
     for (const Path& candidate : {folder / "images", folder}) {
-      if (IsFile(candidate / first)) return candidate;
+      const auto holds = [&](const io::CameraView& view) {
+        return IsFile(candidate / io::PortablePath(view.name));
+      };
+      if (std::ranges::any_of(views, holds)) return candidate;
     }
   }
   return NotFound(
       "{}: image {} not found, neither beside the model or above it nor in a folder \"images\" "
       "there",
-      model.string(), first);
+      model.string(), views[0].name);
 }
 
 // The mask of `images`/`name`, in a folder "masks" or "mask" beside `images` or in it; empty where
@@ -53,6 +56,12 @@ Path MaskFileOf(const Path& images, const Path& name) {
     }
   }
   return {};
+}
+
+// That of an image in a folder "images", as other projects have them.
+Path MaskBeside(const Path& image) {
+  const Path images = image.parent_path();
+  return images.filename() == "images" ? MaskFileOf(images, image.filename()) : Path();
 }
 
 io::NerfFrame FrameOf(const io::CameraView& view) {
@@ -97,12 +106,15 @@ Status CheckAspect(ImageSize own, ImageSize image) {
 
 Result<std::vector<InputFrame>> ReadTransforms(const Path& path) {
   TILEGRAD_ASSIGN(auto frames, io::ReadNerfFrames(path));
+  const auto names_mask = [](const io::NerfFrame& frame) { return frame.mask.has_value(); };
+  const bool named = std::ranges::any_of(frames, names_mask);
   std::vector<InputFrame> out;
   for (io::NerfFrame& frame : frames) {
     if (!frame.image) return DataLoss("{}: needs \"file_path\", a string", frame.place);
     InputFrame& one = out.emplace_back();
     one.image = FindFile(path.parent_path(), *frame.image);
     if (frame.mask) one.mask = FindFile(path.parent_path(), *frame.mask);
+    if (!named) one.mask = MaskBeside(one.image);
     one.camera = std::move(frame);
   }
   return out;
@@ -168,7 +180,7 @@ Status CheckCamera(const Camera64& camera, ImageSize image) {
 
 Result<std::vector<InputFrame>> ReadColmapFrames(const Path& model) {
   TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model, {.bent = true}));
-  TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
+  TILEGRAD_ASSIGN(const Path images, FindImages(model, views));
   std::vector<InputFrame> frames;
   for (const io::CameraView& view : views) {
     const std::string name = io::PortablePath(view.name);

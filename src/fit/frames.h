@@ -19,7 +19,8 @@ struct InputFrame {
 };
 
 // Of transforms.json. file_path and mask_path count from its folder; an ending of ".png" may be
-// left out. Errors name the file, the frame and the key.
+// left out. If no frame has mask_path, images in a folder "images" have their masks as below.
+// Errors name the file, the frame and the key.
 Result<std::vector<InputFrame>> ReadTransforms(const Path& file);
 
 // The camera of a frame whose image has this size, without what its lens bends. An error says why

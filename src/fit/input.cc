@@ -59,15 +59,40 @@ bool TakesMasks(Background background) {
   return background == Background::kAuto || background == Background::kMask;
 }
 
+// An image and its camera, reduced.
+struct ReducedView {
+  Camera camera;
+  TargetImages image;
+};
+
+ReducedView ReduceView(int factor, const Camera& camera, const ViewPixels& view) {
+  const auto [width, height] = view.size;
+  TargetImages image{width,
+                     height,
+                     {view.color.begin(), view.color.end()},
+                     {view.alpha.begin(), view.alpha.end()}};
+  if (factor == 1) return {camera, std::move(image)};
+  image = Reduce(image, factor);
+  const ImageSize used{factor * image.width, factor * image.height};
+  const Camera64 small =
+      ResizeCamera(CameraCast<double>(camera), used, {image.width, image.height});
+  return {CameraCast<float>(small), std::move(image)};
+}
+
 // Grows an input by one view after the other.
 class InputReader {
  public:
-  explicit InputReader(FitInput* input) : input_(*input) {}
+  InputReader(int most_side, FitInput* input) : most_side_(most_side), input_(*input) {}
 
   Status AddAll(std::span<const InputFrame> frames, const Watch& watch) {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       TILEGRAD_TRY(watch.At({"reading images", i, frames.size(), ""}));
       TILEGRAD_TRY(Add(frames[i]));
+    }
+    if (factor_ > 1) {
+      input_.notes.push_back(fmt::format(
+          "images: {} times smaller a side, {} x {} pixels (--image-side 0 takes them as they are)",
+          factor_, input_.images.width, input_.images.height));
     }
     return watch.At({"reading images", frames.size(), frames.size(), ""});
   }
@@ -86,34 +111,59 @@ class InputReader {
   };
 
   Status Add(const InputFrame& frame) {
+    TILEGRAD_TRY(CheckFiles(frame));
     TILEGRAD_ASSIGN(ViewPixels view, LoadViewPixels(frame));
     TILEGRAD_TRY(CheckSize(frame, view));
     const auto camera = CameraOfFrame(frame, view.size);
     if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
-    input_.cameras.push_back(Undistort(frame.camera.lens, *camera, &view));
+    const Camera straight = Undistort(frame.camera.lens, *camera, &view);
+    const ReducedView reduced = ReduceView(factor_, straight, view);
+    const TargetImages& image = reduced.image;
+    input_.cameras.push_back(reduced.camera);
     input_.names.push_back(frame.image.filename().string());
-    input_.images.color.insert(input_.images.color.end(), view.color.begin(), view.color.end());
-    input_.images.alpha.insert(input_.images.alpha.end(), view.alpha.begin(), view.alpha.end());
+    input_.images.color.insert(input_.images.color.end(), image.color.begin(), image.color.end());
+    input_.images.alpha.insert(input_.images.alpha.end(), image.alpha.begin(), image.alpha.end());
     (view.mask.empty() ? bare_ : masked_).push_back({frame.image.string(), view.mask});
+    return {};
+  }
+
+  // Where cameras and images come apart: those that are deleted or moved.
+  static Status CheckFiles(const InputFrame& frame) {
+    for (const Path& file : {frame.image, frame.mask}) {
+      if (file.empty() || PathExists(file)) continue;
+      return NotFound("{}: {}: no such file; restore it, or take this view out", frame.camera.place,
+                      file.string());
+    }
     return {};
   }
 
   Status CheckSize(const InputFrame& frame, const ViewPixels& view) {
     TargetImages& all = input_.images;
-    if (input_.names.empty()) {
-      all.width = view.size.width;
-      all.height = view.size.height;
-    }
-    if (view.size.width != all.width || view.size.height != all.height) {
-      return DataLoss("{}: has {} x {} pixels, the images before it {} x {}", frame.image.string(),
-                      view.size.width, view.size.height, all.width, all.height);
+    if (input_.names.empty()) SetSize(view.size);
+    if (view.size.width != size_.width || view.size.height != size_.height) {
+      return DataLoss(
+          "{}: has {} x {} pixels, the images before it {} x {}; a fit takes images of one size: "
+          "turn or crop it, or leave it out",
+          frame.image.string(), view.size.width, view.size.height, size_.width, size_.height);
     }
     if ((input_.names.size() + 1) * all.pixels() <= kMostPixels) return {};
     return ResourceExhausted("{}: all images together have more than {} pixels",
                              frame.image.string(), kMostPixels);
   }
 
+  // Of all images.
+  void SetSize(ImageSize size) {
+    const auto [shorter, longer] = std::minmax(size.width, size.height);
+    size_ = size;
+    factor_ = most_side_ > 0 ? std::min(shorter, (longer - 1) / most_side_ + 1) : 1;
+    input_.images.width = size.width / factor_;
+    input_.images.height = size.height / factor_;
+  }
+
+  const int most_side_;
   FitInput& input_;
+  ImageSize size_;  // of the images, of which the fit takes 1 / factor_ a side
+  int factor_ = 1;
   std::vector<Source> masked_, bare_;
 };
 
@@ -143,7 +193,7 @@ Status NothingIn(const Path& folder, const Frames& bare) {
   }
   if (IsFile(folder)) {
     return InvalidArgument(
-        "{}: is a file; give the folder that holds transforms.json or a COLMAP model",
+        "{}: is a file; give the folder that holds transforms.json, a COLMAP model or images",
         folder.string());
   }
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
@@ -269,7 +319,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
         test.string());
   }
   if (PathExists(test) && input.posed) TILEGRAD_TRY(AddHeldOut(test, &read.frames, &input));
-  InputReader reader(&input);
+  InputReader reader(options.image_side, &input);
   TILEGRAD_TRY(reader.AddAll(read.frames, options.watch));
   if (options.masks.empty()) {
     TILEGRAD_TRY(reader.CheckMasks(options.background));

@@ -59,6 +59,9 @@ inline constexpr std::size_t kLeastMaskViews = 6;  // of kViews: fewer have too 
 // auto, mask, plain, none or views.
 std::optional<Background> BackgroundNamed(std::string_view name);
 
+// Beyond it, images say little more to a fit, and take memory and time.
+inline constexpr int kUsualSide = 1600;  // pixels along the longer side
+
 struct InputOptions {
   int hold_out = 0;  // every n-th view; 0: none
   Background background = Background::kAuto;
@@ -67,14 +70,16 @@ struct InputOptions {
   std::optional<UpAxis> up = std::nullopt;
   Watch watch = {};  // of reading and masks
   Path masks = {};   // a folder of masks instead of the images' own (masks/start_masks.h)
+  // Images with more pixels along their longer side are reduced by a whole factor; 0: none are.
+  int image_side = kUsualSide;
 };
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
 // none). Or a folder of pictures alone, which come without cameras (frames.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
-// images must have one size. Lenses that bend rays are straightened (undistort.h). Errors name the
-// file.
+// images must have one size. Lenses that bend rays are straightened (undistort.h), and large images
+// reduced. Errors name the file.
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
 inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});
@@ -106,8 +111,8 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
 // black.
 TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size);
 
-// Means over squares of `factor` pixels; colours weighted by alpha. The sides must be multiples of
-// `factor`.
+// Means over squares of `factor` pixels; colours weighted by alpha. What is left over on the right
+// and below is cut off.
 TargetImages Reduce(const TargetImages& images, int factor);
 
 // The axis that all cameras stand upright about; none where that is not plain, or is y.

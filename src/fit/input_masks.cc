@@ -73,6 +73,17 @@ void Renumber(const std::vector<int>& kept, std::vector<int>* views) {
   views->swap(out);
 }
 
+// Some programs write 1 for white.
+Status NothingInMasks(const TargetImages& all) {
+  float most = 0;
+  for (const float a : all.alpha) most = std::max(most, 255 * a);
+  return InvalidArgument("all masks are empty: there is nothing to fit{}",
+                         most > 0 ? fmt::format("; the object must be white, 255, but no mask has "
+                                                "more than {:.0f}",
+                                                most)
+                                  : "");
+}
+
 }  // namespace
 
 Status DropEmptyViews(FitInput* input) {
@@ -86,7 +97,7 @@ Status DropEmptyViews(FitInput* input) {
       input->warnings.push_back(input->names[n] + ": its mask is empty; the view is left out");
     }
   }
-  if (kept.empty()) return InvalidArgument("all masks are empty: there is nothing to fit");
+  if (kept.empty()) return NothingInMasks(all);
   if (kept.size() == input->names.size()) return {};
   KeepPlanes(kept, 3 * all.pixels(), &all.color);
   KeepPlanes(kept, all.pixels(), &all.alpha);

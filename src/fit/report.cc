@@ -56,6 +56,7 @@ std::string Facts(const FitJob& job, const FitOutcome& o, const Mesh& mesh) {
                                     "what all have in common",
                                     100 * *job.input.mask_agreement));
   }
+  if (!o.doubt.empty()) out += Row("in doubt", o.doubt);
   if (o.voxel_iou)
     out += Row("3D IoU, 32 voxels a side", fmt::format("{:.1f} %", 100 * *o.voxel_iou));
   if (o.camera_error_before && o.camera_error_after) {

@@ -329,6 +329,7 @@ Status FitResult::Score(FitOutcome* outcome) const {
   const std::vector<Camera> fitted = Choose(scene_.cameras, input.training);
   TILEGRAD_ASSIGN(outcome->training,
                   ScoreViews(scene_, input, input.training, fitted, workers_, watch_));
+  outcome->doubt = DoubtOf(outcome->training, input);
   // Cameras that moved fix the scene only up to a similarity; held-out ones did not move.
   FitScene scene = scene_;
   const std::vector<Camera>& given = GivenCameras(input);

@@ -43,6 +43,7 @@ struct FitJob {
 struct FitOutcome : RunOutcome {
   std::vector<Finding> findings;  // of the doctor, at the start
   std::vector<ViewScore> training, held_out;
+  std::string doubt;                // what the scores of the fitted views say against it
   std::optional<double> voxel_iou;  // at 32 voxels a side, where a truth is known
   std::optional<double> camera_error_before, camera_error_after;  // degrees, means; if perturbed
 };

@@ -19,6 +19,8 @@ namespace {
 
 constexpr int kSamples = 3;  // a side of a pixel
 constexpr double kBestPsnr = 99;
+constexpr double kLowIou = 0.75;    // mean of all views, below which they do not fit together
+constexpr double kFarBelow = 0.25;  // of one view below the mean, which is then its own fault
 
 Picture TruthOf(const TargetImages& images, std::size_t view) {
   const std::size_t plane = images.pixels();
@@ -188,6 +190,23 @@ double MeanIou(std::span<const ViewScore> scores) {
   double sum = 0;
   for (const ViewScore& s : scores) sum += s.iou / static_cast<double>(scores.size());
   return sum;
+}
+
+std::string DoubtOf(std::span<const ViewScore> scores, const FitInput& input) {
+  if (scores.empty() || !input.masked) return "";
+  const ViewScore& worst = *std::ranges::min_element(scores, {}, &ViewScore::iou);
+  const double mean = MeanIou(scores);
+  if (worst.iou < mean - kFarBelow) {
+    return fmt::format(
+        "{}: mesh and mask agree to {:.0f} %, those of all views to {:.0f} %; correct its mask or "
+        "its camera, or leave the image out",
+        input.names[static_cast<std::size_t>(worst.view)], 100 * worst.iou, 100 * mean);
+  }
+  if (mean >= kLowIou) return "";
+  return fmt::format(
+      "mesh and masks agree to {:.0f} % only: look for wrong masks and cameras, or give it more "
+      "steps",
+      100 * mean);
 }
 
 }  // namespace tilegrad::train

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fit/input.h"
@@ -31,6 +32,10 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
 // Means over views; 0 for none.
 double MeanPsnr(std::span<const ViewScore> scores);
 double MeanIou(std::span<const ViewScore> scores);
+
+// What the scores of masked views say against a mask, a camera or all of them, in words for people;
+// empty where nothing does.
+std::string DoubtOf(std::span<const ViewScore> scores, const FitInput& input);
 
 // Brings cameras `from` to stand and look like `to` as well as possible: rotation from their axes,
 // the rest from their centres. Refined cameras fix a scene only up to it.

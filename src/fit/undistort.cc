@@ -158,19 +158,6 @@ Result<ImageU8> LoadTarget(const InputFrame& frame) {
   return fits_stored && !fits(upright) ? std::move(stored.image) : std::move(upright);
 }
 
-Status TakeMask(const Path& path, ViewPixels* out) {
-  TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(path));
-  if (mask.width != out->size.width || mask.height != out->size.height) {
-    return DataLoss("{}: the mask has {} x {} pixels, its image {} x {}", path.string(), mask.width,
-                    mask.height, out->size.width, out->size.height);
-  }
-  const std::vector<std::uint8_t> values = MaskValues(mask);
-  std::ranges::transform(values, out->alpha.begin(),
-                         [](std::uint8_t v) { return static_cast<float>(v) / 255; });
-  out->mask = path.string();
-  return {};
-}
-
 void TakeImage(const ImageU8& image, ViewPixels* out) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const std::size_t plane = image.pixels.size() / channels;
@@ -188,13 +175,43 @@ void TakeImage(const ImageU8& image, ViewPixels* out) {
   if (has_alpha) out->mask = "its alpha channel";
 }
 
+// Means over squares of `factor` pixels.
+void ReduceMask(const ImageU8& mask, int factor, ImageSize size, std::span<float> alpha) {
+  const std::vector<std::uint8_t> values = MaskValues(mask);
+  const auto squares = static_cast<std::int64_t>(factor) * factor;
+  std::size_t to = 0;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      std::int64_t sum = 0;
+      for (std::int64_t s = 0; s < squares; ++s) {
+        const std::int64_t column = x * factor + s % factor, row = y * factor + s / factor;
+        sum += values[static_cast<std::size_t>(row * mask.width + column)];
+      }
+      alpha[to++] = static_cast<float>(sum) / static_cast<float>(255 * squares);
+    }
+  }
+}
+
 }  // namespace
+
+Status LoadMask(const Path& path, ImageSize size, std::span<float> alpha) {
+  TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(path));
+  const int factor = std::max(1, mask.width / size.width);
+  if (mask.width / factor != size.width || mask.height / factor != size.height) {
+    return DataLoss("{}: the mask has {} x {} pixels, its image {} x {}; save it at that size",
+                    path.string(), mask.width, mask.height, size.width, size.height);
+  }
+  ReduceMask(mask, factor, size, alpha);
+  return {};
+}
 
 Result<ViewPixels> LoadViewPixels(const InputFrame& frame) {
   TILEGRAD_ASSIGN(const ImageU8 image, LoadTarget(frame));
   ViewPixels out;
   TakeImage(image, &out);
-  if (!frame.mask.empty()) TILEGRAD_TRY(TakeMask(frame.mask, &out));
+  if (frame.mask.empty()) return out;
+  TILEGRAD_TRY(LoadMask(frame.mask, out.size, out.alpha));
+  out.mask = frame.mask.string();
   return out;
 }
 

@@ -2,6 +2,7 @@
 // Images of lenses that bend rays, as a straight lens would have taken them.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,10 @@ struct ViewPixels {
 
   std::size_t pixels() const { return alpha.size(); }
 };
+
+// alpha [H,W] of a mask file of that size, or of a multiple, as reduced images had (input.h).
+// Errors name the file.
+Status LoadMask(const Path& path, ImageSize size, std::span<float> alpha);
 
 // Turned as the frame's camera counts pixels. Errors name the file.
 Result<ViewPixels> LoadViewPixels(const InputFrame& frame);

@@ -158,9 +158,8 @@ Status ReadImageLine(std::string_view line, const std::string& place, const Came
   auto& t = c.translation;
   const bool good = ParseTokens(line, id, w, x, y, z, t[0], t[1], t[2], camera_id);
   line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
-  if (!good || line.empty()) {
+  if (!good || line.empty())
     return DataLoss("{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", place);
-  }
   return AddView(place, cameras, camera_id, c, std::string(line), views);
 }
 
@@ -288,8 +287,10 @@ bool ReadPointError(BinaryReader* in, double* error) {
 
 // Projects ------------------------------------------------------------------------------------
 
+// Poses alone are a model that lacks its cameras.
 bool IsModel(const Path& folder) {
-  return IsFile(folder / "cameras.txt") || IsFile(folder / "cameras.bin");
+  return std::ranges::any_of(std::array{"cameras.txt", "cameras.bin", "images.bin"},
+                             [&](const char* name) { return IsFile(folder / name); });
 }
 
 // In a folder `sparse`, sorted.

@@ -175,6 +175,12 @@ Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::stri
   return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
 }
 
+constexpr std::string_view kReadEndings[] = {".png", ".jpg", ".jpeg", ".webp"};
+constexpr std::string_view kOtherEndings[] = {".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp",
+                                              ".gif",  ".tga",  ".jp2",  ".jxl", ".jfif", ".psd",
+                                              ".exr",  ".hdr",  ".ppm",  ".pgm", ".dng",  ".cr2",
+                                              ".cr3",  ".nef",  ".arw",  ".raf", ".orf"};
+
 }  // namespace
 
 int OrientationOf(ByteSpan bytes) {
@@ -257,16 +263,6 @@ Status SavePng(const Path& path, const ImageU8& image) {
   return WriteFileAtomic(path, bytes);
 }
 
-namespace {
-
-constexpr std::string_view kReadEndings[] = {".png", ".jpg", ".jpeg", ".webp"};
-constexpr std::string_view kOtherEndings[] = {".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp",
-                                              ".gif",  ".tga",  ".jp2",  ".jxl", ".jfif", ".psd",
-                                              ".exr",  ".hdr",  ".ppm",  ".pgm", ".dng",  ".cr2",
-                                              ".cr3",  ".nef",  ".arw",  ".raf", ".orf"};
-
-}  // namespace
-
 std::string PictureNames::DescribeOthers() const {
   constexpr std::size_t kNamed = 5;
   if (others.empty()) return "";
@@ -282,7 +278,8 @@ PictureNames PicturesIn(const Path& folder) {
   std::error_code error;
   for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
        at.increment(error)) {
-    if (!IsFile(at->path())) continue;
+    const bool hidden = at->path().filename().string().starts_with('.');  // such as macOS's ._a.jpg
+    if (hidden || !IsFile(at->path())) continue;
     const std::string ending = LowerCase(at->path().extension().string());
     if (std::ranges::find(kReadEndings, ending) != std::end(kReadEndings))
       out.read.push_back(at->path().filename());

@@ -54,7 +54,7 @@ struct PictureNames {
   std::string DescribeOthers() const;
 };
 
-// Empty if the folder does not exist.
+// Empty if the folder does not exist. Hidden files do not count.
 PictureNames PicturesIn(const Path& folder);
 
 }  // namespace tilegrad::io

@@ -74,4 +74,20 @@ TEST_F(FitCommand, TurnsWorldsOfOtherAxesUpright) {
   EXPECT_LT(lying.to_truth, 0.6);  // glTF has y up
 }
 
+// A wrong camera, which the others outvote; and what is given in vain.
+TEST_F(FitCommand, SaysWhatIsInDoubt) {
+  MakeWorld();
+  ExpectNotIn(FitBox("").said, "mesh and mask", "--fov has");
+  const Path file = folder_ / "v/transforms_train.json";
+  Json json = Json::parse(ReadText(file).value());
+  Json& first = json.at("frames").at(0).at("transform_matrix");
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double right = first[row][0].get<double>();
+    first[row][3] = first[row][3].get<double>() + 0.5 * right;
+  }
+  Write("v/transforms_train.json", json.dump());
+  ExpectIn(FitBox(" --fov 50").said, "warning: 000.png: mesh and mask agree to ",
+           "--fov has no effect");
+}
+
 }  // namespace tilegrad::fit_command_test

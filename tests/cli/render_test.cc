@@ -361,6 +361,16 @@ TEST_F(Render, OptionsThatWouldDoNothing) {
       In("b.png"));
 }
 
+TEST_F(Render, WarnsOfImagesThatShowNothing) {
+  const std::string ball = "render " + In("ball.glb") + " --size 8 --force --out " + In("b.png");
+  ExpectIn(ProgramTest::ExpectDone(ball + " --quiet --eye 0 0 9 --target 0 0 10"),
+           "ball.glb: is not seen in 1 of 1 image, such as b.png");
+  ExpectNotIn(ProgramTest::ExpectDone(ball + " --eye 0 0 9"), "not seen");
+  Write("line.obj", "v 0 0 0\nv 1 1 0\nv 2 2 0\nf 1 2 3\n");
+  const std::string line = "render " + In("line.obj") + " --size 8 --out " + In("line.png");
+  ExpectIn(ProgramTest::ExpectDone(line), "line.obj: is not seen", "or have no area");
+}
+
 TEST_F(Render, BrokenFiles) {
   ExpectRefused("--cameras " + In("none"), 3, "none");
   ExpectRefused("--cameras " + folder_.string(), 3, "cameras.txt");

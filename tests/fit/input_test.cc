@@ -15,6 +15,24 @@ namespace tilegrad::train::input_test {
 
 constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
 
+// A cut-out of 8 x 6 pixels; the object is its first `columns`.
+ImageU8 CutOut(int columns) {
+  ImageU8 image(8, 6, 4, 77);
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 8; ++x) image.at(x, y)[3] = x < columns ? 255 : 0;
+  return image;
+}
+
+// Ten frames of images/0.png to 9.png; `more` stands in the given one.
+std::string TenFrames(int which, const std::string& more) {
+  std::string frames;
+  for (int i = 0; i < 10; ++i) {
+    frames += std::string(i == 0 ? "" : ",") + R"({"file_path":"images/)" + std::to_string(i) +
+              R"(.png",)" + (i == which ? more : "") + kPose + "}";
+  }
+  return R"({"fl_x":10,"frames":[)" + frames + "]}";
+}
+
 class Input : public TempFolderTest {
  protected:
   // 8 x 6 pixels of one grey.
@@ -93,9 +111,72 @@ TEST_F(Input, ColmapImagesThatAreNotThere) {
   Model("p/sparse/0");
   ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "a.png", "images");
   Image("p/images/a.png", 51);
-  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "deep/b.png");
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "deep/b.png: no such file");
+  std::filesystem::remove(folder_ / "p/images/a.png");
+  Image("p/images/deep/b.png", 51);
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "images/a.png: no such file");
   Write("p/sparse/0/cameras.txt", std::string("1 FOV 16 12 20 22 9 5 0.5\n"));
   ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "cameras.txt: line 1", "undistort");
+}
+
+TEST_F(Input, ImagesThatTransformsNameAndThatAreNotThere) {
+  Image("g/images/0.png", 51);
+  Write("g/transforms.json", TenFrames(-1, ""));
+  ExpectMessage(ReadFitFolder(folder_ / "g", 0).status(),
+                "transforms.json: frame 1: ", "images/1.png: no such file");
+  Transforms("g", "images/0.png", R"("fl_x":10,)", R"("mask_path":"masks/0.png",)");
+  ExpectMessage(ReadFitFolder(folder_ / "g", 0).status(),
+                "transforms.json: frame 0: ", "masks/0.png: no such file");
+}
+
+// As COLMAP projects and images alone have them.
+TEST_F(Input, MasksBesideTheImagesOfTransforms) {
+  Image("k/images/0.png", 51);
+  Mask("k/masks/0.png");
+  Transforms("k", "images/0.png", R"("fl_x":10,)");
+  EXPECT_TRUE(ReadFitFolder(folder_ / "k", 0)->masked);
+  // Where some are named, so must be the others.
+  Image("k/images/1.png", 51);
+  Mask("k/masks/1.png");
+  Write("k/transforms.json", R"({"fl_x":10,"frames":[{"file_path":"images/0.png",)" +
+                                 std::string(kPose) + R"(},{"file_path":"images/1.png",)" +
+                                 R"("mask_path":"masks/1.png",)" + kPose + "}]}");
+  ExpectMessage(ReadFitFolder(folder_ / "k", 0).status(), "0.png: has no mask");
+  Image("k/train/0.png", 51);  // one of several folders with the same names
+  Transforms("k", "train/0.png", R"("fl_x":10,)");
+  EXPECT_FALSE(ReadFitFolder(folder_ / "k", {.background = Background::kMask})->masked);
+}
+
+TEST_F(Input, LargeImagesAreReduced) {
+  Image("l/images/0.png", 51);
+  Transforms("l", "images/0.png", R"("fl_x":10,"cx":4,"cy":2,)");
+  Mask("l/mine/0.png");  // of the image as it is
+  const InputOptions options{.masks = folder_ / "l/mine", .image_side = 7};
+  const auto input = Ok(ReadFitFolder(folder_ / "l", options));
+  EXPECT_EQ(input->images.width, 4);
+  EXPECT_EQ(input->images.height, 3);
+  EXPECT_EQ(input->cameras[0].fx, 5);
+  EXPECT_EQ(input->cameras[0].cx, 2);
+  EXPECT_EQ(input->cameras[0].cy, 1);
+  for (std::size_t p = 0; p < 12; ++p) {
+    EXPECT_NEAR(input->images.color[p], 0.2, 1e-6);
+    EXPECT_EQ(input->images.alpha[p], p % 4 < 2 ? 1 : 0);
+  }
+  ExpectOnly(input->notes, "2 times smaller", "4 x 3 pixels");
+  for (const int side : {8, 0})
+    EXPECT_EQ(ReadFitFolder(folder_ / "l", {.image_side = side})->images.width, 8);
+  // What is left over is cut off: 2 x 2 of 3 x 3 pixels, and of 8 x 6.
+  const auto third = Ok(ReadFitFolder(folder_ / "l", {.image_side = 3}));
+  EXPECT_EQ(third->images.width, 2);
+  EXPECT_EQ(third->images.height, 2);
+  EXPECT_NEAR(third->cameras[0].fx, 10.0 / 3, 1e-5);
+  EXPECT_NEAR(third->cameras[0].cx, 4.0 / 3, 1e-5);
+}
+
+TEST_F(Input, ColmapCamerasThatAreNotThere) {
+  Image("q/images/a.png", 51);
+  Write("q/sparse/0/images.bin", std::string("x"));
+  ExpectMessage(ReadFitFolder(folder_ / "q", 0).status(), "sparse/0/cameras.bin");
 }
 
 // Cameras that are upside down in COLMAP's world, as its first one is.
@@ -198,24 +279,6 @@ TEST_F(Input, IsTurnedAsUpSays) {
   EXPECT_FALSE(std::ranges::equal(turned->cameras[1].rotation, given->cameras[1].rotation));
 }
 
-// A cut-out of 8 x 6 pixels; the object is its first `columns`.
-ImageU8 CutOut(int columns) {
-  ImageU8 image(8, 6, 4, 77);
-  for (int y = 0; y < 6; ++y)
-    for (int x = 0; x < 8; ++x) image.at(x, y)[3] = x < columns ? 255 : 0;
-  return image;
-}
-
-// Ten frames of images/0.png to 9.png; `more` stands in the given one.
-std::string TenFrames(int which, const std::string& more) {
-  std::string frames;
-  for (int i = 0; i < 10; ++i) {
-    frames += std::string(i == 0 ? "" : ",") + R"({"file_path":"images/)" + std::to_string(i) +
-              R"(.png",)" + (i == which ? more : "") + kPose + "}";
-  }
-  return R"({"fl_x":10,"frames":[)" + frames + "]}";
-}
-
 TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
   for (int i = 0; i < 10; ++i) {
     const ImageU8 image = i == 7 ? ImageU8(8, 6, 3, 77) : CutOut(4);
@@ -254,6 +317,14 @@ TEST_F(Input, FramesOfTheTestFileAreNotFitted) {
   ExpectOnly(input->warnings, "transforms_test.json", "1 image");
 }
 
+TEST_F(Input, ImagesOfSeveralSizesAreRefused) {
+  for (int i = 0; i < 10; ++i) Image("z/images/" + std::to_string(i) + ".png", 51);
+  Ok(io::SavePng(folder_ / "z/images/4.png", ImageU8(6, 8, 3, 51)));
+  Write("z/transforms.json", TenFrames(-1, ""));
+  ExpectMessage(ReadFitFolder(folder_ / "z", 0).status(), "4.png: has 6 x 8 pixels", "8 x 6",
+                "turn or crop it");
+}
+
 TEST_F(Input, CamerasOfImagesOfAnotherShapeAreRefused) {
   Image("s/a.png", 51);
   Transforms("s", "a.png", R"("fl_x":10,"w":40,"h":10,)");
@@ -283,13 +354,19 @@ TEST_F(Input, ViewsThatShowNothingAreNamedAndLeftOut) {
     ASSERT_TRUE(io::SavePng(folder_ / "e/images" / (std::to_string(i) + ".png"), CutOut(0)).ok());
   }
   ExpectMessage(ReadFitFolder(folder_ / "e", 0).status(), "all masks are empty");
+  // Of programs that write 1 for white.
+  ASSERT_TRUE(io::SavePng(folder_ / "e/ones.png", ImageU8(8, 6, 1, 1)).ok());
+  Transforms("e", "images/0.png", R"("fl_x":10,)", R"("mask_path":"ones.png",)");
+  ExpectMessage(ReadFitFolder(folder_ / "e", 0).status(), "must be white, 255", "more than 1");
 }
 
 TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
   Image("b/0.png", 51);
   Image("b/1.PNG", 51);
   Write("b/notes.txt", std::string("mine"));
-  EXPECT_TRUE(ReadFitFolder(folder_ / "b", 0)->warnings.empty());
+  Write("b/._0.png", std::string("of macOS"));
+  EXPECT_TRUE(Ok(ReadFitFolder(folder_ / "b", 0))->warnings.empty());
+  std::filesystem::remove(folder_ / "b/._0.png");
   for (const char* name : {"b/2.heic", "b/3.TIF", "b/4.bmp"}) Write(name, std::string("x"));
   const auto input = Ok(ReadFitFolder(folder_ / "b", 0));
   EXPECT_EQ(input->names.size(), 2u);

@@ -248,6 +248,32 @@ TEST(FitMasks, AFloorStandsOutWhereThereIsOne) {
   }
 }
 
+// Ten masks of 8 x 8 pixels that cover their columns from the first one on.
+FitInput MasksOfColumns(int first) {
+  FitInput input;
+  input.images.width = input.images.height = 8;
+  for (int v = 0; v < 10; ++v) {
+    input.names.push_back(std::to_string(v));
+    for (int p = 0; p < 64; ++p) {
+      const int x = p % 8, y = p / 8;
+      input.images.alpha.push_back(x >= first && x < 7 && y > 0 && y < 7 ? 1.0f : 0.0f);
+    }
+  }
+  return input;
+}
+
+TEST(MaskBorders, TellWhatIsCutOffOrInverted) {
+  FitInput input = MasksOfColumns(1);
+  DoubtBorders(&input);
+  EXPECT_TRUE(input.warnings.empty());
+  for (float& a : input.images.alpha) a = 1 - a;
+  DoubtBorders(&input);
+  ExpectOnly(input.warnings, "cover the border of 10 of 10 images", "inverted");
+  input = MasksOfColumns(0);
+  DoubtBorders(&input);
+  ExpectOnly(input.warnings, "reach the border of 10 of 10 images, such as 0");
+}
+
 class FitMaskFiles : public TempFolderTest {
  protected:
   void SetUp() override {

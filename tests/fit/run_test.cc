@@ -387,6 +387,27 @@ TEST_F(Fit, TransformsRoundTrip) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(half->translation[i], camera.translation[i], 1e-5);
 }
 
+TEST(FitScore, SaysWhichMaskOrCameraIsInDoubt) {
+  FitInput input;
+  input.names = {"a", "b", "c", "d"};
+  input.masked = true;
+  std::vector<ViewScore> scores(4);
+  const auto doubt = [&](std::initializer_list<double> ious) {
+    int view = 0;
+    for (const double iou : ious) {
+      scores[static_cast<std::size_t>(view)].iou = iou;
+      scores[static_cast<std::size_t>(view)].view = view;
+      ++view;
+    }
+    return DoubtOf(scores, input);
+  };
+  EXPECT_EQ(doubt({0.9, 0.95, 0.8, 0.97}), "");
+  ExpectIn(doubt({0.9, 0.95, 0.5, 0.97}), "c: mesh and mask agree to 50 %", "all views to 83 %");
+  ExpectIn(doubt({0.4, 0.5, 0.3, 0.4}), "mesh and masks agree to 40 % only");
+  input.masked = false;  // every pixel counts as the object
+  EXPECT_EQ(doubt({0.4, 0.5, 0.3, 0.4}), "");
+}
+
 TEST(FitScore, AlignmentFindsASimilarity) {
   Similarity truth;
   const double angle = 0.4;

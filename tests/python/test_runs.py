@@ -111,6 +111,13 @@ class Fit(FolderTest):
         for message in ("fit: 2: its mask is full", "fit: 4: its mask is empty"):
             self.assertTrue(any(text.startswith(message) for text in said), said)
 
+    def test_masks_in_doubt_are_named(self):
+        images = IMAGES.copy()
+        images[2] = 0
+        images[2, 4:12, 4:12] = 255
+        with self.assertWarnsRegex(UserWarning, "^fit: mesh and masks agree to "):
+            tilegrad.fit(images, CAMERAS, **SMALL)
+
     def test_up_turns_the_mesh(self):
         given, turned = (np.ptp(tilegrad.fit(IMAGES, CAMERAS, up=up, **SMALL).mesh.positions, axis=0)
                          for up in ("", "z"))

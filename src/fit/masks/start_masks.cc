@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "fit/masks/find_masks.h"
+#include "fit/undistort.h"
 #include "io/image_file.h"
-#include "train/data/cutout.h"
 
 namespace tilegrad::train {
 namespace {
@@ -69,6 +69,24 @@ Status Find(FitInput* input, const Workers& workers, const Watch& watch) {
   return {};
 }
 
+// The share of a view's outermost pixels that its mask covers; 0 if it covers all pixels, of which
+// there is a warning already.
+double BorderShare(const TargetImages& images, std::size_t view) {
+  constexpr float kObject = 0.5f;
+  const auto mask = std::span(images.alpha).subspan(view * images.pixels(), images.pixels());
+  if (std::ranges::all_of(mask, [](float a) { return a >= 1; })) return 0;
+  std::size_t covered = 0, count = 0;
+  for (int y = 0; y < images.height; ++y) {
+    const bool whole = y == 0 || y == images.height - 1;
+    for (int x = 0; x < images.width; x += whole ? 1 : std::max(1, images.width - 1)) {
+      covered += mask[static_cast<std::size_t>(y) * static_cast<std::size_t>(images.width) +
+                      static_cast<std::size_t>(x)] >= kObject;
+      ++count;
+    }
+  }
+  return static_cast<double>(covered) / static_cast<double>(count);
+}
+
 // Before empty ones go.
 Status KeepFound(const Path& folder, const FitInput& input) {
   return input.masks_found && !folder.empty() ? WriteMasks(folder, input) : Status();
@@ -93,17 +111,32 @@ Status ReadMasks(const Path& folder, FitInput* input) {
   TargetImages& all = input->images;
   for (std::size_t v = 0; v < input->names.size(); ++v) {
     TILEGRAD_ASSIGN(const Path file, FindMask(folder, MaskName(*input, v)));
-    TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(file));
-    if (mask.width != all.width || mask.height != all.height) {
-      return DataLoss("{}: the mask has {} x {} pixels, its image {} x {}", file.string(),
-                      mask.width, mask.height, all.width, all.height);
-    }
-    const std::vector<std::uint8_t> values = MaskValues(mask);
-    std::ranges::transform(values,
-                           all.alpha.begin() + static_cast<std::ptrdiff_t>(v * all.pixels()),
-                           [](std::uint8_t m) { return static_cast<float>(m) / 255; });
+    TILEGRAD_TRY(LoadMask(file, {all.width, all.height},
+                          std::span(all.alpha).subspan(v * all.pixels(), all.pixels())));
   }
   return {};
+}
+
+void DoubtBorders(FitInput* input) {
+  constexpr double kBackground = 0.9, kCut = 0.02;
+  std::size_t inverted = 0;
+  std::vector<std::size_t> cut;
+  for (std::size_t v = 0; v < input->names.size(); ++v) {
+    const double share = BorderShare(input->images, v);
+    inverted += share > kBackground;
+    if (share > kCut) cut.push_back(v);
+  }
+  const std::string views = Count(input->names.size(), "image");
+  if (2 * inverted > input->names.size()) {
+    input->warnings.push_back(
+        fmt::format("masks cover the border of {} of {}, as background does: are they inverted? "
+                    "White must be the object",
+                    inverted, views));
+  } else if (!cut.empty()) {
+    input->warnings.push_back(
+        fmt::format("masks reach the border of {} of {}, such as {}: what it cuts off is a guess",
+                    cut.size(), views, input->names[cut.front()]));
+  }
 }
 
 Status StartMasks(bool resume, FitJob* job, const Workers& workers, const Watch& watch) {

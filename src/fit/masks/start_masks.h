@@ -12,11 +12,16 @@ namespace tilegrad::train {
 // FindMasks, ReadMasks and files.
 Status StartMasks(bool resume, FitJob* job, const Workers& workers, const Watch& watch);
 
+// Warns where masks look inverted, or else where objects are cut off: by what covers the border of
+// their images.
+void DoubtBorders(FitInput* input);
+
 // <folder>/NAME.png for each view, grey; NAME has its own ending, and the view's number before it
 // where an earlier view has the same name.
 Status WriteMasks(const Path& folder, const FitInput& input);
 // The same names, as images or with the ending .png instead of theirs; of the images as a fit sees
-// them, upright and without what lenses bend. Sets alpha. Errors name the file.
+// them, upright and without what lenses bend, or larger by a whole factor. Sets alpha. Errors name
+// the file.
 Status ReadMasks(const Path& folder, FitInput* input);
 
 }  // namespace tilegrad::train

@@ -21,28 +21,6 @@ namespace {
 constexpr double kColorCost = 0.4;
 constexpr double kLeastDeviation = 0.02;  // of objects of one colour, whose shades are noise
 
-// The upper left part whose sides are multiples of `factor`.
-TargetImages CutToMultiple(const TargetImages& images, int factor) {
-  TargetImages out;
-  out.width = images.width / factor * factor;
-  out.height = images.height / factor * factor;
-  if (out.width == images.width && out.height == images.height) return images;
-  const auto copy = [&](const AlignedVector<float>& from, AlignedVector<float>* to) {
-    const std::size_t planes = from.size() / images.pixels();
-    to->resize(planes * out.pixels());
-    for (std::size_t row = 0; row < planes * static_cast<std::size_t>(out.height); ++row) {
-      const std::size_t plane = row / static_cast<std::size_t>(out.height);
-      const std::size_t y = row % static_cast<std::size_t>(out.height);
-      const auto* source =
-          from.data() + plane * images.pixels() + y * static_cast<std::size_t>(images.width);
-      std::copy_n(source, out.width, to->data() + row * static_cast<std::size_t>(out.width));
-    }
-  };
-  copy(images.color, &out.color);
-  copy(images.alpha, &out.alpha);
-  return out;
-}
-
 // Mean over the object's pixels of `value`, a function of (image, channel, pixel of the plane).
 template <class Value>
 double MeanOnObject(const TargetImages& images, std::size_t channel, const Value& value) {
@@ -180,7 +158,7 @@ Result<PosePictures> PreparePictures(const TargetImages& images, std::span<const
   // No side of the result may vanish.
   const auto [shorter, longer] = std::minmax(images.width, images.height);
   const int factor = std::clamp(longer / side, 1, shorter);
-  out.images = Reduce(CutToMultiple(images, factor), factor);
+  out.images = Reduce(images, factor);
   const std::size_t plane = images.pixels();
   for (std::size_t n = 0; n < lenses.size(); ++n) {
     out.lenses.push_back(ScaledCamera(lenses[n], 1.0f / static_cast<float>(factor)));

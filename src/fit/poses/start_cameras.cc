@@ -246,6 +246,7 @@ void NoteWidestGap(FitInput* input) {
 Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& workers,
                     const ProgressSink& progress, const StopFlag& stop) {
   if (!search.look) TILEGRAD_TRY(StartMasks(search.resume, job, workers, {progress, &stop}));
+  if (job->input.masked) DoubtBorders(&job->input);
   InputPosesJob find;
   find.options.seed = job->config.seed;
   if (!job->out.empty()) find.file = job->out / "cameras_start.json";
