@@ -34,6 +34,16 @@ std::size_t ParseBytes(std::string_view text) {
 
 std::string Megabytes(std::size_t bytes) { return fmt::format("{} MB", (bytes >> 20) + 1); }
 
+std::atomic<std::uint64_t> g_count = 0;
+std::atomic<int> g_last = 0;
+
+const char* Remedy(int error) {
+  if (error == EMFILE) return "allow more open files (ulimit -n) or use fewer workers";
+  if (error == ENFILE) return "close other programs' files or use fewer workers";
+  if (error == EAGAIN) return "allow more processes (ulimit -u) or use fewer workers";
+  return "allow more memory (ulimit -v, the container's limit) or use fewer workers";
+}
+
 }  // namespace
 
 Result<std::size_t> ParseByteCount(const std::string& text) {
@@ -68,8 +78,7 @@ Status ReadBudget::Take(std::size_t bytes, const std::string& what) {
   if (status.ok() && bytes > *budget->limit_ - budget->taken_) {
     status = ResourceExhausted(
         "{}: needs {} more, above the memory limit of {} per file, referenced files included; "
-        "raise "
-        "it (bytes, or 16G) with tilegrad's --read-limit or {} in the environment",
+        "raise it (bytes, or 16G) with --read-limit, in Python max_bytes, or {} in the environment",
         what, Megabytes(bytes), Megabytes(*budget->limit_ - 1), kReadLimitVariable);
   }
   if (status.ok()) budget->taken_ += bytes;
@@ -78,20 +87,6 @@ Status ReadBudget::Take(std::size_t bytes, const std::string& what) {
 }
 
 Status ReadBudget::status() const { return outer_ != nullptr ? outer_->status() : refused_; }
-
-namespace {
-
-std::atomic<std::uint64_t> g_count = 0;
-std::atomic<int> g_last = 0;
-
-const char* Remedy(int error) {
-  if (error == EMFILE) return "allow more open files (ulimit -n) or use fewer workers";
-  if (error == ENFILE) return "close other programs' files or use fewer workers";
-  if (error == EAGAIN) return "allow more processes (ulimit -u) or use fewer workers";
-  return "allow more memory (ulimit -v, the container's limit) or use fewer workers";
-}
-
-}  // namespace
 
 bool IsShortage(int error) {
   for (const int shortage : {EMFILE, ENFILE, ENOMEM, EAGAIN, ENOBUFS}) {

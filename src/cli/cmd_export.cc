@@ -42,7 +42,7 @@ Status RunExport(const ExportOptions& options) {
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   TILEGRAD_ASSIGN(const std::string credits, CreditsOf(options, run));
   const auto floats = options.half ? nn::StoredFloats::kHalf : nn::StoredFloats::kFull;
-  TILEGRAD_TRY(predictor.ExportWeights(out, credits, floats).Within(out.string()));
+  TILEGRAD_TRY(predictor.ExportWeights(out, credits, floats));
   std::error_code error;
   const auto bytes = std::filesystem::file_size(out, error);  // devices have none
   Print("{}: {}{}\n{}\n", out.string(), predictor.description(),

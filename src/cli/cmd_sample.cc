@@ -38,7 +38,7 @@ struct InterpolationSteps {
 
 constexpr int kTurning = 8, kTurningColumns = 4, kTurningSize = 112, kTurningFrames = 30;
 constexpr int kStripSize = 96, kAnimationSize = 192, kAnimated = 6, kSampleFrameMilliseconds = 100,
-              kSampleQuality = 70;
+              kSampleQuality = 70, kMostSamples = 999;
 
 double Difference(const ImageU8& a, const ImageU8& b) {
   double sum = 0;
@@ -140,6 +140,14 @@ struct SampleFiles {
   std::vector<Path> meshes, all;
 };
 
+// All that earlier calls may have left, which would pass for a part of these samples.
+Status RemoveEarlier(SampleOptions options) {
+  options.count = kMostSamples;
+  options.interpolate = 1;
+  options.score = true;
+  return RemoveFiles(SampleFiles(options).all);
+}
+
 Result<train::GeneratorModel*> GeneratorOf(const train::Predictor& predictor, const Path& run) {
   auto* const model = predictor.model().generator();
   if (model != nullptr) return model;
@@ -177,20 +185,24 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
   return {};
 }
 
-Status Score(const SampleOptions& options, const SampleFiles& files, const Path& run,
-             train::GeneratorModel& model, nlohmann::ordered_json* json) {
+Result<train::GanScores> Score(const SampleOptions& options, const Path& run,
+                               train::GeneratorModel& model) {
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
   ProgressLine line;
   TILEGRAD_TRY(train::WarnWithoutList(run, line.Warnings()));
-  const auto scores = train::ScoreGenerator(
+  auto scores = train::ScoreGenerator(
       model, {run, data, options.score_count, options.seed, options.judge}, line.Watching());
   line.Finish();
-  if (!scores.ok()) return scores.status();
-  const std::string text = train::FormatScores(*scores);
+  return scores;
+}
+
+Status WriteScores(const train::GanScores& scores, const SampleFiles& files,
+                   nlohmann::ordered_json* json) {
+  const std::string text = train::FormatScores(scores);
   TILEGRAD_TRY(WriteTextAtomic(files.scores, text));
-  (*json)["scores"] = train::ScoresJson(*scores);
+  (*json)["scores"] = train::ScoresJson(scores);
   TILEGRAD_TRY(WriteTextAtomic(files.numbers, JsonText((*json)["scores"], 2) + "\n"));
-  TILEGRAD_TRY(io::SavePng(files.nearest, scores->nearest));
+  TILEGRAD_TRY(io::SavePng(files.nearest, scores.nearest));
   Print("{}written to {} and {}; samples beside the nearest training objects: {}\n", text,
         files.scores.string(), files.numbers.string(), files.nearest.string());
   return {};
@@ -212,6 +224,12 @@ Status RunSampling(const SampleOptions& options) {
   for (int i = 0; i < options.count; ++i)
     codes.push_back(model->Code(options.seed, static_cast<std::uint64_t>(i)));
   TILEGRAD_ASSIGN(const auto meshes, GenerateAll(*model, codes));
+  // First: it may be refused.
+  train::GanScores scores;
+  if (options.score) {
+    TILEGRAD_ASSIGN(scores, Score(options, run, *model));
+  }
+  if (options.force) TILEGRAD_TRY(RemoveEarlier(options));
   nlohmann::ordered_json json = {{"seed", options.seed},
                                  {"textured", model->has_textures()},
                                  {"sheet", files.sheet.string()},
@@ -227,7 +245,7 @@ Status RunSampling(const SampleOptions& options) {
         files.meshes.back().string(), files.sheet.string(), files.turntable.string());
   if (options.interpolate > 0)
     TILEGRAD_TRY(Interpolate(options, files, codes, *model, workers, &json));
-  if (options.score) TILEGRAD_TRY(Score(options, files, run, *model, &json));
+  if (options.score) TILEGRAD_TRY(WriteScores(scores, files, &json));
   PrintResult(json);
   return {};
 }
@@ -240,7 +258,7 @@ void AddSample(CommandList* list) {
   command->Add("--run", &options->run,
                fmt::format("{} [the newest run below runs/, else {} if installed]", kRunOrWeights,
                            train::kGeneratorWeights));
-  command->Add("--count", &options->count, "objects", {Range{1, 999}});
+  command->Add("--count", &options->count, "objects", {Range{1, kMostSamples}});
   command->Add("--out", &options->out,
                "folder for sample_001.glb and so on, sheet.png (each from the front and from "
                "behind) and turntable.webp");

@@ -12,6 +12,7 @@
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/config.h"
+#include "train/run/run_files.h"
 #include "train/trainer.h"
 
 namespace tilegrad::cli {
@@ -84,9 +85,20 @@ Status Complete(TrainOptions* options) {
   return {};
 }
 
+// What a run names, such as textures.run, is looked for beside it, as its dataset is.
+void FindPlaces(const Path& run, train::TrainConfig* config) {
+  for (const train::ConfigField& field : config->Fields()) {
+    if (field.affects != train::Affects::kPlace) continue;
+    std::string& place = *std::get<std::string*>(field.target);
+    if (place.empty()) continue;
+    if (const auto found = FindFromRun(place, run)) place = found->string();
+  }
+}
+
 Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   TILEGRAD_TRY(Complete(options));
   TILEGRAD_ASSIGN(job->config, train::FindConfig(options->config));
+  if (!options->resume.empty()) FindPlaces(options->out, &job->config);
   if (options->steps > 0) {
     options->overrides.push_back(fmt::format("schedule.steps={}", options->steps));
     job->extends = !options->resume.empty();
@@ -97,6 +109,13 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   job->existing = ExistingOf(!options->resume.empty(), options->force);
   job->max_minutes = options->max_minutes;
   return {};
+}
+
+// Adds how to resume a stopped run, once there is one.
+Status WithResume(const Status& status, const std::string& run) {
+  const auto begun = train::HoldsRun(run);
+  if (!begun.ok() || !*begun) return status;
+  return WithCommand(status, "tilegrad train --resume " + run);
 }
 
 // Says where sample sheets are, as soon as there is one.
@@ -132,7 +151,7 @@ Status RunTraining(const TrainOptions& given) {
   line.Finish();
   live.Finish(outcome.status());
   ranks.EndIfBroken(outcome.status());
-  if (!outcome.ok()) return WithCommand(outcome.status(), "tilegrad train --resume " + options.out);
+  if (!outcome.ok()) return WithResume(outcome.status(), options.out);
   PrintOutcome(*outcome, options, job.config.task->ScoreCommand());
   PrintJson(*outcome, options);
   return {};

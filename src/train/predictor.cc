@@ -61,7 +61,8 @@ Result<std::vector<Mesh>> Predictor::Predict(std::span<const std::uint8_t> image
   std::vector<Mesh> out;
   for (std::size_t at = 0; at < images.size(); at += Model::kImagesAtOnce * bytes) {
     const std::size_t size = std::min(Model::kImagesAtOnce * bytes, images.size() - at);
-    TILEGRAD_TRY(all_->model->Predict(images.subspan(at, size), &out));
+    const Status predicted = all_->model->Predict(images.subspan(at, size), &out);
+    TILEGRAD_TRY(predicted.Within(RunFolderOf(checkpoint()).string()));
   }
   for (Mesh& mesh : out) {
     if (mesh.normals.empty()) mesh.normals = SmoothNormals(mesh);

@@ -86,6 +86,37 @@ TEST_F(Sample, ScoresAgainstTrueObjects) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / "s" / file)) << file;
 }
 
+TEST_F(Sample, ForceLeavesNoneOfEarlierCalls) {
+  const std::string common = "sample --run " + Run("g") + " --out " + In("a");
+  ExpectDone(common + " --count 3 --interpolate 1");
+  Write("a/mine.txt", "mine");
+  ExpectDone(common + " --count 2 --force");
+  EXPECT_TRUE(Exists("a/sample_002.glb") && Exists("a/sheet.png") && Exists("a/mine.txt"));
+  EXPECT_FALSE(Exists("a/sample_003.glb") || Exists("a/interpolation.png"));
+}
+
+TEST_F(Sample, WritesNothingIfItsScoresAreRefused) {
+  const std::string common = "sample --score --count 1 --run " + Run("g") + " --out " + In("x");
+  ExpectError(common + " --data " + In("none"), "none: ");
+  ExpectError(common + " --data " + Run("d") + " --judge " + Run("t"), "\"classify\"");
+  EXPECT_FALSE(Exists("x"));
+}
+
+// Paths of a run that moved, or that is resumed from another folder.
+TEST_F(Sample, RunsFindTheirTextures) {
+  const auto from = [](const std::string& folder) { return "cd " + folder + " && "; };
+  ExpectDone("train --config gan.toml --data d --out h --set stages.shape=1 --set textures.run=t",
+             from(Run("")));
+  std::filesystem::copy(Run("h"), folder_ / "h", std::filesystem::copy_options::recursive);
+  const std::string elsewhere = from(folder_.string());
+  ExpectDone("train --resume " + Run("h") + " --steps 3", elsewhere);
+  const std::string moved = "train --resume h --steps 3 --data " + Run("d");
+  ExpectRefused(RunProgram(moved, elsewhere), 3, "textures.run = \"t\"");
+  ExpectDone(moved + " --set textures.run=" + Run("t"), elsewhere);
+  ExpectRefused(RunProgram(moved + " --set textures.count=3", elsewhere), 2,
+                "another configuration");
+}
+
 TEST_F(Sample, RefusesWhatItCannotDo) {
   ExpectError("sample --run " + Run("t") + " --out " + In("x"),
               "not a generator; train one with --config gan_quick");

@@ -143,7 +143,7 @@ TEST_F(Weights, ComeAlongByName) {
   // As does a folder of that name.
   std::filesystem::create_directory_symlink(Shared("gan"), folder_ / "furniture");
   ExpectIn(RunProgram("predict --run furniture --force" + to, Alone()).output,
-           "predicts no meshes");
+           "furniture: this network predicts no meshes");
 }
 
 // Those of data/weights, which are installed.
@@ -197,6 +197,10 @@ TEST_F(Weights, AreWrittenAsOtherFilesAre) {
   ExpectRefused("export --run " + In("a.safetensors") + " --out " + In("c.safetensors"), 3,
                 "names no dataset", "--credits");
   ExpectNotIn(ExpectDone(run + "/dev/null --force --credits me"), " MB");  // has no size
+  // A failure names the file once.
+  std::filesystem::create_directory(folder_ / "taken.safetensors");
+  ExpectNotIn(RunProgram(run + In("taken.safetensors") + " --force --credits me").output,
+              In("taken.safetensors") + ": " + In("taken.safetensors"));
   // A bit that changed is noticed.
   std::string text = ReadText(folder_ / "a.safetensors").value();
   text.back() = static_cast<char>(text.back() ^ 1);

@@ -85,11 +85,6 @@ class Names(FolderTest):
                 files.save_layers(self.folder / "a.exr", dict.fromkeys(names, plane))
         self.assertEqual(list(self.folder.iterdir()), [])
 
-    def test_the_longest_that_a_file_can_hold(self) -> None:
-        name = "n" * 65531
-        files.save_weights(self.folder / "a.npz", {name: np.ones(2, np.float32)})
-        self.assertEqual(list(files.load_weights(self.folder / "a.npz")), [name])
-
     def test_half_of_a_character(self) -> None:
         """A lone surrogate, which UTF-8 cannot hold."""
         one, plane, bad = np.ones(2, np.float32), np.ones((2, 2), np.float32), "a\ud800"
@@ -168,7 +163,8 @@ class Memory(FolderTest):
         for load, name in self.loads:
             load(self.folder / name, max_bytes=20 << 20)
             load(self.folder / name, max_bytes=None)
-            with self.assertRaisesRegex((OSError, ValueError, MemoryError), f"{name}.*LIMIT"):
+            refused = f"{name}.*max_bytes.*LIMIT"
+            with self.assertRaisesRegex((OSError, ValueError, MemoryError), refused):
                 load(self.folder / name, max_bytes=1 << 20)
             with self.assertRaisesRegex(ValueError, "max_bytes is 0"):
                 load(self.folder / name, max_bytes=0)

@@ -41,14 +41,6 @@ TEST_F(Losses, ColorGradientAwayFromKinks) {
                  Uniform(36, 0.5, 1, 4));
 }
 
-TEST_F(Losses, ColorIsThreeTimesThePlainMean) {
-  const nn::Shape shape = {1, 3, 1, 2};
-  const auto truth = context_.Zeros(shape);
-  EXPECT_NEAR(
-      Value([&](const nn::Var& a) { return ColorL1Loss(a, truth); }, shape, {1, 1, 1, 1, 1, 1}), 3,
-      1e-12);
-}
-
 // Four images side by side, then the two that are left, to the bit.
 TEST_F(Losses, ColorSumsTheDifferencesOfEachImageInOrder) {
   const nn::Shape shape = {6, 3, 5, 7};

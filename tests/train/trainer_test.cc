@@ -170,20 +170,35 @@ TEST_F(TrainerTest, CheckpointsAloneAreARun) {
 }
 
 TEST_F(TrainerTest, ARunWithoutItsCheckpointsDoesNotStartAnew) {
-  job_.config.schedule.steps = 7;  // checkpoints are due at 3 and 6
+  job_.config.schedule.steps = 7;
   ExpectFinishes();
   std::filesystem::remove_all(job_.run / "checkpoints");
+  const auto gone = LoadNewestCheckpoint(context_, job_.run);
+  ExpectMessage(gone.status(), job_.run.string() + ": there is no checkpoint");
   const std::string curves = ReadText(job_.run / "metrics.jsonl").value();
+  job_.config.schedule.checkpoint_every = 100;  // however often they were saved
   ExpectMessage(Run().status(), job_.run.string(), "up to step 7", "--out", "--force");
   EXPECT_EQ(ReadText(job_.run / "metrics.jsonl").value(), curves);
   // As if it was killed while the first of them was saved.
-  Write("run/metrics.jsonl", curves.substr(0, curves.find("{\"step\":7")));
-  std::vector<std::string> warnings;
-  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  Write("run/metrics.jsonl", curves.substr(0, curves.find("{\"step\":2")));
   EXPECT_EQ(Ok(Run())->first_step, 0);
   EXPECT_EQ(ReadLog(job_.run)->size(), 7u);
-  ASSERT_EQ(warnings.size(), 2u);  // the other one: of few models
-  ExpectIn(warnings[0], job_.run.string(), "starts anew", "step 6");
+}
+
+TEST_F(TrainerTest, ADivergedNetworkIsToldWhatMayHelp) {
+  ValueOf<double>(job_.config, "optimizer.learning_rate") = 1;
+  ValueOf<double>(job_.config, "optimizer.beta2") = 0;
+  ValueOf<double>(job_.config, "loss.iou") = 1e12;
+  ExpectMessage(Run().status(), "cannot be rendered", "optimizer.learning_rate");
+}
+
+TEST_F(TrainerTest, TheFirstStepIsSaved) {
+  job_.config.schedule.checkpoint_every = 100;
+  job_.config.schedule.keep_checkpoints = 3;
+  RunWhole("run", 1);
+  const std::vector<Path> files = ListCheckpoints(folder_ / "run");
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_EQ(files[0].filename(), "step_00000001.safetensors");
 }
 
 TEST_F(TrainerTest, ARunThatCannotWriteItsFirstFilesIsOneToResume) {

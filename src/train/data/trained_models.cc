@@ -89,11 +89,17 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
       seen[0].substr(seen[0].find(' ') + 1));
 }
 
-Status WarnWithoutList(const Path& run, const WarningSink& warn) {
+Result<bool> HasTrainedList(const Path& run) {
   for (const char* name : {kTrainedModels, kTrainedPhotographs}) {
     TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, name));
-    if (list) return {};
+    if (list) return true;
   }
+  return false;
+}
+
+Status WarnWithoutList(const Path& run, const WarningSink& warn) {
+  TILEGRAD_ASSIGN(const bool listed, HasTrainedList(run));
+  if (listed) return {};
   warn(fmt::format(
       "{}: has no {} (of photographs: {}), which lists what it was trained on: what is taken for "
       "held out may be among it",

@@ -22,8 +22,10 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, std::int64
 // their meshes. OK for a run without a list. `run`: as for ReadRunFile.
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split = Split::kTest);
 
-// Tells `warn` of a run without a list, for which CheckHeldOut cannot tell. Runs on photographs
-// have a list of these instead.
+// Whether the run has a list; runs on photographs have one of these.
+Result<bool> HasTrainedList(const Path& run);
+
+// Tells `warn` of a run without a list, for which CheckHeldOut cannot tell.
 Status WarnWithoutList(const Path& run, const WarningSink& warn);
 
 }  // namespace tilegrad::train

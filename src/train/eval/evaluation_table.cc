@@ -161,8 +161,12 @@ std::string Notes(const Evaluation& evaluation) {
   if (HasAny(evaluation, &Score::texture_l1))
     notes +=
         " Texture L1 and texture + light L1: mean difference of colour over all pixels of the "
-        "input's view, without light and with it, of 1. Light: angle between its direction and the "
-        "true one.";
+        "input's view, without light and with it, of 1.";
+  if (HasAny(evaluation, &Score::light_angle))
+    notes +=
+        " Light: angle between its direction and the true one; light / constant: as a multiple of "
+        "that of the mean light. Search: the light under which the prediction, or what it is given "
+        "of the truth, is most like the input.";
   const auto has_error = [](const EvaluationRow& row) { return row.error.has_value(); };
   if (std::ranges::any_of(evaluation.rows, has_error)) notes += kErrorNote;
   if (evaluation.unusable_predictions > 0)
@@ -351,6 +355,7 @@ Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   const int most = std::numeric_limits<int>::max();
   fields.Read("predictor", &out.predictor);
   fields.Read("split", &out.split);
+  if (json.is_object() && json.contains("dataset")) fields.Read("dataset", &out.dataset_source);
   fields.Read("views_per_model", 1, most, &out.views_per_model);
   fields.Read("shape_threshold", &out.shape_threshold);
   if (json.is_object() && json.contains("retrieval_models"))  // not in those of elder programs

@@ -58,6 +58,7 @@ std::optional<ClassedMean> DifferenceOf(const std::vector<ScorePair>& pairs,
 }
 
 const char* VerdictOn(const PairedDifference& d) {
+  if (!d.difference.error) return "too few models to tell";
   return d.tie() ? "a tie" : d.better() ? "better" : "worse";
 }
 

@@ -257,11 +257,12 @@ function svg(name, attributes, parent, text) {
   return element;
 }
 
-// Round numbers over [0, high], about `count` of them.
-function ticks(high, count) {
-  const rough = (high || 1) / count, power = 10 ** Math.floor(Math.log10(rough));
+// Round numbers over [low, high], about `count` of them.
+function ticks(low, high, count) {
+  const rough = (high - low || 1) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= 0.7 * rough);
-  return Array.from({length: Math.floor(high / step + 1e-9) + 1}, (_, i) => +(i * step).toPrecision(12));
+  const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
+  return Array.from({length: last - first + 1}, (_, i) => +((first + i) * step).toPrecision(12));
 }
 
 const format = (x) => x === null ? '–' : Math.abs(x) >= 1000 ? Math.round(x).toLocaleString('en') : String(+x.toPrecision(4));
@@ -285,7 +286,8 @@ class Chart {
     head.className = 'chart-head', heading.textContent = title;
     this.readout = document.createElement('output');
     head.append(heading, this.readout);
-    const last = this.mean[this.mean.length - 1];
+    this.last = this.values.reduce((last, value, i) => value === null ? last : i, 0);
+    const last = this.mean[this.last];
     this.drawing = svg('svg', {role: 'img', tabindex: 0, 'aria-label': `${title} against steps, ${format(this.mean[0])} at first, ${format(last)} at last`});
     this.element.append(head, this.drawing);
     this.listen(moved);
@@ -309,31 +311,33 @@ class Chart {
     return best;
   }
   x(i) { return this.left + this.inner * this.steps[i] / (this.steps[this.steps.length - 1] || 1); }
-  y(value) { return height - margin.bottom - (height - margin.top - margin.bottom) * value / this.high; }
+  y(value) { return height - margin.bottom - (height - margin.top - margin.bottom) * (value - this.low) / (this.high - this.low); }
   path(values) {
     let pen = 'M';
     return values.map((value, i) => {
-      const part = value === null ? '' : `${pen}${this.x(i).toFixed(1)} ${this.y(value).toFixed(1)}`;
+      const start = pen === 'M' ? 'h0' : '';  // one without neighbours is a dot
+      const part = value === null ? '' : `${pen}${this.x(i).toFixed(1)} ${this.y(value).toFixed(1)}${start}`;
       pen = value === null ? 'M' : 'L';
       return part;
     }).join('');
   }
   axes() {
-    for (const tick of ticks(this.high, 4)) {
+    for (const tick of ticks(this.low, this.high, 4)) {
       const y = this.y(tick);
       svg('line', {class: 'grid', x1: this.left, x2: this.width - margin.right, y1: y, y2: y}, this.drawing);
       svg('text', {x: this.left - 6, y: y + 4, 'text-anchor': 'end'}, this.drawing, format(tick));
     }
     const end = this.steps[this.steps.length - 1];
-    for (const tick of ticks(end, this.width > 380 ? 6 : 4)) {
+    for (const tick of ticks(0, end, this.width > 380 ? 6 : 4)) {
       const x = this.left + this.inner * tick / (end || 1);
       svg('text', {x, y: height - margin.bottom + 15, 'text-anchor': 'middle'}, this.drawing, tick.toLocaleString('en'));
     }
     svg('text', {x: this.left + this.inner / 2, y: height - 4, 'text-anchor': 'middle'}, this.drawing, 'step');
   }
   draw() {
-    this.high = Math.max(0, ...this.values) * 1.02 || 1;
-    this.left = 14 + 7 * Math.max(...ticks(this.high, 4).map((tick) => format(tick).length));
+    this.low = Math.min(0, ...this.values) * 1.02;
+    this.high = Math.max(0, ...this.values) * 1.02 || (this.low < 0 ? 0 : 1);
+    this.left = 14 + 7 * Math.max(...ticks(this.low, this.high, 4).map((tick) => format(tick).length));
     this.width = this.element.clientWidth, this.inner = this.width - this.left - margin.right;
     this.drawing.setAttribute('viewBox', `0 0 ${this.width} ${height}`);
     this.drawing.replaceChildren();
@@ -343,10 +347,10 @@ class Chart {
     this.cursor = svg('g', {class: 'cursor'}, this.drawing);
     this.point(null);
   }
-  // Reads the curve at a logged step, or at its end.
+  // Reads the curve at a logged step, or at its end, which may be before that of others.
   point(index) {
     this.at = index;
-    const shown = index ?? this.steps.length - 1;
+    const shown = index ?? this.last;
     this.readout.textContent = `step ${this.steps[shown].toLocaleString('en')}: ${format(this.values[shown])}`;
     this.cursor.replaceChildren();
     if (index === null) return;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "scene/shrink_image.h"
+#include "train/data/trained_models.h"
 #include "train/predictor.h"
 #include "train/report/html.h"
 #include "train/run/run_files.h"
@@ -262,6 +263,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   TILEGRAD_ASSIGN(facts.run, ReadRun(job.run));
   facts.data = job.data.string();
   TILEGRAD_ASSIGN(facts.evaluation, ReadEvaluation(job.run));
+  TILEGRAD_ASSIGN(facts.listed, HasTrainedList(job.run));
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(job.run, workers));
   facts.predictor = predictor.description();
   facts.step = predictor.step();

@@ -34,6 +34,7 @@ struct ReportFacts {
   std::string predictor;  // Predictor::description
   std::int64_t step = 0;  // of the checkpoint shown
   std::optional<Evaluation> evaluation;
+  bool listed = false;  // what the run was trained on, so that nothing of that is shown as held out
   Showcase showcase;
 };
 

@@ -12,19 +12,12 @@ namespace tilegrad::train {
 namespace {
 
 std::string Comparison(const Evaluation& evaluation) {
-  const auto& rows = evaluation.rows;
-  const double own = rows.back().mean.main();
-  const auto beaten = static_cast<std::size_t>(std::count_if(
-      rows.begin(), rows.end() - 1, [&](const auto& row) { return row.mean.main() < own; }));
-  std::string baselines;
-  for (std::size_t i = 0; i + 1 < rows.size(); ++i)
-    baselines += fmt::format("{}the {} has {:.1f} %", i > 0 ? ", " : "", EscapeHtml(rows[i].method),
-                             100 * rows[i].mean.main());
-  if (baselines.empty()) return ".";
-  const char* verdict = beaten + 1 == rows.size() ? "above every baseline"
-                        : beaten > 0              ? "above one baseline but not all"
-                                                  : "not above the baselines";
-  return fmt::format(", {}: {}.", verdict, baselines);
+  std::string out;
+  for (std::size_t i = 0; i + 1 < evaluation.rows.size(); ++i) {
+    const EvaluationRow& row = evaluation.rows[i];
+    out += fmt::format("; {}: {:.1f} %", EscapeHtml(row.method), 100 * row.mean.main());
+  }
+  return out + ".";
 }
 
 // Whether the methods differ in light only, so that images compare them.
@@ -53,11 +46,18 @@ std::string EvaluationSentence(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
+  const char* const thing = IsOfPhotographs(evaluation) ? "photograph" : "model";
   return fmt::format(
-      "On {} {} of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}", WithCommas(models),
-      Plural("model", models == 1), EscapeHtml(evaluation.split), MainMeasure(evaluation),
+      "Mean {} on {} {} of the {} split: <b>{:.1f} %</b>{}", MainMeasure(evaluation),
+      WithCommas(models), Plural(thing, models == 1), EscapeHtml(evaluation.split),
       100 * evaluation.rows.back().mean.main(),
       IsOfLight(evaluation) ? ComparisonOfLight(evaluation) : Comparison(evaluation));
+}
+
+std::string HeldOutSentence(const ReportFacts& facts) {
+  if (facts.showcase.generated) return "";
+  if (facts.listed) return "None of these was seen in training. ";
+  return "The run has no list of what it was trained on: these may be among it. ";
 }
 
 // A word as a shell reads it back.
@@ -184,6 +184,10 @@ std::string NotesHtml(const ReportFacts& facts) {
   if (evaluation.unusable_predictions > 0)
     out += fmt::format(" {} predictions without extent or area score 0.",
                        evaluation.unusable_predictions);
+  const std::string& source = evaluation.dataset_source;
+  if (!source.empty() && source != facts.run.header.dataset_source)
+    out += fmt::format(" The scored models are of another source than those trained on: {}.",
+                       EscapeHtml(source));
   if (evaluation.predictor != facts.predictor)
     out += fmt::format(" The scores are of: {}; the pictures and meshes of this page are of: {}.",
                        EscapeHtml(evaluation.predictor), EscapeHtml(facts.predictor));
@@ -241,7 +245,8 @@ std::string LightHtml(const Evaluation& evaluation) {
   return SideTable("Texture and light", kColumns, lines,
                    "L1: mean colour difference over all pixels of the input view, on a scale of 0 "
                    "to 1. Light: angle between the predicted and the true direction. Lower is "
-                   "better.");
+                   "better. Search: the light under which the prediction, or what it is given of "
+                   "the truth, is most like the input.");
 }
 
 }  // namespace
@@ -289,7 +294,8 @@ std::string ComparisonHtml(const ReportFacts& facts) {
 Result<std::string> ModelsHtml(const ReportFacts& facts) {
   if (facts.showcase.examples.empty())
     return std::string("<p>The dataset has no test models to show.</p>");
-  std::string out = "<p class=\"note\">" + EscapeHtml(facts.showcase.note) + "</p>\n";
+  std::string out =
+      "<p class=\"note\">" + HeldOutSentence(facts) + EscapeHtml(facts.showcase.note) + "</p>\n";
   for (std::size_t i = 0; i < facts.showcase.examples.size(); ++i) {
     TILEGRAD_ASSIGN(const std::string row, RowHtml(facts, i));
     out += row;

@@ -137,9 +137,10 @@ Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
 Status WriteWeights(nn::Context& context, const Path& file, const Checkpoint& weights,
                     nn::StoredFloats floats) {
   const nn::TensorFile whole{weights.tensors, MetadataOf(weights.info)};
-  TILEGRAD_ASSIGN(const Bytes bytes, nn::EncodeSafetensors(whole, floats));
+  const auto bytes = nn::EncodeSafetensors(whole, floats);
+  if (!bytes.ok()) return bytes.status().Within(file.string());
   // The checksum is that of what a reader gets.
-  TILEGRAD_ASSIGN(nn::TensorFile stored, nn::DecodeSafetensors(context, bytes));
+  TILEGRAD_ASSIGN(nn::TensorFile stored, nn::DecodeSafetensors(context, *bytes));
   stored.metadata[kChecksum] = ChecksumOf(stored);
   return nn::WriteSafetensors(file, stored, floats);
 }
@@ -156,9 +157,11 @@ std::vector<Path> ListCheckpoints(const Path& run) {
 
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
   TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
-  if (files.empty())
-    return NotFound("{}: not the folder of a run: there is no checkpoint in {}", run.string(),
-                    Folder(run).string());
+  if (files.empty()) {
+    const auto holds = HoldsRun(run);
+    const char* const what = holds.ok() && *holds ? "" : "not the folder of a run: ";
+    return NotFound("{}: {}there is no checkpoint in {}", run.string(), what, Folder(run).string());
+  }
   FoundCheckpoint found;
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     bool damaged = false;

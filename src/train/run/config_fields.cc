@@ -285,8 +285,10 @@ std::string WriteFields(const ConfigFields& fields) {
 std::string ResultSettings(const ConfigFields& fields) {
   std::string out;
   for (const ConfigField& field : fields) {
-    if (field.affects == Affects::kResult)
-      out += fmt::format("{} = {}\n", field.key, ShortText(field.target));
+    if (field.affects == Affects::kReporting) continue;
+    std::string text = ShortText(field.target);
+    if (field.affects == Affects::kPlace && !text.empty()) text = "(a place)";
+    out += fmt::format("{} = {}\n", field.key, text);
   }
   return out;
 }

@@ -13,8 +13,9 @@
 
 namespace tilegrad::train {
 
-// What a key changes. A run continues only with the same results; the rest may change.
-enum class Affects { kResult, kReporting };
+// What a key changes. A run continues only with the same results; the rest may change. kPlace: what
+// lies at that path affects the result, but it may have moved since the run was started.
+enum class Affects { kResult, kReporting, kPlace };
 
 struct ConfigField {
   std::string
@@ -43,7 +44,7 @@ Status CheckFields(const ConfigFields& fields);
 // Complete TOML with a comment on each key; tables appear in the order of their first keys. Reading
 // it back gives the same values.
 std::string WriteFields(const ConfigFields& fields);
-// A line "key = value" for each field that affects the result.
+// A line "key = value" for each field that affects the result; of a place only whether it is set.
 std::string ResultSettings(const ConfigFields& fields);
 
 }  // namespace tilegrad::train

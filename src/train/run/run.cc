@@ -115,24 +115,16 @@ class Session {
     return {};
   }
 
-  // A run that was killed before its first checkpoint has none; one whose checkpoints were removed
+  // A run that was killed in its first step has no checkpoint; one whose checkpoints were removed
   // must not write over the curves of what they held.
   Status StartAnew() const {
     TILEGRAD_ASSIGN(const std::int64_t last, LastLogged(plan_.folder));
-    const std::string folder = plan_.folder.string();
-    // The first checkpoint is saved beside the steps, and awaited when the second is due.
-    if (last > 2 * plan_.schedule.checkpoint_every) {
-      return DataLoss(
-          "{}: its metrics.jsonl goes up to step {}, but its checkpoints are gone: there is "
-          "nothing to resume; start anew in another folder with --out, or in this one with "
-          "--force, which removes the run",
-          folder, last);
-    }
-    if (last > 0 && plan_.warn) {
-      plan_.warn(fmt::format("{}: has no checkpoint: starts anew, although its log went to step {}",
-                             folder, last));
-    }
-    return {};
+    if (last <= 1) return {};
+    return DataLoss(
+        "{}: its metrics.jsonl goes up to step {}, but its checkpoints are gone: there is "
+        "nothing to resume; start anew in another folder with --out, or in this one with "
+        "--force, which removes the run",
+        plan_.folder.string(), last);
   }
 
   Status OneStep() {
@@ -146,8 +138,9 @@ class Session {
     const bool last = done_ >= End();
     if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
     TILEGRAD_TRY(Draw());
-    if (done_ % s.checkpoint_every == 0 || last) TILEGRAD_TRY(Save());
-    return {};
+    if (done_ % s.checkpoint_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Save());
+    // From the first step on there is a checkpoint, and the disk has room for one.
+    return done_ == 1 ? AwaitSave() : Status();
   }
 
   Status Draw() {

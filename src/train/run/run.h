@@ -86,7 +86,7 @@ struct RunPlan {
   std::string may_differ = {};
   bool locked = false;         // the caller holds the folder's lock already
   double max_minutes = 0;      // > 0: save and stop after this long
-  WarningSink warn = nullptr;  // of broken checkpoints passed over, of steps before the first one
+  WarningSink warn = nullptr;  // of broken checkpoints passed over
   PictureSink drawn = nullptr;
 };
 

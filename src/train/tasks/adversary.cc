@@ -29,7 +29,7 @@ ConfigFields FieldsOf(AdversaryConfig* c) {
       {"adversarial.network", &c->network, 0, 0,
        "the network of the perceptual loss: \"classify\" or \"vgg16\""},
       {"adversarial.network_file", &c->network_file, 0, 0,
-       "run folder of that network, or the safetensors file of its weights"},
+       "run folder of that network, or the safetensors file of its weights", Affects::kPlace},
       {"adversarial.penalty", &c->penalty, 0, kNoLimit, "weight of the gradient penalty"},
       {"adversarial.place", &c->place, 0, 0,
        "where the penalty is evaluated: at \"rendered\" pictures or at \"interpolates\""},
@@ -69,8 +69,9 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
     return InvalidArgument(
         "adversarial.perceptual needs adversarial.network_file, e.g. the folder of a run of "
         "configs/classify.toml");
-  TILEGRAD_ASSIGN(out->perceptual_,
-                  LoadPerceptualNetwork(context, {config.network, config.network_file}));
+  auto network = LoadPerceptualNetwork(context, {config.network, config.network_file});
+  if (!network.ok()) return network.status().Within("adversarial.network_file");
+  out->perceptual_ = std::move(*network);
   return out;
 }
 

@@ -215,9 +215,9 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
   TILEGRAD_ASSIGN(const Dataset dataset, OpenHeldOut(request));
   Showcase out = AboutDataset(dataset, request.header);
   out.note =
-      "The network saw none of these in training. From the first picture alone it predicted one "
-      "mesh, here from three sides beside the truth. The models are spread over the classes in the "
-      "dataset's order, not picked by hand.";
+      "From the first picture alone the network predicted one mesh, here from three sides beside "
+      "the truth. The models are spread over the classes in the dataset's order, not picked by "
+      "hand.";
   const ShowcaseBuilder builder(dataset, request.predictor, workers);
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int model : chosen) {

@@ -7,6 +7,17 @@
 #include "nn/nn.h"
 
 namespace tilegrad::train {
+namespace {
+
+// What a scene may be refused for is the network's prediction: all else was checked before.
+Status OfPrediction(const Status& status) {
+  if (status.code() != StatusCode::kInvalidArgument) return status;
+  return InternalError(
+      "the prediction cannot be rendered: {}; a smaller optimizer.learning_rate may help",
+      status.message());
+}
+
+}  // namespace
 
 LearnedWeights::LearnedWeights(nn::Context& context, nn::Module& network,
                                const OptimizerConfig& config, std::int64_t steps)
@@ -26,7 +37,7 @@ Result<nn::StepVector<nn::Gradient>> LearnedWeights::Gradients(const nn::Var& lo
                                                                nn::GradientListener* listener,
                                                                const StepValues& values) {
   auto gradients = nn::Gradients(loss, adam_.parameters(), listener);
-  TILEGRAD_TRY(context_.TakeStatus());
+  TILEGRAD_TRY(OfPrediction(context_.TakeStatus()));
   if (std::isfinite(values.loss) && nn::IsFinite(context_, gradients)) return gradients;
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",

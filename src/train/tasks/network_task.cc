@@ -14,8 +14,10 @@ Status NetworkTask::BeginStart(const TaskStart& start, std::int64_t batch) {
 }
 
 Status NetworkTask::StartAs(const Path& run) {
-  TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(*context_, run));
-  return LoadPredictingWeights(weights().network(), found.checkpoint.tensors).Within(run.string());
+  const std::string place = "start.run = \"" + run.string() + "\"";
+  const auto found = FindCheckpoint(*context_, run);
+  if (!found.ok()) return found.status().Within(place);
+  return LoadPredictingWeights(weights().network(), found->checkpoint.tensors).Within(place);
 }
 
 RunHeader NetworkTask::Header() {

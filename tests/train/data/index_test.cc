@@ -140,8 +140,6 @@ class IndexTest : public TempFolderTest {
   }
 };
 
-TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(folder_).ok()); }
-
 // Datasets of before have none; a shape of its own is written nowhere.
 TEST_F(IndexTest, ShapesAreOptional) {
   auto models = ReadModels(folder_, ReadDatasetInfo(folder_).value()).value();

@@ -224,6 +224,11 @@ TEST(Paired, SmallDifferencesAreTies) {
   EXPECT_TRUE(IouOf(*comparison).tie());
 }
 
+TEST(Paired, OneModelTellsNothing) {
+  const auto comparison = Ok(ComparePaired(Scored("a", {0.3}), Scored("b", {0.2})));
+  ExpectIn(FormatComparison(*comparison), "+10.0 ± ?  too few models to tell");
+}
+
 // Two liveries of one shape count as one: without that, the error would be half as large.
 TEST(Paired, ModelsOfAShapeCountOnce) {
   Evaluation first = Scored("a", {0.3, 0.3, 0.5, 0.5}), second = Scored("b", {0.2, 0.2, 0.5, 0.5});

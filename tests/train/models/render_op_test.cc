@@ -171,67 +171,63 @@ double LightAt(std::span<const double> sh, const shade::Vec3<double>& n) {
   return shade::ShLightRef(shade::ShPolynomialOf<double>(sh), n);
 }
 
+class LightFrames : public testing::Test {
+ protected:
+  const Workers workers_{1};
+  nn::Context context_{workers_, nn::DType::kF64};
+  const std::vector<Camera> cameras_ = SomeCameras();
+};
+
 // A normal of the world and the same one in the camera's axes have the same light. Rotations are of
 // floats, so 1e-6.
-TEST(LightFrames, HarmonicsShineOnTheSameSides) {
-  const Workers workers(1);
-  nn::Context context(workers, nn::DType::kF64);
-  const std::vector<Camera> cameras = SomeCameras();
+TEST_F(LightFrames, HarmonicsShineOnTheSameSides) {
   Rng rng(2);
-  const std::vector<double> seen = Random(9 * cameras.size(), rng);
+  const std::vector<double> seen = Random(9 * cameras_.size(), rng);
   const nn::Var world = HarmonicsToWorld(
-      nn::Constant(context, context.From({3, 9}, std::span<const double>(seen))), cameras);
-  ASSERT_TRUE(context.status().ok()) << context.status().message();
-  for (std::size_t n = 0; n < cameras.size(); ++n) {
+      nn::Constant(context_, context_.From({3, 9}, std::span<const double>(seen))), cameras_);
+  ASSERT_TRUE(context_.status().ok()) << context_.status().message();
+  for (std::size_t n = 0; n < cameras_.size(); ++n) {
     std::array<float, 9> row;
     for (std::size_t i = 0; i < 9; ++i) row[i] = static_cast<float>(seen[9 * n + i]);
-    const std::array<float, 9> alone = HarmonicsToWorld(row, cameras[n]);
+    const std::array<float, 9> alone = HarmonicsToWorld(row, cameras_[n]);
     const auto got = world.value().span<double>().subspan(9 * n, 9);
     for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(alone[i], got[i], 1e-6);
     for (int k = 0; k < 20; ++k) {
       const shade::Vec3<double> normal = UnitNormal(rng);
       EXPECT_NEAR(LightAt(got, normal),
-                  LightAt(std::span(seen).subspan(9 * n, 9), ToCamera(cameras[n], normal)), 1e-6);
+                  LightAt(std::span(seen).subspan(9 * n, 9), ToCamera(cameras_[n], normal)), 1e-6);
     }
   }
 }
 
-TEST(LightFrames, DirectionsKeepTheirAngles) {
-  const Workers workers(1);
-  nn::Context context(workers, nn::DType::kF64);
-  const std::vector<Camera> cameras = SomeCameras();
+TEST_F(LightFrames, DirectionsKeepTheirAngles) {
   Rng rng(3);
   const std::vector<double> seen = Random(9, rng);
   const nn::Var world = DirectionsToWorld(
-      nn::Constant(context, context.From({3, 3}, std::span<const double>(seen))), cameras);
+      nn::Constant(context_, context_.From({3, 3}, std::span<const double>(seen))), cameras_);
   for (std::size_t n = 0; n < 3; ++n) {
     const double* const d = world.value().data<double>() + 3 * n;
-    const shade::Vec3<double> back = ToCamera(cameras[n], {d[0], d[1], d[2]});
+    const shade::Vec3<double> back = ToCamera(cameras_[n], {d[0], d[1], d[2]});
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(back[i], seen[3 * n + i], 1e-6);
   }
 }
 
-TEST(LightFrames, GradientsAgreeWithDifferences) {
-  const Workers workers(1);
-  nn::Context context(workers, nn::DType::kF64);
-  const std::vector<Camera> cameras = SomeCameras();
+TEST_F(LightFrames, GradientsAgreeWithDifferences) {
   Rng rng(4);
   for (const std::int64_t numbers : {3, 9}) {
-    const nn::Var x = nn::RandomParameter(context, {{3, numbers}}, rng),
-                  w = nn::RandomConstant(context, {3, numbers}, rng);
+    const nn::Var x = nn::RandomParameter(context_, {{3, numbers}}, rng),
+                  w = nn::RandomConstant(context_, {3, numbers}, rng);
     const auto loss = [&] {
-      return nn::Sum(w *
-                     (numbers == 3 ? DirectionsToWorld(x, cameras) : HarmonicsToWorld(x, cameras)));
+      return nn::Sum(
+          w * (numbers == 3 ? DirectionsToWorld(x, cameras_) : HarmonicsToWorld(x, cameras_)));
     };
     nn::ExpectGradientBy({x}, loss, rng);
   }
 }
 
-TEST(LightFrames, OneLightForEachCamera) {
-  const Workers workers(1);
-  nn::Context context(workers);
-  DirectionsToWorld(nn::Constant(context, context.Full({2, 3}, 1.0)), SomeCameras());
-  ExpectMessage(context.TakeStatus(), "lights [2, 3] of 3 cameras");
+TEST_F(LightFrames, OneLightForEachCamera) {
+  DirectionsToWorld(nn::Constant(context_, context_.Full({2, 3}, 1.0)), cameras_);
+  ExpectMessage(context_.TakeStatus(), "lights [2, 3] of 3 cameras");
 }
 
 // The renderer on the tape: gradients of everything that a network may predict, in float64 against

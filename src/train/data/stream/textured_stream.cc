@@ -53,7 +53,8 @@ ConfigFields FieldsOf(TexturedStreamConfig* c) {
                     "largest texture of the source, texels a side; larger ones are averaged down"});
   fields.push_back({"stream.models", &c->meshes.folder, 0, 0,
                     "folder with the models of --source folder; \"\": the installed packages, or "
-                    "else the dataset's coloured meshes"});
+                    "else the dataset's coloured meshes",
+                    Affects::kPlace});
   fields.push_back({"stream.crease", &c->meshes.crease, 0, 180,
                     "edges below this angle are shaded smoothly, degrees; 0: flat shading"});
   fields.push_back(

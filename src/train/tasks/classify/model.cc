@@ -285,8 +285,8 @@ Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel&
   Showcase out = AboutDataset(dataset, request.header);
   out.purpose = "to classify an object from one image";
   out.note =
-      "The network saw none of these in training. The predicted class stands below each picture. "
-      "The models are spread over the classes in the dataset's order, not picked by hand.";
+      "The predicted class stands below each picture. The models are spread over the classes in "
+      "the dataset's order, not picked by hand.";
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int m : chosen) {
     TILEGRAD_TRY(

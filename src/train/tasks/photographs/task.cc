@@ -104,8 +104,8 @@ class PhotographsTask : public NetworkTask {
                     Count(request.header.training_models, "photograph"),
                     set.keypoint_names.empty() ? "" : " and keypoints");
     out.note =
-        "The network saw none of these in training. Dots are annotated keypoints, rings predicted "
-        "ones. Photographs are spread evenly over the held-out ones, not picked by hand.";
+        "Dots are annotated keypoints, rings predicted ones. Photographs are spread evenly over "
+        "the held-out ones, not picked by hand.";
     TILEGRAD_ASSIGN(const PhotoStore store,
                     PhotoStore::Load(set, ChoosePhotographs(set, Split::kTest, request.examples),
                                      model.config().crop, static_cast<int>(model.config().size),

@@ -103,9 +103,8 @@ class TexturedImageTask : public NetworkTask {
     out.purpose = "to predict shape, texture and light of an object from one image";
     out.data += " It saw only pictures that were rendered while it trained, no 3D data.";
     out.note =
-        "The network saw none of these in training. From the first picture alone it predicted a "
-        "mesh, its texture map and the light. The models are spread over the classes in the "
-        "dataset's order, not picked by hand.";
+        "From the first picture alone the network predicted a mesh, its texture map and the light. "
+        "The models are spread over the classes in the dataset's order, not picked by hand.";
     auto& model = *request.predictor.model().textured();
     const int size = dataset.info().image_size;
     ObjectPictures pictures = Pictures(size);

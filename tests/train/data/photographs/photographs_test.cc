@@ -316,29 +316,25 @@ TEST_F(PhotoFolderTest, WithoutKeypointsThereAreNoCameras) {
 
 TEST_F(PhotoFolderTest, BrokenKeypointsAreErrors) {
   WritePictures(6);
+  const auto refused = [&](const std::string& text, const auto&... parts) {
+    Write("keypoints.json", text);
+    ExpectMessage(OpenPhotographs(folder_).status(), parts...);
+  };
   const std::string good = ReadText(folder_ / "keypoints.json").value();
-  ExpectMessage(OpenPhotographs(folder_).status(), "keypoints.json", "at least 8 photographs");
-  Write("keypoints.json", "{");
-  ExpectMessage(OpenPhotographs(folder_).status(), "not a JSON object");
-  Write("keypoints.json", "{}");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"names\"");
-  Write("keypoints.json", std::string(kNames) + "\"photographs\": {\"p100.png\": [1]}}");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"p100.png\" needs 8 keypoints");
-  Write("keypoints.json", R"({"names": ["a"], "mirror": [["a", "z"]]})");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"z\" is not one of");
-  Write("keypoints.json", R"({"names": ["a", "b", "a"]})");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"names\" has \"a\" twice");
+  refused(good, "keypoints.json", "at least 8 photographs");
+  refused("{", "not a JSON object");
+  refused("{}", "\"names\"");
+  refused(std::string(kNames) + "\"photographs\": {\"p100.png\": [1]}}",
+          "\"p100.png\" needs 8 keypoints");
+  refused(R"({"names": ["a"], "mirror": [["a", "z"]]})", "\"z\" is not one of");
+  refused(R"({"names": ["a", "b", "a"]})", "\"names\" has \"a\" twice");
   // No mirror images: their pairs would be a ring.
-  Write("keypoints.json", R"({"names": ["a", "b", "c"], "mirror": [["a", "b"], ["b", "c"]]})");
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"mirror\" has \"b\" or \"c\" twice");
-  std::string wrong = good;
-  wrong.replace(wrong.find("null"), 4, "[1e300, 5]");
-  Write("keypoints.json", wrong);
-  ExpectMessage(OpenPhotographs(folder_).status(), "keypoints.json", "1e+300", "pixels away");
-  wrong = good;
-  wrong.replace(wrong.find("null"), 4, "\"hm\"");
-  Write("keypoints.json", wrong);
-  ExpectMessage(OpenPhotographs(folder_).status(), "\"hm\" is neither");
+  refused(R"({"names": ["a", "b", "c"], "mirror": [["a", "b"], ["b", "c"]]})",
+          "\"mirror\" has \"b\" or \"c\" twice");
+  std::string far_away = good, word = good;
+  refused(far_away.replace(good.find("null"), 4, "[1e300, 5]"), "keypoints.json", "1e+300",
+          "pixels away");
+  refused(word.replace(good.find("null"), 4, "\"hm\""), "\"hm\" is neither");
 }
 
 TEST_F(PhotoFolderTest, PicturesThatAreNotReadAreNamed) {

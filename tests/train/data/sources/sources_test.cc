@@ -18,12 +18,22 @@ namespace tilegrad::train::sources_test {
 
 constexpr const char* kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+const std::string kPainted =
+    "mtllib m.mtl\nvt 0 0\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n";
 
 class SourcesTest : public TempFolderTest {
  protected:
   Result<std::unique_ptr<ModelSource>> Listed() const {
     TILEGRAD_ASSIGN(const SplitList list, SplitList::Read({folder_ / "split.txt"}));
     return ShapeNetSource(folder_ / "net", list);
+  }
+  // Of the folder "set".
+  BuildSummary Build(int workers = 1) const {
+    BuildOptions options;
+    options.image_size = 8;
+    options.views = 2;
+    const auto source = Ok(FolderSource(folder_ / "set"));
+    return Ok(BuildDataset(**source, options, folder_ / "out", Workers(workers), {})).value();
   }
 };
 
@@ -71,40 +81,32 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   ASSERT_EQ((*source)->entries().size(), 2u);
   EXPECT_EQ((*source)->entries()[0].id, "a_b");
   EXPECT_EQ((*source)->entries()[0].class_name, "solid");
-  BuildOptions options;
-  options.image_size = 8;
-  options.views = 2;
-  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}));
-  EXPECT_EQ(summary->models.size(), 1u);
-  ASSERT_EQ(summary->rejected.size(), 1u);
-  ExpectIn(summary->rejected[0].reason, "c.obj");
-  ASSERT_EQ(summary->ignored.size(), 2u);
-  ExpectIn(summary->ignored[0].file, "readme.md");
-  ExpectIn(summary->ignored[1].file, "notes.txt");
+  const BuildSummary summary = Build();
+  EXPECT_EQ(summary.models.size(), 1u);
+  ASSERT_EQ(summary.rejected.size(), 1u);
+  ExpectIn(summary.rejected[0].reason, "c.obj");
+  ASSERT_EQ(summary.ignored.size(), 2u);
+  ExpectIn(summary.ignored[0].file, "readme.md");
+  ExpectIn(summary.ignored[1].file, "notes.txt");
 }
 
 // Models that nobody published are used without their textures.
 TEST_F(SourcesTest, BrokenModelsOfAFolderCostThemselves) {
-  const std::string painted = std::string("mtllib m.mtl\nvt 0 0\nusemtl m\n") +
-                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n";
   Write("set/none/faces.obj", "v 0 0 0\n");
   Write("set/nan/vertex.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   for (const std::string name : {"missing", "cut"}) {
-    Write("set/" + name + "/m.obj", painted);
+    Write("set/" + name + "/m.obj", kPainted);
     Write("set/" + name + "/m.mtl", "newmtl m\nmap_Kd m.png\n");
   }
   Write("set/cut/m.png", "\x89PNG\r\n\x1a\n");
   std::filesystem::create_directory(folder_ / "set/empty");
-  BuildOptions options;
-  options.image_size = 8;
-  const auto source = Ok(FolderSource(folder_ / "set"));
-  const auto summary = Ok(BuildDataset(**source, options, folder_ / "out", Workers(1), {}));
-  EXPECT_EQ(summary->models.size(), 2u);
-  ExpectIn(summary->broken.Summary(), "(none/faces)", "(nan/vertex)");
-  ASSERT_EQ(summary->warnings.size(), 2u);
-  ExpectIn(summary->warnings[0].file + summary->warnings[0].text, "cut/m.obj", "m.png");
-  ExpectIn(summary->warnings[1].file + summary->warnings[1].text, "missing/m.obj", "m.png");
-  ExpectIn(summary->ignored.back().file + summary->ignored.back().reason, "set/empty", "no model");
+  const BuildSummary summary = Build();
+  EXPECT_EQ(summary.models.size(), 2u);
+  ExpectIn(summary.broken.Summary(), "(none/faces)", "(nan/vertex)");
+  ASSERT_EQ(summary.warnings.size(), 2u);
+  ExpectIn(summary.warnings[0].file + summary.warnings[0].text, "cut/m.obj", "m.png");
+  ExpectIn(summary.warnings[1].file + summary.warnings[1].text, "missing/m.obj", "m.png");
+  ExpectIn(summary.ignored.back().file + summary.ignored.back().reason, "set/empty", "no model");
 }
 
 TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
@@ -165,13 +167,6 @@ TEST_F(SourcesTest, HiddenNamesAreNoModels) {
 // Builds a dataset of one folder again and again.
 class RepeatedTest : public SourcesTest {
  protected:
-  BuildSummary Build(int workers = 1) const {
-    BuildOptions options;
-    options.image_size = 8;
-    options.views = 2;
-    const auto source = Ok(FolderSource(folder_ / "set"));
-    return Ok(BuildDataset(**source, options, folder_ / "out", Workers(workers), {})).value();
-  }
   void ExpectBuilt(int reused, int renewed) const {
     const BuildSummary summary = Build();
     EXPECT_EQ(summary.reused, reused);
@@ -198,16 +193,14 @@ TEST_F(RepeatedTest, IdsMayMoveToOtherModels) {
 }
 
 TEST_F(RepeatedTest, ChangedFilesAreReadAgain) {
-  const std::string painted = std::string("mtllib a.mtl\nvt 0 0\nusemtl m\n") +
-                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n";
-  Write("set/c/a.obj", painted);
-  Write("set/c/a.mtl", "newmtl m\nKd 1 0 0\n");
+  Write("set/c/a.obj", kPainted);
+  Write("set/c/m.mtl", "newmtl m\nKd 1 0 0\n");
   Write("set/c/b.obj", kTetrahedron);
   Build();
   ExpectBuilt(2, 0);
-  Write("set/c/a.obj", painted + "# changed\n");
+  Write("set/c/a.obj", kPainted + "# changed\n");
   ExpectBuilt(1, 1);
-  Write("set/c/a.mtl", "newmtl m\nKd 0 1 0\nmap_Kd skin.ppm\n");
+  Write("set/c/m.mtl", "newmtl m\nKd 0 1 0\nmap_Kd skin.ppm\n");
   ExpectBuilt(1, 1);
   ExpectBuilt(2, 0);  // without its texture
   Write("set/c/skin.ppm", std::string("P6 1 1 255\n\x20\x40\x60"));

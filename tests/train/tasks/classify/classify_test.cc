@@ -69,7 +69,7 @@ TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
   ExpectNotIn(table, "IoU");
 
   const std::string page = Page("run", "data", 3);
-  ExpectIn(page, "to classify an object", "a mean accuracy of", "nearest training picture",
+  ExpectIn(page, "to classify an object", "Mean accuracy on", "nearest training picture",
            "most frequent class", "called red", "accuracy, %");
   ExpectNotIn(page, "3D IoU at");
 }

@@ -59,6 +59,7 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   ASSERT_TRUE(read.ok() && read->has_value());
   EXPECT_EQ((*read)->rows[6].mean.light_angle, ours.light_angle);
 
+  ExpectIn(FormatTable(**read), "light / constant", "Search: the light");
   ExpectIn(Page("run", "data", 2), "to predict shape, texture and light", "texture + light L1",
            "true light", "another view", "Angle of the light");
 }
@@ -73,7 +74,7 @@ TEST_F(TexturedTask, WhatDoesNotFitIsAnError) {
       {{"render.rule=softras", "light.model=lambert"}, "\"softras\""},  // it draws no textures
       {{"render.rule=n3mr", "light.model=phong"}, "N3MR has no light.model"},
       {{"light.model=neon"}, "light.model is \"neon\""},
-      {{"start.run=/no/run"}, "/no/run"}};
+      {{"start.run=/no/run"}, "start.run = \"/no/run\""}};
   for (const auto& [settings, part] : cases) ExpectMessage(TrainTextured(settings).status(), part);
 }
 
