@@ -195,27 +195,7 @@ py::dict LoadCheckpoint(const Path& path) {
                   py::arg("warnings") = found.warnings);
 }
 
-}  // namespace
-
-void BindArrayFiles(py::module_& m) {
-  m.def("load_image", &LoadImage, "(H, W, C) uint8.");
-  m.def("save_png", &SavePng, "Writes (H, W, C) uint8.");
-  m.def("load_exr", &LoadExr,
-        "Names of channels, (C, H, W) float32, and warnings about skipped data.");
-  m.def("save_exr", &SaveExr, "Writes (C, H, W) float32 with names of channels.");
-  m.def("load_npy", &LoadNpy, "The array of an .npy file.");
-  m.def("save_npy", &SaveNpy, "Writes an .npy file.");
-  m.def("load_safetensors", &LoadSafetensors, "Arrays and metadata by name.");
-  m.def("save_safetensors", &SaveSafetensors, "Writes arrays and metadata by name.");
-  m.def("load_npz", &LoadNpz, "Arrays by name.");
-  m.def("save_npz", &SaveNpz, "Writes arrays by name.");
-  m.def("load_checkpoint", &LoadCheckpoint,
-        "A checkpoint, or the newest whole one of a run folder.");
-}
-
 // Files of cameras, and the cameras of glTF files.
-
-namespace {
 
 using Size = std::pair<int, int>;                            // width, height
 using ViewTuple = std::tuple<std::string, CameraRow, Size>;  // as Python has it: with its name
@@ -261,6 +241,22 @@ py::array FromGltf(const Mat4Array& node_to_world, const Vec3Array& lens, const 
 }
 
 }  // namespace
+
+void BindArrayFiles(py::module_& m) {
+  m.def("load_image", &LoadImage, "(H, W, C) uint8.");
+  m.def("save_png", &SavePng, "Writes (H, W, C) uint8.");
+  m.def("load_exr", &LoadExr,
+        "Names of channels, (C, H, W) float32, and warnings about skipped data.");
+  m.def("save_exr", &SaveExr, "Writes (C, H, W) float32 with names of channels.");
+  m.def("load_npy", &LoadNpy, "The array of an .npy file.");
+  m.def("save_npy", &SaveNpy, "Writes an .npy file.");
+  m.def("load_safetensors", &LoadSafetensors, "Arrays and metadata by name.");
+  m.def("save_safetensors", &SaveSafetensors, "Writes arrays and metadata by name.");
+  m.def("load_npz", &LoadNpz, "Arrays by name.");
+  m.def("save_npz", &SaveNpz, "Writes arrays by name.");
+  m.def("load_checkpoint", &LoadCheckpoint,
+        "A checkpoint, or the newest whole one of a run folder.");
+}
 
 void BindCameraFiles(py::module_& m) {
   m.def("load_cameras", &LoadCameras,

@@ -60,12 +60,8 @@ void AskTrees(const Queries& how, std::span<const T> queries, const TreeOf& tree
     for (std::size_t b = 0; b < how.batch; ++b) {
       const auto points = PointsOf(Part(queries, how.batch, b));
       const Tree tree(tree_of(b));
-      how.workers.ForRanges(points.size(), kGrain,
-                            [&](std::size_t begin, std::size_t end, std::size_t) {
-                              for (std::size_t i = begin; i < end; ++i) {
-                                answer(tree, points[i], b * points.size() + i);
-                              }
-                            });
+      how.workers.ForEach(points.size(), kGrain,
+                          [&](std::size_t i) { answer(tree, points[i], b * points.size() + i); });
     }
   });
 }
@@ -153,29 +149,8 @@ double VoxelIou(const py::object& a, const py::array& b) {
                          SpanOf<std::uint8_t>(b, "iou", "gt", {kAny}));
 }
 
-}  // namespace
-
-void BindSurfaces(py::module_& m) {
-  m.def("nearest_points", &NearestPoints,
-        "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
-  m.def(
-      "nearest_faces", &NearestFaces,
-      "(B, N, 3), (B, F, 3, 3) -> the nearest face (B, N) int64 and the weights of its corners in\n"
-      "the nearest point (B, N, 3): 0 on the opposite edge.");
-  m.def("enclosed", &Enclosed,
-        "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
-  m.def("sample_faces", &SampleFaces,
-        "(F,) float64 -> faces (count,) int64, distributed by area, and weights of their corners\n"
-        "(count, 3) float64.");
-  m.def("surface_voxels", &SurfaceVoxels,
-        "(F, 3, 3) float64, in voxels -> those that the faces pass through (R, R, R) uint8.");
-  m.def("voxel_iou", &VoxelIou, "(N,) uint8, (N,) uint8.");
-}
-
 // The losses of training and fitting (train/losses), each as its value and its gradient: float32 or
 // float64.
-
-namespace {
 
 using Outcome = std::pair<double, py::array>;
 
@@ -268,6 +243,23 @@ Outcome Iou(const py::array& alpha, const py::array& truth) {
 }
 
 }  // namespace
+
+void BindSurfaces(py::module_& m) {
+  m.def("nearest_points", &NearestPoints,
+        "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
+  m.def(
+      "nearest_faces", &NearestFaces,
+      "(B, N, 3), (B, F, 3, 3) -> the nearest face (B, N) int64 and the weights of its corners in\n"
+      "the nearest point (B, N, 3): 0 on the opposite edge.");
+  m.def("enclosed", &Enclosed,
+        "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
+  m.def("sample_faces", &SampleFaces,
+        "(F,) float64 -> faces (count,) int64, distributed by area, and weights of their corners\n"
+        "(count, 3) float64.");
+  m.def("surface_voxels", &SurfaceVoxels,
+        "(F, 3, 3) float64, in voxels -> those that the faces pass through (R, R, R) uint8.");
+  m.def("voxel_iou", &VoxelIou, "(N,) uint8, (N,) uint8.");
+}
 
 void BindLosses(py::module_& m) {
   const char* text = "(value, gradient) of a mesh: positions (V, 3), faces (F, 3) int32.";

@@ -37,6 +37,19 @@ void GiveBack(const Block& block) {
   }
 }
 
+constexpr int kMostThreads = 1024;
+
+struct Pool {
+  std::mutex mutex;
+  std::map<int, std::unique_ptr<Workers>> workers;
+};
+
+// Never ended: at exit, threads are not joined. A child of a fork has a pool of
+// its own, since the parent's may have been locked at that moment.
+Pool* the_pool = new Pool;
+[[maybe_unused]] const int renewed_in_children =
+    pthread_atfork(nullptr, nullptr, [] { the_pool = new Pool; });
+
 }  // namespace
 
 KeptBlock TakeKeptBlock(std::size_t bytes) {
@@ -55,23 +68,6 @@ KeptBlock TakeKeptBlock(std::size_t bytes) {
   });
   return {block.release()->data, std::move(owner)};
 }
-
-namespace {
-
-constexpr int kMostThreads = 1024;
-
-struct Pool {
-  std::mutex mutex;
-  std::map<int, std::unique_ptr<Workers>> workers;
-};
-
-// Never ended: at exit, threads are not joined. A child of a fork has a pool of
-// its own, since the parent's may have been locked at that moment.
-Pool* the_pool = new Pool;
-[[maybe_unused]] const int renewed_in_children =
-    pthread_atfork(nullptr, nullptr, [] { the_pool = new Pool; });
-
-}  // namespace
 
 const Workers& SharedWorkers(int threads) {
   const int count = std::clamp(threads > 0 ? threads : AvailableCores(), 1, kMostThreads);

@@ -27,6 +27,15 @@ py::ssize_t Length(const py::object& array, py::ssize_t axis_from_end) {
   return values.ndim() < axis_from_end ? 0 : values.shape(values.ndim() - axis_from_end);
 }
 
+template <class T>
+void SetField(std::span<const T> values, Rate, std::span<const T>* to) {
+  *to = values;
+}
+template <class T>
+void SetField(std::span<const T> values, Rate rate, StreamT<T>* to) {
+  *to = {values, rate};
+}
+
 }  // namespace
 
 py::object SceneArrays::operator[](const char* name) const {
@@ -81,19 +90,6 @@ SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
   SetSurfaces();
   SetLights();
 }
-
-namespace {
-
-template <class T>
-void SetField(std::span<const T> values, Rate, std::span<const T>* to) {
-  *to = values;
-}
-template <class T>
-void SetField(std::span<const T> values, Rate rate, StreamT<T>* to) {
-  *to = {values, rate};
-}
-
-}  // namespace
 
 template <class T>
 void SceneRecord<T>::SetStreams() {

@@ -25,6 +25,28 @@ std::align_val_t AlignmentOf(std::size_t bytes) {
   return std::align_val_t(bytes >= kHugePage ? kHugePage : kAlignment);
 }
 
+// Reserves `size` bytes, so that no write to the mapping can fail; -1 if there is no room.
+int OpenScratchFile(std::size_t size) {
+  std::error_code error;
+  static std::atomic<unsigned> count = 0;
+  const auto file = std::filesystem::temp_directory_path(error) /
+                    fmt::format("tilegrad-{}-{}", ::getpid(), count++);
+  const int fd = ::open(file.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0600);
+  if (fd < 0) return -1;
+  ::unlink(file.c_str());
+  if (::posix_fallocate(fd, 0, static_cast<off_t>(size)) == 0) return fd;
+  ::close(fd);
+  return -1;
+}
+
+void* MapBytes(std::size_t size, std::size_t in_memory) {
+  const int fd = size > in_memory ? OpenScratchFile(size) : -1;
+  const int kind = fd < 0 ? MAP_PRIVATE | MAP_ANONYMOUS : MAP_SHARED;
+  void* const bytes = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, kind, fd, 0);
+  if (fd >= 0) ::close(fd);
+  return bytes;
+}
+
 }  // namespace
 
 void* AllocateAligned(std::size_t bytes) {
@@ -61,32 +83,6 @@ std::size_t Arena::capacity() const {
   for (const auto& block : blocks_) total += block.size();
   return total;
 }
-
-namespace {
-
-// Reserves `size` bytes, so that no write to the mapping can fail; -1 if there is no room.
-int OpenScratchFile(std::size_t size) {
-  std::error_code error;
-  static std::atomic<unsigned> count = 0;
-  const auto file = std::filesystem::temp_directory_path(error) /
-                    fmt::format("tilegrad-{}-{}", ::getpid(), count++);
-  const int fd = ::open(file.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0600);
-  if (fd < 0) return -1;
-  ::unlink(file.c_str());
-  if (::posix_fallocate(fd, 0, static_cast<off_t>(size)) == 0) return fd;
-  ::close(fd);
-  return -1;
-}
-
-void* MapBytes(std::size_t size, std::size_t in_memory) {
-  const int fd = size > in_memory ? OpenScratchFile(size) : -1;
-  const int kind = fd < 0 ? MAP_PRIVATE | MAP_ANONYMOUS : MAP_SHARED;
-  void* const bytes = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, kind, fd, 0);
-  if (fd >= 0) ::close(fd);
-  return bytes;
-}
-
-}  // namespace
 
 Result<ScratchBytes> ScratchBytes::OfFile(const Path& file, std::size_t size) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);

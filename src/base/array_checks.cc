@@ -9,8 +9,7 @@
 #include <cstddef>
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad {
-namespace HWY_NAMESPACE {
+namespace tilegrad::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Merges term(v) of all values v, with several independent accumulators.
@@ -76,8 +75,7 @@ bool AllWithinInt(std::span<const std::int32_t> values, std::int32_t least, std:
   return hn::AllTrue(d, hn::Eq(outside, hn::Zero(d)));
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad
+}  // namespace tilegrad::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

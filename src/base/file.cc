@@ -107,18 +107,6 @@ Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
   return out;
 }
 
-}  // namespace
-
-Result<Bytes> ReadFile(const Path& path, std::size_t max_bytes) {
-  return ReadWhole<Bytes>(path, max_bytes);
-}
-
-Result<std::string> ReadText(const Path& path, std::size_t max_bytes) {
-  return ReadWhole<std::string>(path, max_bytes);
-}
-
-namespace {
-
 // Terminals, pipes, /dev/null: a rename would replace them by a file.
 bool IsDevice(const Path& path) {
   struct stat info = {};
@@ -143,7 +131,37 @@ Path BehindLinks(const Path& path) {
   return error ? path : target;
 }
 
+constexpr const char* kEnding = ".tmp";
+
+// The process in a name made by TemporaryOf().
+std::optional<pid_t> WriterOf(const Path& file) {
+  if (file.extension() != kEnding) return std::nullopt;
+  const std::string number = file.stem().extension().string();  // ".123"
+  if (number.size() < 2) return std::nullopt;
+  pid_t writer = 0;
+  const char* end = number.data() + number.size();
+  const auto [at, error] = std::from_chars(number.data() + 1, end, writer);
+  return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
+}
+
+// A file with our own process id is from an earlier process: in a container every run may get the
+// same.
+bool IsRunningElsewhere(pid_t writer) {
+  return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
+}
+
+constexpr int kAttempts = 2;
+constexpr unsigned kPauseMicroseconds = 10'000;
+
 }  // namespace
+
+Result<Bytes> ReadFile(const Path& path, std::size_t max_bytes) {
+  return ReadWhole<Bytes>(path, max_bytes);
+}
+
+Result<std::string> ReadText(const Path& path, std::size_t max_bytes) {
+  return ReadWhole<std::string>(path, max_bytes);
+}
 
 Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes) {
   return WriteFileAtomic(path, BytePieces(&bytes, 1));
@@ -210,29 +228,6 @@ Status RemoveFiles(std::span<const Path> files) {
   return {};
 }
 
-namespace {
-
-constexpr const char* kEnding = ".tmp";
-
-// The process in a name made by TemporaryOf().
-std::optional<pid_t> WriterOf(const Path& file) {
-  if (file.extension() != kEnding) return std::nullopt;
-  const std::string number = file.stem().extension().string();  // ".123"
-  if (number.size() < 2) return std::nullopt;
-  pid_t writer = 0;
-  const char* end = number.data() + number.size();
-  const auto [at, error] = std::from_chars(number.data() + 1, end, writer);
-  return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
-}
-
-// A file with our own process id is from an earlier process: in a container every run may get the
-// same.
-bool IsRunningElsewhere(pid_t writer) {
-  return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
-}
-
-}  // namespace
-
 Path TemporaryOf(const Path& path) {
   const std::string ending = fmt::format(".{}{}", ::getpid(), kEnding);
   std::string name = path.filename().string();
@@ -275,13 +270,6 @@ void RemoveTemporariesOf(const Path& file) {
   const Path folder = file.parent_path();
   LeftTemporaries(folder.empty() ? Path(".") : folder).RemoveOf(file.filename().string());
 }
-
-namespace {
-
-constexpr int kAttempts = 2;
-constexpr unsigned kPauseMicroseconds = 10'000;
-
-}  // namespace
 
 FolderLock::FolderLock(const Path& folder)
     : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {}

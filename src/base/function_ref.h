@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <new>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -14,7 +15,8 @@ namespace tilegrad {
 template <class Signature>
 class FunctionRef;
 
-// Refers to a callable that must outlive the FunctionRef: use it for parameters only.
+// Refers to a callable that must outlive the FunctionRef: use it for parameters only. The callable
+// may leave out the last parameter.
 template <class R, class... A>
 class FunctionRef<R(A...)> {
  public:
@@ -22,11 +24,22 @@ class FunctionRef<R(A...)> {
   FunctionRef(F&& f)  // NOLINT: implicit by design
       : object_(const_cast<void*>(static_cast<const void*>(std::addressof(f)))),
         call_([](void* o, A... a) -> R {
-          return (*static_cast<std::remove_reference_t<F>*>(o))(std::forward<A>(a)...);
+          auto& function = *static_cast<std::remove_reference_t<F>*>(o);
+          if constexpr (std::is_invocable_v<decltype(function), A...>) {
+            return function(std::forward<A>(a)...);
+          } else {
+            return CallWithoutLast(function, std::forward_as_tuple(std::forward<A>(a)...),
+                                   std::make_index_sequence<sizeof...(A) - 1>());
+          }
         }) {}
   R operator()(A... a) const { return call_(object_, std::forward<A>(a)...); }
 
  private:
+  template <class F, std::size_t... kIndex>
+  static R CallWithoutLast(F& function, std::tuple<A&&...> a, std::index_sequence<kIndex...>) {
+    return function(std::get<kIndex>(std::move(a))...);
+  }
+
   void* object_;
   R (*call_)(void*, A...);
 };

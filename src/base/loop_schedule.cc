@@ -256,8 +256,7 @@ double MeasureStart(const Workers& workers) {
   for (int i = 0; i < kLoops; ++i) {
     Spin(kBefore);
     const auto begin = std::chrono::steady_clock::now();
-    workers.For(static_cast<std::size_t>(workers.count()),
-                [](std::size_t, std::size_t) { Spin(kTask); });
+    workers.For(workers.size(), [](std::size_t, std::size_t) { Spin(kTask); });
     beyond.push_back(SecondsSince(begin) - kTask);
   }
   std::nth_element(beyond.begin(), beyond.begin() + kLoops / 10, beyond.end());
@@ -273,7 +272,7 @@ double MeasureMemory(const Workers& workers) {
   double best = 0;
   for (int i = 0; i < kRounds; ++i) {
     const auto begin = std::chrono::steady_clock::now();
-    workers.ForRanges(kNumbers, kGrain, [&](std::size_t from, std::size_t to, std::size_t) {
+    workers.ForRanges(kNumbers, kGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t k = from; k < to; ++k) y[k] += 0.5f * x[k];
     });
     best = std::max(best, 3.0 * sizeof(float) * kNumbers / SecondsSince(begin));

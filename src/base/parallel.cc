@@ -169,7 +169,7 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
     own_loop = outer;
   };
   std::vector<std::thread> threads;
-  const std::size_t count = std::min(n, static_cast<std::size_t>(workers->count()));
+  const std::size_t count = std::min(n, workers->size());
   try {
     threads.reserve(count);
     for (std::size_t w = 1; w < count; ++w) threads.emplace_back(work, w);
@@ -180,6 +180,8 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
   for (std::thread& thread : threads) thread.join();
   if (error != nullptr) std::rethrow_exception(error);
 }
+
+thread_local volatile int t_exceptions = 0;  // volatile: a compiler removes unread variables
 
 }  // namespace
 
@@ -288,12 +290,6 @@ void KeepToCores(std::span<const int> cores) {
   }
   if (CPU_COUNT(&set) > 0) sched_setaffinity(0, sizeof(set), &set);
 }
-
-namespace {
-
-thread_local volatile int t_exceptions = 0;  // volatile: a compiler removes unread variables
-
-}  // namespace
 
 void ReserveThreadData() { t_exceptions = std::uncaught_exceptions(); }
 

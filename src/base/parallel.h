@@ -47,9 +47,12 @@ class Workers {
   Workers& operator=(const Workers&) = delete;
 
   int count() const { return count_; }
+  // The same as a size: of what every worker has one of.
+  std::size_t size() const { return static_cast<std::size_t>(count_); }
 
   // Calls task(index, worker) once for each index in [0, n) and returns when all are done; worker
   // is in [0, count()) and no two calls with the same worker overlap, so it selects scratch memory.
+  // A task that needs none is task(index), here and below.
   // Which worker takes which index is not determined: results must depend on the index only, which
   // is how the library keeps the same bits for any thread count. Rethrows what a task throws (such
   // as out of memory) once all running tasks have ended; some may never start. Calls may nest, but
@@ -62,6 +65,16 @@ class Workers {
   void ForRanges(std::size_t n, std::size_t grain,
                  FunctionRef<void(std::size_t begin, std::size_t end, std::size_t worker)> task,
                  LoopSite site = LoopSite::Here()) const;
+
+  // task(index) for each index in [0, n), `grain` of them at a time: for short tasks.
+  template <class Task>
+  void ForEach(std::size_t n, std::size_t grain, const Task& task,
+               LoopSite site = LoopSite::Here()) const {
+    const auto range = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) task(i);
+    };
+    ForRanges(n, grain, range, site);
+  }
 
   // Bytes of memory that the next loop reads and writes, for a trace.
   void NoteTraffic(double bytes) const;
@@ -134,8 +147,7 @@ void ForChunks(const Workers* workers, std::size_t n, std::size_t size, const Ta
     for (std::size_t i = 0; i < n; i += size) task(i, std::min(n, i + size));
     return;
   }
-  workers->ForRanges(
-      n, size, [&](std::size_t begin, std::size_t end, std::size_t) { task(begin, end); }, site);
+  workers->ForRanges(n, size, task, site);
 }
 
 }  // namespace tilegrad

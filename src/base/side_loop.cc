@@ -67,8 +67,7 @@ struct SideLoop::State {
 struct SideLoop::Helpers {
   Helpers(const Workers& the_workers, State* state)
       : workers(the_workers), count(HelpersOf(workers.count())) {
-    for (std::size_t i = count; i-- > 0;)
-      state->lanes.push_back(static_cast<std::size_t>(workers.count()) + i);
+    for (std::size_t i = count; i-- > 0;) state->lanes.push_back(workers.size() + i);
   }
   ~Helpers() { Join(); }
   Helpers(const Helpers&) = delete;
@@ -105,7 +104,7 @@ SideLoop::~SideLoop() {
 }
 
 std::size_t SideLoop::LanesOf(const Workers& workers) {
-  return static_cast<std::size_t>(workers.count()) + HelpersOf(workers.count());
+  return workers.size() + HelpersOf(workers.count());
 }
 
 void SideLoop::Begin(std::size_t n, Task task, LoopSite site) {

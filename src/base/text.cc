@@ -17,6 +17,48 @@ bool StandsForByte(const Utf8Character& c) {
   return c.valid && c.code >= kByte + 0x80 && c.code <= kByte + 0xFF;
 }
 
+// Letters to insert, remove or replace.
+std::size_t EditDistance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+bool IsControl(std::uint32_t code) {
+  const bool layout = code == '\n' || code == '\t';
+  const bool marks = code == 0x061c || (code >= 0x200e && code <= 0x200f) ||
+                     (code >= 0x202a && code <= 0x202e) ||
+                     (code >= 0x2066 && code <= 0x2069);  // of the direction of writing
+  const bool breaks = code == 0x2028 || code == 0x2029;   // of lines and paragraphs
+  return (code < 0x20 && !layout) || (code >= 0x7f && code < 0xa0) || marks || breaks;
+}
+
+// "&lt;" for '<'; empty for characters that need none.
+std::string_view HtmlEntity(char c) {
+  switch (c) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    case '\'':
+      return "&#39;";
+    default:
+      return "";
+  }
+}
+
 }  // namespace
 
 std::string LowerCase(std::string_view text) {
@@ -109,25 +151,6 @@ std::string NameFromJson(std::string_view text) {
   return out;
 }
 
-namespace {
-
-// Letters to insert, remove or replace.
-std::size_t EditDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 bool IsNear(std::string_view word, std::string_view name) {
   constexpr std::size_t kBegun = 4;  // enough letters for a prefix, "--" included
   const std::size_t both = std::min(word.size(), name.size());
@@ -147,37 +170,6 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& kn
     list += (i == 0 ? "" : " or ") + found[i].second;
   return list.empty() ? "" : fmt::format(" (did you mean {}?)", list);
 }
-
-namespace {
-
-bool IsControl(std::uint32_t code) {
-  const bool layout = code == '\n' || code == '\t';
-  const bool marks = code == 0x061c || (code >= 0x200e && code <= 0x200f) ||
-                     (code >= 0x202a && code <= 0x202e) ||
-                     (code >= 0x2066 && code <= 0x2069);  // of the direction of writing
-  const bool breaks = code == 0x2028 || code == 0x2029;   // of lines and paragraphs
-  return (code < 0x20 && !layout) || (code >= 0x7f && code < 0xa0) || marks || breaks;
-}
-
-// "&lt;" for '<'; empty for characters that need none.
-std::string_view HtmlEntity(char c) {
-  switch (c) {
-    case '&':
-      return "&amp;";
-    case '<':
-      return "&lt;";
-    case '>':
-      return "&gt;";
-    case '"':
-      return "&quot;";
-    case '\'':
-      return "&#39;";
-    default:
-      return "";
-  }
-}
-
-}  // namespace
 
 std::string EscapeControls(std::string_view text) {
   std::string out;

@@ -26,7 +26,7 @@ void WorkerGroups::For(FunctionRef<void(std::size_t)> task, LoopSite site) const
   std::atomic<std::size_t> waiting = count();
   // Workers without a task would keep threads from the groups, and so would those of a group that
   // is done.
-  const auto run = [&](std::size_t g, std::size_t) {
+  const auto run = [&](std::size_t g) {
     if (--waiting == 0) all_.Dismiss();
     task(g);
     group(g).Dismiss();

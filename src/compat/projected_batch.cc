@@ -42,9 +42,6 @@ Status ValidateProjected(const ProjectedBatchT<T>& batch, const ImageSize& size,
   return CheckFaceIds(face_ids, batch.faces);
 }
 
-template Status ValidateProjected(const ProjectedBatchT<float>&, const ImageSize&,
-                                  std::span<const std::int32_t>);
-template Status ValidateProjected(const ProjectedBatchT<double>&, const ImageSize&,
-                                  std::span<const std::int32_t>);
+TILEGRAD_INSTANTIATE(ValidateProjected);
 
 }  // namespace tilegrad::compat

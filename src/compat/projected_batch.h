@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/scalar.h"
 #include "scene/camera.h"
@@ -81,6 +82,34 @@ struct ProjectedBatchT {
 inline std::size_t PixelCount(const ImageSize& size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
+
+// Pixels, or other entries that show a face each, grouped by face. Index: numbers the entries.
+template <class Index>
+class EntriesOfFaces {
+ public:
+  // `face_ids` of the entries, negative where one shows none.
+  template <class Id>
+  EntriesOfFaces(std::span<const Id> face_ids, std::size_t faces) : begin_(faces + 1) {
+    for (const Id id : face_ids) {
+      if (id >= 0) ++begin_[static_cast<std::size_t>(id) + 1];
+    }
+    for (std::size_t f = 0; f < faces; ++f) begin_[f + 1] += begin_[f];
+    entries_.resize(begin_[faces]);
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::size_t i = 0; i < face_ids.size(); ++i) {
+      if (face_ids[i] < 0) continue;
+      entries_[next[static_cast<std::size_t>(face_ids[i])]++] = static_cast<Index>(i);
+    }
+  }
+  // Ascending.
+  std::span<const Index> of(std::size_t face) const {
+    return std::span(entries_).subspan(begin_[face], begin_[face + 1] - begin_[face]);
+  }
+
+ private:
+  std::vector<std::size_t> begin_;  // [F + 1]
+  std::vector<Index> entries_;
+};
 
 // Checks sizes of the batch, that xy is finite, the image's size, and that face_ids [N,H,W] (unless
 // empty) are in [-1, F).

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/scalar.h"
+#include "compat/projected_batch.h"
 #include "render/validate.h"
 
 namespace tilegrad::compat::pytorch3d {
@@ -167,35 +169,12 @@ Status ValidateRanges(std::span<const FaceRange> images, std::size_t faces) {
   return {};
 }
 
-// Fragments by face, in the order of pixels and layers.
-struct FragmentsOfFaces {
-  std::vector<std::size_t> begin;  // [F + 1]
-  std::vector<std::size_t> fragments;
-
-  FragmentsOfFaces(std::span<const std::int64_t> pix_to_face, std::size_t faces)
-      : begin(faces + 1) {
-    for (const std::int64_t id : pix_to_face) {
-      if (id >= 0) ++begin[static_cast<std::size_t>(id) + 1];
-    }
-    for (std::size_t f = 0; f < faces; ++f) begin[f + 1] += begin[f];
-    fragments.resize(begin[faces]);
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < pix_to_face.size(); ++i) {
-      if (pix_to_face[i] >= 0) fragments[next[static_cast<std::size_t>(pix_to_face[i])]++] = i;
-    }
-  }
-  std::span<const std::size_t> of(std::size_t face) const {
-    return std::span(fragments).subspan(begin[face], begin[face + 1] - begin[face]);
-  }
-};
-
 template <class T>
 Status ValidateLayeredAdjoint(std::span<const T> face_vertices, const LayeredOptions& options,
                               const LayeredAdjoint<T>& adjoint) {
   const std::size_t n = adjoint.pix_to_face.size();
-  const std::size_t image = static_cast<std::size_t>(options.size.width) *
-                            static_cast<std::size_t>(options.size.height) *
-                            static_cast<std::size_t>(options.faces_per_pixel);
+  const std::size_t image =
+      PixelCount(options.size) * static_cast<std::size_t>(options.faces_per_pixel);
   if (n % image != 0) {
     return InvalidArgument("pix_to_face has {} numbers, not a multiple of {}", n, image);
   }
@@ -247,7 +226,7 @@ Status RasterizeLayers(std::span<const T> face_vertices, std::span<const FaceRan
   TILEGRAD_TRY(CheckSize("dists", out.dists.size(), fragments));
   TILEGRAD_TRY(CheckSize("bary_coords", out.barycentrics.size(), 3 * fragments));
   const std::size_t bands = (centres.height + kBandRows - 1) / kBandRows;
-  std::vector<Lists<T>> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<Lists<T>> scratch(workers.size());
   workers.For(images.size() * bands, [&](std::size_t task, std::size_t worker) {
     const std::size_t n = task / bands, row = task % bands * kBandRows;
     const Band band{row, std::min(row + kBandRows, centres.height)};
@@ -270,26 +249,18 @@ Status RasterizeLayersBackward(std::span<const T> face_vertices, const LayeredOp
   TILEGRAD_TRY(ValidateLayeredAdjoint(face_vertices, options, adjoint));
   const Centres<T> centres(options.size);
   const std::size_t faces = face_vertices.size() / 9;
-  const FragmentsOfFaces lists(adjoint.pix_to_face, faces);
+  const EntriesOfFaces<std::size_t> lists(adjoint.pix_to_face, faces);
   std::fill(adjoint.d_face_vertices.begin(), adjoint.d_face_vertices.end(), T(0));
-  workers.ForRanges(faces, kFacesPerTask, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t f = begin; f < end; ++f) {
-      for (const std::size_t fragment : lists.of(f)) {
-        AddFragment(face_vertices.data() + 9 * f, centres, options, fragment, adjoint,
-                    adjoint.d_face_vertices.data() + 9 * f);
-      }
+  workers.ForEach(faces, kFacesPerTask, [&](std::size_t f) {
+    for (const std::size_t fragment : lists.of(f)) {
+      AddFragment(face_vertices.data() + 9 * f, centres, options, fragment, adjoint,
+                  adjoint.d_face_vertices.data() + 9 * f);
     }
   });
   return CheckFinite("d_face_vertices", std::span<const T>(adjoint.d_face_vertices));
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                    \
-  template Status RasterizeLayers(std::span<const T>, std::span<const FaceRange>,                  \
-                                  const LayeredOptions&, const Workers&, const LayeredImages<T>&); \
-  template Status RasterizeLayersBackward(std::span<const T>, const LayeredOptions&,               \
-                                          const Workers&, const LayeredAdjoint<T>&)
-TILEGRAD_INSTANTIATE(float);
-TILEGRAD_INSTANTIATE(double);
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(RasterizeLayers);
+TILEGRAD_INSTANTIATE(RasterizeLayersBackward);
 
 }  // namespace tilegrad::compat::pytorch3d

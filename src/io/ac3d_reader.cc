@@ -29,22 +29,17 @@ std::string_view NextAc3dString(std::string_view& rest) {
 }
 
 // Lines and numbers of the text, and its materials.
-class Ac3dText {
+class Ac3dText : public Lines {
  public:
-  // `place` stands in error messages.
-  Ac3dText(std::string place, std::string_view text) : place_(std::move(place)), lines_(text) {}
+  using Lines::Lines;
 
-  const std::string& place() const { return place_; }
-  bool NextRaw(std::string_view& line) { return lines_.Next(line); }
+  bool NextRaw(std::string_view& line) { return Lines::Next(line); }
   // The next line that is not empty.
   bool Next(std::string_view& line) {
-    while (lines_.Next(line)) {
+    while (NextRaw(line)) {
       if (!Trimmed(line).empty()) return true;
     }
     return false;
-  }
-  Status Error(std::string_view what) const {
-    return DataLoss("{}: line {}: {}", place_, lines_.Number(), what);
   }
 
   // Takes `count` finite numbers off `rest`; errors call them `what`.
@@ -52,7 +47,7 @@ class Ac3dText {
   Status Numbers(std::string_view& rest, T* values, int count, const char* what) const {
     for (int i = 0; i < count; ++i) {
       if (!ParseNumber(NextToken(rest), values[i]))
-        return Error(fmt::format("{} needs {} finite number{}", what, count, count > 1 ? "s" : ""));
+        return Error("{} needs {} finite number{}", what, count, count > 1 ? "s" : "");
     }
     return {};
   }
@@ -90,8 +85,6 @@ class Ac3dText {
     return {};
   }
 
-  const std::string place_;
-  Lines lines_;
   bool emits_ = false;
 };
 
@@ -112,7 +105,7 @@ struct Object {
 class Ac3dReader {
  public:
   Ac3dReader(const FileSource& source, const std::string& name, std::string_view text)
-      : source_(source), name_(name), text_(source.Describe(name), text) {}
+      : source_(source), name_(name), text_(text, source.Describe(name)) {}
 
   Status Read() {
     std::string_view line;
@@ -138,8 +131,7 @@ class Ac3dReader {
  private:
   // The lines after OBJECT up to its children, which end it.
   Status ReadObject(const Inherited& parent, int depth) {
-    if (depth > kMaxDepth)
-      return text_.Error(fmt::format("objects nested more than {} deep", kMaxDepth));
+    if (depth > kMaxDepth) return text_.Error("objects nested more than {} deep", kMaxDepth);
     Object object;
     object.inherited = parent;
     for (std::string_view line; text_.Next(line);) {
@@ -194,8 +186,7 @@ class Ac3dReader {
     const glm::dmat4 m = object.inherited.transform * object.local;
     for (std::size_t i = 0; i < object.vertices; ++i) {
       std::string_view line;
-      if (!text_.Next(line))
-        return text_.Error(fmt::format("ends at vertex {} of {}", i, object.vertices));
+      if (!text_.Next(line)) return text_.Error("ends at vertex {} of {}", i, object.vertices);
       glm::dvec4 p(0, 0, 0, 1);
       TILEGRAD_TRY(text_.Numbers(line, &p[0], 3, "a vertex"));
       out.exact.emplace_back(m * p);
@@ -232,7 +223,7 @@ class Ac3dReader {
       if (keyword != "mat" && !last) return text_.Error("expected mat or refs");
     }
     if (palette > 0 && palette >= palette_.size())
-      return text_.Error(fmt::format("material {}, but the file has {}", palette, palette_.size()));
+      return text_.Error("material {}, but the file has {}", palette, palette_.size());
     TILEGRAD_TRY(ReadCorners(object, refs));
     switch (flags & 0xf) {
       case kPolygon:
@@ -243,8 +234,7 @@ class Ac3dReader {
         break;
       default:
         polygon_.triangles.clear();
-        if (!std::exchange(lines_warned_, true))
-          out.warnings.push_back("surfaces that are lines left out");
+        if (!std::exchange(lines_warned_, true)) out.Warn("surfaces that are lines left out");
     }
     FinishTriangles(static_cast<int>(palette), object);
     return {};
@@ -256,11 +246,11 @@ class Ac3dReader {
     uvs_.clear();
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
-      if (!text_.Next(line)) return text_.Error(fmt::format("ends at corner {} of {}", i, count));
+      if (!text_.Next(line)) return text_.Error("ends at corner {} of {}", i, count);
       std::size_t index = 0;
       TILEGRAD_TRY(text_.Numbers(line, &index, 1, "a corner's vertex"));
       if (index >= object.vertices)
-        return text_.Error(fmt::format("vertex {}, but the object has {}", index, object.vertices));
+        return text_.Error("vertex {}, but the object has {}", index, object.vertices);
       glm::vec2 uv(0);
       TILEGRAD_TRY(text_.Numbers(line, &uv[0], 2, "a corner's uv"));
       polygon_.corners.push_back(static_cast<std::int32_t>(object.first_vertex + index));
@@ -315,7 +305,7 @@ class Ac3dReader {
       const bool more = text_.Next(line);
       if (!more && i > 0) return NoteMissing(i, count);
       if (!more || NextToken(line) != "OBJECT")
-        return text_.Error(fmt::format("expected OBJECT, child {} of {}", i, count));
+        return text_.Error("expected OBJECT, child {} of {}", i, count);
       TILEGRAD_TRY(ReadObject(object.inherited, depth + 1));
     }
     return {};
@@ -323,10 +313,8 @@ class Ac3dReader {
 
   // When people delete objects by hand, the count in their group stays as it was.
   Status NoteMissing(std::size_t child, std::size_t count) {
-    if (!std::exchange(missing_warned_, true)) {
-      out.warnings.push_back(
-          fmt::format("the file ends before child {} of {} of a group", child, count));
-    }
+    if (!std::exchange(missing_warned_, true))
+      out.Warn("the file ends before child {} of {} of a group", child, count);
     return {};
   }
 

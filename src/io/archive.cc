@@ -122,9 +122,8 @@ class Zip : public FileSource {
     const auto index = Find(name);
     if (!index) return NotFound("{}: no such entry", Describe(name));
     zip_stat_t info;
-    if (zip_stat_index(zip_.get(), *index, 0, &info) != 0 || !(info.valid & ZIP_STAT_SIZE)) {
+    if (zip_stat_index(zip_.get(), *index, 0, &info) != 0 || !(info.valid & ZIP_STAT_SIZE))
       return DataLoss("{}: the entry has no size", Describe(name));
-    }
     if (info.size > kMaxEntryBytes) {
       return ResourceExhausted("{}: {} bytes unpacked, more than the limit of {}", Describe(name),
                                info.size, kMaxEntryBytes);

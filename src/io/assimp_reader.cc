@@ -132,10 +132,8 @@ class Assembly {
     material.name = from.name;
     material.base_color = from.color;
     if (!from.image.empty()) material.base_color_texture = Texture(from);
-    if (material.base_color_texture >= 0 && !from.not_read.empty()) {
-      out_.warnings.push_back(
-          fmt::format("material \"{}\": not read of its image: {}", from.name, from.not_read));
-    }
+    if (material.base_color_texture >= 0 && !from.not_read.empty())
+      out_.Warn("material \"{}\": not read of its image: {}", from.name, from.not_read);
     // With a texture, exporters often leave the diffuse colour black or grey; use the image alone.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};
     return material;
@@ -162,8 +160,7 @@ class Assembly {
 
   int Embedded(const ImportedImage& image, const std::string& label) {
     if (!image.bytes.empty()) return AddTexture(DecodeImage(image.bytes, label), label, out_);
-    out_.warnings.push_back(
-        fmt::format("texture \"{}\" left out: embedded without compression", label));
+    out_.Warn("texture \"{}\" left out: embedded without compression", label);
     return -1;
   }
 
@@ -194,9 +191,8 @@ GuardLimits LimitsFor(std::size_t bytes) {
 
 Status Explain(const Status& failure, const std::string& place, const std::string& name) {
   // A refusal by the system or a stop says nothing about the file.
-  if (failure.code() == StatusCode::kIo || failure.code() == StatusCode::kCancelled) {
+  if (failure.code() == StatusCode::kIo || failure.code() == StatusCode::kCancelled)
     return failure.Within(fmt::format("{}: the {} reader", place, MeshEnding(name)));
-  }
   return Status(failure.code(),
                 fmt::format("{}: the {} reader {}; the file is probably damaged, try to save it "
                             "anew or as .glb",

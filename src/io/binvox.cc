@@ -70,18 +70,16 @@ Status ReadBinvoxRuns(std::string_view runs, const std::string& name, BinvoxGrid
 }  // namespace
 
 Result<BinvoxGrid> DecodeBinvox(std::span<const std::uint8_t> bytes, const std::string& name) {
-  Lines lines(TextOf(bytes));
+  Lines lines(TextOf(bytes), name);
   std::string_view line;
   if (!lines.Next(line) || !line.starts_with("#binvox"))
     return DataLoss("{}: not a binvox file: it does not begin with #binvox", name);
   BinvoxGrid grid;
   while (lines.Next(line) && line != "data") {
     if (!ReadBinvoxLine(line, &grid)) {
-      return DataLoss(
-          "{}: line {}: expected \"dim N N N\" with N up to {}, \"translate X Y Z\", \"scale S\" "
-          "or "
-          "\"data\"",
-          name, lines.Number(), kMaxBinvoxSide);
+      return lines.Error(
+          "expected \"dim N N N\" with N up to {}, \"translate X Y Z\", \"scale S\" or \"data\"",
+          kMaxBinvoxSide);
     }
   }
   if (line != "data" || grid.side == 0)

@@ -15,11 +15,6 @@
 namespace tilegrad::io {
 namespace {
 
-template <class List>
-bool Has(const List& list, int index) {
-  return index >= 0 && static_cast<std::size_t>(index) < list.size();
-}
-
 template <class T>
 T Read(const unsigned char* at) {
   T value;
@@ -253,7 +248,7 @@ const ParsedJson* Referred(const ParsedJson& document, const char* list, const P
     return nullptr;
   }
   const int i = static_cast<int>(index->get<std::int64_t>());  // as tinygltf takes it
-  return i >= 0 && static_cast<std::size_t>(i) < entries->size() ? &(*entries)[i] : nullptr;
+  return Has(*entries, i) ? &(*entries)[i] : nullptr;
 }
 
 // tinygltf takes the address of an image's first byte in its buffer before it calls KeepEncoded,

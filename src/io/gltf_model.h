@@ -32,6 +32,12 @@ struct GltfDocument {
   std::vector<std::string> warnings;  // ignored extensions
 };
 
+// Whether a list of the model has such an element: any number may stand in a file.
+template <class List>
+bool Has(const List& list, int index) {
+  return index >= 0 && static_cast<std::size_t>(index) < list.size();
+}
+
 // Reads the file `name` with its side files. DataLoss if it is not glTF 2, nested too deep or
 // compressed; ResourceExhausted above 4 GiB. Numbers in the model are not validated yet.
 Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::string& name);

@@ -2,13 +2,11 @@
 // Converts primitives of glTF files to meshes; finds their base colour.
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "io/gltf_model.h"
-#include "io/mesh_readers.h"
 
 namespace tilegrad::io {
 namespace {
@@ -154,9 +152,8 @@ Status Morph(const tinygltf::Model& model, const tinygltf::Primitive& p,
     TILEGRAD_ASSIGN(const GltfAccessor from,
                     GltfAccessor::OpenAttribute(model, found->second, 0, place));
     const int length = std::min(from.components(), static_cast<int>(Vec::length()));
-    if (from.count() != to.values->size()) {
+    if (from.count() != to.values->size())
       return DataLoss("{} has {} elements for {} vertices", place, from.count(), to.values->size());
-    }
     for (std::size_t i = 0; i < from.count(); ++i) {
       for (int c = 0; c < length; ++c)
         (*to.values)[i][c] +=
@@ -169,8 +166,8 @@ Status Morph(const tinygltf::Model& model, const tinygltf::Primitive& p,
 // Geometry whose uncompressed copy was omitted from the file.
 bool IsCompressed(const tinygltf::Model& model, const tinygltf::Primitive& p) {
   const int at = AttributeIndex(p, "POSITION");
-  return p.extensions.count("KHR_draco_mesh_compression") > 0 && at >= 0 &&
-         at < static_cast<int>(model.accessors.size()) && model.accessors[at].bufferView < 0;
+  return p.extensions.count("KHR_draco_mesh_compression") > 0 && Has(model.accessors, at) &&
+         model.accessors[at].bufferView < 0;
 }
 
 // The attributes of a primitive, morphed.
@@ -209,7 +206,7 @@ glm::vec2 GltfUvUse::operator()(glm::vec2 uv) const {
 }
 
 GltfBaseColor GltfBaseColorOf(const tinygltf::Model& model, int material) {
-  if (material < 0 || material >= static_cast<int>(model.materials.size())) return {};
+  if (!Has(model.materials, material)) return {};
   const tinygltf::Material& from = model.materials[material];
   const auto glossy = from.extensions.find("KHR_materials_pbrSpecularGlossiness");
   return glossy == from.extensions.end() ? OfMetallicRoughness(from.pbrMetallicRoughness)

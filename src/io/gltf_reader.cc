@@ -26,7 +26,7 @@ std::vector<int> GltfRootNodes(const tinygltf::Model& model) {
   std::vector<bool> child(model.nodes.size(), false);
   for (const auto& node : model.nodes) {
     for (const int c : node.children) {
-      if (c >= 0 && c < static_cast<int>(child.size())) child[c] = true;
+      if (Has(child, c)) child[c] = true;
     }
   }
   std::vector<int> roots;
@@ -64,7 +64,7 @@ std::vector<glm::dmat4> GltfWorldMatrices(const tinygltf::Model& model) {
     if (known[parent]) continue;
     known[parent] = true;
     for (const int child : model.nodes[parent].children) {
-      if (child < 0 || child >= static_cast<int>(world.size()) || known[child]) continue;
+      if (!Has(world, child) || known[child]) continue;
       world[child] = world[parent] * GltfLocalMatrix(model.nodes[child]);
       open.push_back(child);
     }
@@ -146,12 +146,11 @@ void TurnNormal(const glm::dmat3& m, glm::vec3* n) {
 Result<std::vector<glm::dmat4>> GltfJointMatrices(const tinygltf::Model& model, int skin,
                                                   std::span<const glm::dmat4> world,
                                                   const std::string& what) {
-  if (skin < 0 || skin >= static_cast<int>(model.skins.size()))
-    return DataLoss("{}: skin {} does not exist", what, skin);
+  if (!Has(model.skins, skin)) return DataLoss("{}: skin {} does not exist", what, skin);
   const tinygltf::Skin& from = model.skins[skin];
   std::vector<glm::dmat4> out;
   for (const int joint : from.joints) {
-    if (joint < 0 || joint >= static_cast<int>(world.size()))
+    if (!Has(world, joint))
       return DataLoss("{}: skin {}: node {}, a joint, does not exist", what, skin, joint);
     out.push_back(world[joint]);
   }
@@ -236,9 +235,8 @@ struct GltfWalk {
     if (node.skin >= 0) {
       TILEGRAD_ASSIGN(at.joints, GltfJointMatrices(model, node.skin, world, what));
     }
-    for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    for (std::size_t i = 0; i < mesh.primitives.size(); ++i)
       TILEGRAD_TRY(AddPrimitive(mesh.primitives[i], at, fmt::format("{} primitive {}", what, i)));
-    }
     return {};
   }
 
@@ -246,7 +244,7 @@ struct GltfWalk {
     const bool triangles =
         p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
     if (!triangles) {
-      out.warnings.push_back(fmt::format("{}: points or lines left out", what));
+      out.Warn("{}: points or lines left out", what);
       return {};
     }
     TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
@@ -255,8 +253,8 @@ struct GltfWalk {
     if (p.attributes.count("COLOR_1") > 0) Warn("sets of vertex colours but COLOR_0 are left out");
     const Material material = ConvertMaterial(p.material);
     if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
-      Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",
-                       material.name, GltfBaseColorOf(model, p.material).uv.Key()));
+      Warn("material \"{}\": its texture is not drawn where a mesh has no {}", material.name,
+           GltfBaseColorOf(model, p.material).uv.Key());
     }
     return AppendPrimitive(std::move(mesh), p, material, at, what).Within(what);
   }
@@ -279,7 +277,9 @@ struct GltfWalk {
   }
 
   // Each warning once.
-  void Warn(std::string warning) {
+  template <class... Args>
+  void Warn(fmt::format_string<Args...> format, Args&&... args) {
+    std::string warning = fmt::format(format, std::forward<Args>(args)...);
     if (warned.insert(warning).second) out.warnings.push_back(std::move(warning));
   }
 
@@ -293,9 +293,10 @@ struct GltfWalk {
   Material ConvertMaterial(int index) {
     Material material;
     material.base_color = glm::vec4(1);  // glTF's default
-    if (index >= static_cast<int>(model.materials.size()))
-      Warn(fmt::format("material {} does not exist: white instead", index));
-    if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
+    if (!Has(model.materials, index)) {
+      if (index >= 0) Warn("material {} does not exist: white instead", index);
+      return material;
+    }
     const tinygltf::Material& from = model.materials[index];
     material.name = from.name;
     const GltfBaseColor color = GltfBaseColorOf(model, index);
@@ -312,16 +313,16 @@ struct GltfWalk {
     SetSampler(color.texture, &material);
     const auto& emission = from.emissiveFactor;
     if (std::any_of(emission.begin(), emission.end(), [](double c) { return c > 0; }))
-      Warn(fmt::format("material \"{}\": its emission is not drawn", material.name));
+      Warn("material \"{}\": its emission is not drawn", material.name);
     return material;
   }
 
   void AddCamera(const tinygltf::Node& node, const glm::dmat4& m) {
-    if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
+    if (!Has(model.cameras, node.camera)) return;
     const tinygltf::Camera& from = model.cameras[node.camera];
     const std::string label = from.name.empty() ? node.name : from.name;
     if (from.type != "perspective") {
-      out.warnings.push_back(fmt::format("camera \"{}\" is orthographic: left out", label));
+      out.Warn("camera \"{}\" is orthographic: left out", label);
       return;
     }
     MeshFileCamera camera;
@@ -334,9 +335,9 @@ struct GltfWalk {
   }
 
   void SetSampler(int texture, Material* material) {
-    if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
+    if (!Has(model.textures, texture)) return;
     const int index = model.textures[texture].sampler;
-    if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
+    if (!Has(model.samplers, index)) return;
     const tinygltf::Sampler& sampler = model.samplers[index];
     material->wrap = {WrapOf(sampler.wrapS), WrapOf(sampler.wrapT)};
     material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
@@ -344,15 +345,15 @@ struct GltfWalk {
 
   int ImageTexture(int texture) {
     if (texture < 0) return -1;
-    const bool there = texture < static_cast<int>(model.textures.size());
+    const bool there = Has(model.textures, texture);
     const std::string other = there ? GltfImageExtension(model.textures[texture]) : "";
     const int image = there ? model.textures[texture].source : -1;
-    const bool has_image = image >= 0 && image < static_cast<int>(model.images.size());
+    const bool has_image = Has(model.images, image);
     if (!other.empty() || !has_image) {
-      Warn(fmt::format("texture {} {}; the material's colour stands in", texture,
-                       !other.empty() ? "has its image in " + other + " only, which is not read"
-                       : there        ? "has no image"
-                                      : "does not exist"));
+      Warn("texture {} {}; the material's colour stands in", texture,
+           !other.empty() ? "has its image in " + other + " only, which is not read"
+           : there        ? "has no image"
+                          : "does not exist");
     }
     if (!has_image) return -1;
     if (!textures[image]) textures[image] = AddImage(model.images[image], image);
@@ -378,8 +379,7 @@ struct GltfWalk {
   Status Visit(int index, const glm::dmat4& parent, int depth) {
     if (depth > kMaxNodeDepth)
       return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
-    if (index < 0 || index >= static_cast<int>(model.nodes.size()))
-      return DataLoss("{}: node {} does not exist", place, index);
+    if (!Has(model.nodes, index)) return DataLoss("{}: node {} does not exist", place, index);
     // Nodes form trees: a second visit is a cycle, or shared children, whose number of paths may
     // grow without bound.
     if (visited[index])
@@ -389,7 +389,7 @@ struct GltfWalk {
     const glm::dmat4 m = parent * GltfLocalMatrix(node);
     AddCamera(node, m);
     if (node.mesh >= 0) {
-      if (node.mesh >= static_cast<int>(model.meshes.size()))
+      if (!Has(model.meshes, node.mesh))
         return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
       TILEGRAD_TRY(AddMesh(node, m, fmt::format("{}: mesh {}", place, node.mesh)));
     }
@@ -401,9 +401,7 @@ struct GltfWalk {
 // The nodes of the default scene, or of the first one, or all root nodes.
 std::vector<int> SceneNodes(const tinygltf::Model& model) {
   if (model.scenes.empty()) return GltfRootNodes(model);
-  const bool valid =
-      model.defaultScene >= 0 && model.defaultScene < static_cast<int>(model.scenes.size());
-  return model.scenes[valid ? model.defaultScene : 0].nodes;
+  return model.scenes[Has(model.scenes, model.defaultScene) ? model.defaultScene : 0].nodes;
 }
 
 }  // namespace

@@ -395,9 +395,8 @@ Status TooMuchMemory(const GuardLimits& limits) {
 // The mailbox counts as a file: the size limit of this process's files applies to it.
 Status TooLargeAResult(const GuardLimits& limits) {
   rlimit own = {};
-  if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes) {
+  if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes)
     return TooMuchMemory(limits);
-  }
   return IoError("could not return its result: files are limited to {} bytes here (ulimit -f)",
                  own.rlim_max);
 }

@@ -4,7 +4,6 @@
 #include <glm/vector_relational.hpp>
 #include <span>
 
-#include "base/error.h"
 #include "io/mesh_readers.h"
 #include "scene/image.h"
 

@@ -159,10 +159,10 @@ void WarnOfSteps(LoadedMesh& loaded, const ExactBounds& bounds, const glm::dvec3
     step = std::max(step, here);
   }
   if (axes.empty()) return;
-  loaded.warnings.push_back(
-      fmt::format("the coordinates lack precision: around {}, {} come in steps of {}, and the mesh "
-                  "is {} across; move it near the origin, or write more digits",
-                  Point(origin), axes, step, bounds.size()));
+  loaded.Warn(
+      "the coordinates lack precision: around {}, {} come in steps of {}, and the mesh "
+      "is {} across; move it near the origin, or write more digits",
+      Point(origin), axes, step, bounds.size());
 }
 
 // A round point near the centre, so that subtracting it keeps round numbers round.
@@ -188,9 +188,9 @@ void PlaceNearOrigin(LoadedMesh& loaded) {
   if (bounds.size() > 0 && std::isfinite(farthest) && farthest > kFar * bounds.size()) {
     loaded.origin = OriginFor(bounds);
     MoveCameras(loaded);
-    loaded.warnings.push_back(fmt::format(
+    loaded.Warn(
         "{} was subtracted from all coordinates, which are too far from the origin for their size",
-        Point(loaded.origin)));
+        Point(loaded.origin));
     WarnOfSteps(loaded, bounds, loaded.origin);
   }
   loaded.mesh.positions.clear();
@@ -233,7 +233,7 @@ std::optional<std::string> FindByUri(const FileSource& source, const std::string
 
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out) {
   if (!image.ok()) {
-    out.warnings.push_back(fmt::format("texture left out: {}", image.status().message()));
+    out.Warn("texture left out: {}", image.status().message());
     out.lost_appearance.push_back(image.status());
     return -1;
   }
@@ -244,8 +244,7 @@ int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh&
 int AddTextureFile(const FileSource& source, const std::optional<std::string>& file,
                    const std::string& image_name, LoadedMesh& out) {
   if (!file) {
-    out.warnings.push_back(
-        fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
+    out.Warn("texture \"{}\" not found; the material's colour stands in", image_name);
     out.lost_appearance.push_back(NotFound("{}: no such texture", image_name));
     return -1;
   }

@@ -3,11 +3,14 @@
 // Collada, FBX, 3MF, DirectX X, X3D, ASE, LWO, MS3D and MD2 (Assimp, in a child process per file).
 #pragma once
 
+#include <fmt/format.h>
+
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/file.h"
@@ -54,6 +57,11 @@ struct LoadedMesh {
   std::vector<glm::dvec3> exact;
   std::map<std::string, int> texture_of_file;
   std::vector<Path> files;  // files read: the mesh, its MTL, buffers and images
+
+  template <class... Args>
+  void Warn(fmt::format_string<Args...> format, Args&&... args) {
+    warnings.push_back(fmt::format(format, std::forward<Args>(args)...));
+  }
 };
 
 // OBJ, PLY, OFF, AC3D, glTF: the file's vertices in its order, once each, used by faces or not.

@@ -150,6 +150,25 @@ NpyArray WithoutHalves(NpyArray halves) {
 
 std::string EntryName(const std::string& array) { return array + ".npy"; }
 
+constexpr std::size_t kMostNameBytes = 65535;  // of a zip entry: its length has 16 bits
+
+// A zip entry's name ends at a NUL, and readers look for "a/b" if a name is "a/./b": such an array
+// would be lost, as would one with a truncated name.
+Status CheckArrayName(const std::string& name, const Path& path) {
+  const std::size_t bytes = EntryName(name).size();
+  if (bytes > kMostNameBytes) {
+    return InvalidArgument(
+        "{}: an array's name in an .npz has {} bytes at most; that of {} bytes begins with \"{}\"",
+        path.string(), kMostNameBytes - EntryName("").size(), name.size(), name.substr(0, 40));
+  }
+  const bool ends = name.find('\0') != std::string::npos;
+  if (!ends && NormalizeName(EntryName(name)) == EntryName(name)) return {};
+  return InvalidArgument(
+      "{}: \"{}\" cannot be the name of an array in an .npz: it has a NUL or a backslash, or is a "
+      "path out of it",
+      path.string(), name.substr(0, name.find('\0')));
+}
+
 }  // namespace
 
 std::size_t NpyTypeSize(NpyType type) { return Row(type).size; }
@@ -244,29 +263,6 @@ Result<NpyArray> DecodeNpzArray(const Bytes& npz, const std::string& place,
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFromZip(npz, place, EntryName(name)));
   return DecodeNpy(bytes, place + ": " + EntryName(name));
 }
-
-namespace {
-
-constexpr std::size_t kMostNameBytes = 65535;  // of a zip entry: its length has 16 bits
-
-// A zip entry's name ends at a NUL, and readers look for "a/b" if a name is "a/./b": such an array
-// would be lost, as would one with a truncated name.
-Status CheckArrayName(const std::string& name, const Path& path) {
-  const std::size_t bytes = EntryName(name).size();
-  if (bytes > kMostNameBytes) {
-    return InvalidArgument(
-        "{}: an array's name in an .npz has {} bytes at most; that of {} bytes begins with \"{}\"",
-        path.string(), kMostNameBytes - EntryName("").size(), name.size(), name.substr(0, 40));
-  }
-  const bool ends = name.find('\0') != std::string::npos;
-  if (!ends && NormalizeName(EntryName(name)) == EntryName(name)) return {};
-  return InvalidArgument(
-      "{}: \"{}\" cannot be the name of an array in an .npz: it has a NUL or a backslash, or is a "
-      "path out of it",
-      path.string(), name.substr(0, name.find('\0')));
-}
-
-}  // namespace
 
 Status SaveNpz(const Path& path, const NpzArrays& arrays) {
   if (arrays.empty()) return InvalidArgument("{}: no array to write into it", path.string());

@@ -50,9 +50,8 @@ NpyArray MakeNpy(std::vector<std::size_t> shape, std::span<const T> values) {
 template <class T>
 Result<std::vector<T>> NpyArray::As() const {
   const bool bool_as_bytes = type == NpyType::kBool && NpyTypeOf<T>() == NpyType::kU8;
-  if (type != NpyTypeOf<T>() && !bool_as_bytes) {
+  if (type != NpyTypeOf<T>() && !bool_as_bytes)
     return DataLoss("expected {}, got {}", NpyTypeName(NpyTypeOf<T>()), NpyTypeName(type));
-  }
   const auto* begin = reinterpret_cast<const T*>(data.data());
   return std::vector<T>(begin, begin + data.size() / sizeof(T));
 }

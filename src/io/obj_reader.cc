@@ -94,10 +94,8 @@ class ObjLibraries {
     TILEGRAD_ASSIGN(const Bytes bytes, source_.Read(file));
     TILEGRAD_ASSIGN(MtlLibrary library, ParseMtl(TextOf(bytes), place));
     for (MtlMaterial& material : library.materials) Define(std::move(material));
-    if (!library.not_read.empty()) {
-      out_.warnings.push_back(
-          fmt::format("{}: statements that are not read: {}", file, ShortList(library.not_read)));
-    }
+    if (!library.not_read.empty())
+      out_.Warn("{}: statements that are not read: {}", file, ShortList(library.not_read));
     return {};
   }
 
@@ -107,8 +105,7 @@ class ObjLibraries {
       commented_.try_emplace(bare, material);
     const auto [found, added] = materials_.try_emplace(material.name, material);
     if (added || found->second == material) return;
-    out_.warnings.push_back(fmt::format(
-        "material \"{}\" is defined more than once; the last one is used", found->first));
+    out_.Warn("material \"{}\" is defined more than once; the last one is used", found->first);
     found->second = std::move(material);
   }
 
@@ -116,8 +113,8 @@ class ObjLibraries {
   Status ReadFallback(const std::string& missing) {
     const std::string own = Path(obj_name_).stem().string() + ".mtl";
     const auto file = Find(own);
-    out_.warnings.push_back(fmt::format("material library \"{}\" not found{}", missing,
-                                        file ? "; " + own + " is read instead" : ""));
+    out_.Warn("material library \"{}\" not found{}", missing,
+              file ? "; " + own + " is read instead" : "");
     if (file) return ReadFile(*file);
     out_.lost_appearance.push_back(NotFound("{}: no such material library", missing));
     return {};
@@ -240,14 +237,11 @@ class ObjAssembly {
   }
 
   void AddWarnings() {
-    if (!unknown_.empty()) {
-      out_.warnings.push_back(
-          fmt::format("no material library defines {}: white instead", ShortList(unknown_)));
-    }
+    if (!unknown_.empty())
+      out_.Warn("no material library defines {}: white instead", ShortList(unknown_));
     if (corners_without_uv_) {
-      out_.warnings.push_back(
-          fmt::format("faces of a material with an image have no texture coordinates: {} instead",
-                      any_uv_ ? "its texel at (0, 0)" : "the material's colour"));
+      out_.Warn("faces of a material with an image have no texture coordinates: {} instead",
+                any_uv_ ? "its texel at (0, 0)" : "the material's colour");
     }
   }
 

@@ -10,20 +10,16 @@
 namespace tilegrad::io {
 namespace {
 
-struct OffFile {
-  Lines lines;
-  const std::string& place;
+struct OffFile : Lines {
+  using Lines::Lines;
 
   // The next line that is neither empty nor a comment.
   bool Next(std::string_view& line) {
-    while (lines.Next(line)) {
+    while (Lines::Next(line)) {
       line = line.substr(0, line.find('#'));
       if (line.find_first_not_of(" \t\r") != std::string_view::npos) return true;
     }
     return false;
-  }
-  Status Error(const std::string& what) const {
-    return DataLoss("{}: line {}: {}", place, lines.Number(), what);
   }
 };
 
@@ -36,7 +32,7 @@ struct OffCounts {
 // between ("OFF490 518 0").
 Result<OffCounts> ReadCounts(OffFile& file) {
   std::string_view line;
-  if (!file.Next(line)) return DataLoss("{}: empty", file.place);
+  if (!file.Next(line)) return DataLoss("{}: empty", file.place());
   line.remove_prefix(line.find_first_not_of(" \t"));
   OffCounts counts;
   counts.colors = line.starts_with("COFF");
@@ -49,10 +45,10 @@ Result<OffCounts> ReadCounts(OffFile& file) {
   if (!ParseNumber(NextToken(line), counts.vertices) || !ParseNumber(NextToken(line), counts.faces))
     return file.Error("expected the numbers of vertices and faces");
   // A vertex or face takes at least three characters: "0 0 0" and "3 0 1 2" take more.
-  const std::size_t most = file.lines.Rest().size() / 3;
+  const std::size_t most = file.Rest().size() / 3;
   if (counts.vertices > most || counts.faces > most) {
-    return file.Error(fmt::format("{} vertices and {} faces are more than the file can hold",
-                                  counts.vertices, counts.faces));
+    return file.Error("{} vertices and {} faces are more than the file can hold", counts.vertices,
+                      counts.faces);
   }
   return counts;
 }
@@ -107,7 +103,7 @@ class OffColors {
 
 class OffReader {
  public:
-  OffReader(OffFile file, LoadedMesh& out) : file_(file), out_(out) {}
+  OffReader(OffFile file, LoadedMesh& out) : file_(std::move(file)), out_(out) {}
 
   Status Read() {
     TILEGRAD_ASSIGN(counts_, ReadCounts(file_));
@@ -115,9 +111,8 @@ class OffReader {
     TILEGRAD_TRY(ReadFaces());
     AddFaceColors();
     if (odd_lines_ > 0) {
-      out_.warnings.push_back(
-          fmt::format("extra values on {} of vertices or faces left out: not a colour",
-                      Count(odd_lines_, "line")));
+      out_.Warn("extra values on {} of vertices or faces left out: not a colour",
+                Count(odd_lines_, "line"));
     }
     return {};
   }
@@ -127,7 +122,7 @@ class OffReader {
     OffColors colors;
     for (std::size_t i = 0; i < counts_.vertices; ++i) {
       std::string_view line;
-      if (!file_.Next(line)) return file_.Error(fmt::format("ends at vertex {}", i));
+      if (!file_.Next(line)) return file_.Error("ends at vertex {}", i);
       glm::dvec3 p;
       for (int c = 0; c < 3; ++c) {
         if (!ParseNumber(NextToken(line), p[c]))
@@ -146,7 +141,7 @@ class OffReader {
     Polygon polygon;
     for (std::size_t f = 0; f < counts_.faces; ++f) {
       std::string_view line;
-      if (!file_.Next(line)) return file_.Error(fmt::format("ends at face {}", f));
+      if (!file_.Next(line)) return file_.Error("ends at face {}", f);
       TILEGRAD_TRY(ReadCorners(line, polygon));
       odd_lines_ += !face_colors_.Add(line);
       polygon.AddTo(out_);
@@ -163,12 +158,9 @@ class OffReader {
     polygon.corners.clear();
     for (std::size_t k = 0; k < corners; ++k) {
       std::int32_t index = 0;
-      if (!ParseNumber(NextToken(line), index))
-        return file_.Error(fmt::format("corner {} is missing", k));
-      if (index < 0 || static_cast<std::size_t>(index) >= counts_.vertices) {
-        return file_.Error(
-            fmt::format("vertex {}, but the file has {} (from 0)", index, counts_.vertices));
-      }
+      if (!ParseNumber(NextToken(line), index)) return file_.Error("corner {} is missing", k);
+      if (index < 0 || static_cast<std::size_t>(index) >= counts_.vertices)
+        return file_.Error("vertex {}, but the file has {} (from 0)", index, counts_.vertices);
       polygon.corners.push_back(index);
     }
     return {};
@@ -178,7 +170,7 @@ class OffReader {
     const std::vector<glm::vec4> colors = face_colors_.Take();
     if (colors.empty()) return;
     if (!out_.mesh.colors.empty()) {
-      out_.warnings.push_back("colours of faces left out: the vertices have their own");
+      out_.Warn("colours of faces left out: the vertices have their own");
       return;
     }
     for (const std::size_t polygon : polygon_of_)
@@ -197,9 +189,8 @@ class OffReader {
 
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
-  const std::string place = source.Describe(name);
   LoadedMesh out;
-  OffReader reader({Lines(TextOf(bytes)), place}, out);
+  OffReader reader(OffFile(TextOf(bytes), source.Describe(name)), out);
   TILEGRAD_TRY(reader.Read());
   return out;
 }

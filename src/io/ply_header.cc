@@ -87,9 +87,8 @@ bool ParseLine(std::string_view line, PlyHeader& header) {
 // The minimum bytes of a row: a list may be empty, a number in text is a digit and a space.
 std::size_t LeastRowSize(const PlyElement& element, PlyHeader::Encoding encoding) {
   std::size_t size = 0;
-  for (const PlyProperty& p : element.properties) {
+  for (const PlyProperty& p : element.properties)
     size += encoding == PlyHeader::Encoding::kText ? 2 : RowOf(p.count_type.value_or(p.type)).size;
-  }
   return size;
 }
 
@@ -118,7 +117,7 @@ std::size_t PlyHeader::CountOf(std::string_view element) const {
 
 Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place) {
   PlyHeader header;
-  Lines lines(file);
+  Lines lines(file, place);
   std::string_view line;
   if (!lines.Next(line) || line != "ply") return DataLoss("{}: does not begin with \"ply\"", place);
   while (lines.Next(line)) {
@@ -128,8 +127,7 @@ Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place
       return header;
     }
     if (!ParseLine(line, header))
-      return DataLoss("{}: line {}: \"{}\" is not a line of a PLY header", place, lines.Number(),
-                      line.substr(0, 80));
+      return lines.Error("\"{}\" is not a line of a PLY header", line.substr(0, 80));
   }
   return DataLoss("{}: ends before end_header", place);
 }

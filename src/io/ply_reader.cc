@@ -350,18 +350,15 @@ class PlyBody {
   void AddWarnings() {
     if (!out_.mesh.colors.empty() && !out_.mesh.corner_colors.empty()) {
       out_.mesh.corner_colors.clear();
-      out_.warnings.push_back("colours of faces left out: the vertices have their own");
+      out_.Warn("colours of faces left out: the vertices have their own");
     }
     if (!uvs_.empty() && !vertex_uvs_.empty())
-      out_.warnings.push_back("texture coordinates of vertices left out: the faces have their own");
-    if (odd_uvs_) {
-      out_.warnings.push_back(
-          "texture coordinates of faces left out where there are not two for each corner");
-    }
+      out_.Warn("texture coordinates of vertices left out: the faces have their own");
+    if (odd_uvs_)
+      out_.Warn("texture coordinates of faces left out where there are not two for each corner");
     for (const auto& [what, names] :
          {std::pair("elements", &not_read_), std::pair("properties", &properties_not_read_)}) {
-      if (!names->empty())
-        out_.warnings.push_back(fmt::format("{} left out: {}", what, ShortList(*names)));
+      if (!names->empty()) out_.Warn("{} left out: {}", what, ShortList(*names));
     }
   }
 
@@ -401,13 +398,12 @@ class PlyTextures {
     const std::size_t count = header_.textures.size();
     if (count == 0) return;
     if (out_.mesh.corner_uvs.empty()) {
-      out_.warnings.push_back("textures left out: the file has no texture coordinates");
+      out_.Warn("textures left out: the file has no texture coordinates");
       return;
     }
     if (images.empty()) {
       MaterialOf(0);
-      if (count > 1)
-        out_.warnings.push_back("textures but the first left out: faces have no texnumber");
+      if (count > 1) out_.Warn("textures but the first left out: faces have no texnumber");
     }
     for (const double image : images) out_.mesh.face_materials.push_back(MaterialOf(image));
   }
@@ -423,8 +419,8 @@ class PlyTextures {
     if (known) {
       material.base_color_texture = AddTexture(source_, name_, material.name, out_);
     } else {
-      out_.warnings.push_back(fmt::format("a face has texnumber {}, but the file has {} textures",
-                                          image, header_.textures.size()));
+      out_.Warn("a face has texnumber {}, but the file has {} textures", image,
+                header_.textures.size());
     }
     out_.mesh.materials.push_back(std::move(material));
     return next;

@@ -106,9 +106,8 @@ std::vector<std::pair<std::string, std::string>> ParseProperties(const Bytes& te
   for (const std::string& line : LogicalLines(text)) {
     const std::size_t end = KeyEnd(line);
     std::size_t value = std::min(line.find_first_not_of(" \t", end), line.size());
-    if (value < line.size() && (line[value] == '=' || line[value] == ':')) {
+    if (value < line.size() && (line[value] == '=' || line[value] == ':'))
       value = std::min(line.find_first_not_of(" \t", value + 1), line.size());
-    }
     out.emplace_back(Unescape(std::string_view(line).substr(0, end)),
                      Unescape(std::string_view(line).substr(value)));
   }

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "base/error.h"
 
@@ -28,10 +29,11 @@ inline std::string_view WithoutByteOrderMark(std::string_view text) {
 }
 
 // Iterates over lines; Number() is 1-based. The last line needs no line end; skips a UTF-8 byte
-// order mark.
+// order mark. `place` is what errors call the text.
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(WithoutByteOrderMark(text)) {}
+  explicit Lines(std::string_view text, std::string place = {})
+      : rest_(WithoutByteOrderMark(text)), place_(std::move(place)) {}
 
   bool Next(std::string_view& line) {
     if (rest_.empty()) return false;
@@ -44,9 +46,17 @@ class Lines {
   }
   std::size_t Number() const { return number_; }
   std::string_view Rest() const { return rest_; }
+  const std::string& place() const { return place_; }
+  // About the last line.
+  template <class... A>
+  Status Error(fmt::format_string<A...> format, A&&... arguments) const {
+    return DataLoss("{}: line {}: {}", place_, number_,
+                    fmt::format(format, std::forward<A>(arguments)...));
+  }
 
  private:
   std::string_view rest_;
+  std::string place_;
   std::size_t number_ = 0;
 };
 

@@ -7,17 +7,20 @@
 namespace tilegrad::nn {
 namespace {
 
-// A visitor of two callables: parameter(name, Var&), buffer(name, Tensor&).
-template <class P, class B>
-class VisitWith : public ModuleVisitor {
- public:
-  VisitWith(P parameter, B buffer) : parameter_(parameter), buffer_(buffer) {}
-  void Parameter(const std::string& name, Var& value) override { parameter_(name, value); }
-  void Buffer(const std::string& name, Tensor& value) override { buffer_(name, value); }
+// Everything that a module holds.
+struct Contents : ModuleVisitor {
+  explicit Contents(Module& module) { module.Visit("", *this); }
+  void Parameter(const std::string& name, Var& value) override {
+    parameters.push_back({name, value});
+    state.push_back({name, value.value()});
+  }
+  void Buffer(const std::string& name, Tensor& value) override {
+    buffers.push_back({name, value});
+    state.push_back({name, value});
+  }
 
- private:
-  P parameter_;
-  B buffer_;
+  std::vector<NamedVar> parameters;
+  std::vector<NamedTensor> state, buffers;
 };
 
 Var Initialised(Context& context, const Shape& shape, Rng& rng, std::int64_t fan_in) {
@@ -35,39 +38,9 @@ void FillBy(Tensor& tensor, const Draw& draw) {
 
 }  // namespace
 
-std::vector<NamedVar> Parameters(Module& module) {
-  std::vector<NamedVar> result;
-  VisitWith visitor(
-      [&](const std::string& name, Var& v) {
-        result.push_back({name, v});
-      },
-      [](const std::string&, Tensor&) {});
-  module.Visit("", visitor);
-  return result;
-}
-
-std::vector<NamedTensor> State(Module& module) {
-  std::vector<NamedTensor> result;
-  VisitWith visitor(
-      [&](const std::string& name, Var& v) {
-        result.push_back({name, v.value()});
-      },
-      [&](const std::string& name, Tensor& t) {
-        result.push_back({name, t});
-      });
-  module.Visit("", visitor);
-  return result;
-}
-
-std::vector<NamedTensor> Buffers(Module& module) {
-  std::vector<NamedTensor> result;
-  VisitWith visitor([](const std::string&, Var&) {},
-                    [&](const std::string& name, Tensor& t) {
-                      result.push_back({name, t});
-                    });
-  module.Visit("", visitor);
-  return result;
-}
+std::vector<NamedVar> Parameters(Module& module) { return Contents(module).parameters; }
+std::vector<NamedTensor> State(Module& module) { return Contents(module).state; }
+std::vector<NamedTensor> Buffers(Module& module) { return Contents(module).buffers; }
 
 std::int64_t CountParameters(Module& module) {
   std::int64_t count = 0;
@@ -79,17 +52,12 @@ Status LoadState(Module& module, const std::vector<NamedTensor>& state) {
   return CopyByName(state, State(module));
 }
 
-LinearLayer::LinearLayer(Context& context, const LinearShape& shape, Rng& rng)
-    : weight(Initialised(context, {shape.out, shape.in}, rng, shape.in)) {
+LinearLayer::LinearLayer(Context& context, const LinearShape& shape, Rng& rng) {
+  weight = Initialised(context, {shape.out, shape.in}, rng, shape.in);
   if (shape.bias) bias = Initialised(context, {shape.out}, rng, shape.in);
 }
 
 Var LinearLayer::Forward(const Var& x, Mode) { return Linear(x, weight, bias); }
-
-void LinearLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  visitor.Parameter(prefix + "weight", weight);
-  if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
-}
 
 Conv2dLayer::Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
     : options_(shape.options) {
@@ -98,7 +66,7 @@ Conv2dLayer::Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
   if (shape.bias) bias = Initialised(context, {shape.out}, rng, fan_in);
 }
 
-void Conv2dLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+void WeightedLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   visitor.Parameter(prefix + "weight", weight);
   if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
 }

@@ -57,14 +57,18 @@ struct LinearShape {
   bool bias = true;
 };
 
-class LinearLayer : public Module {
+class WeightedLayer : public Module {
+ public:
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Var weight;  // [out, in], or [out, in, kernel, kernel]
+  Var bias;    // [out]; invalid if there is none
+};
+
+class LinearLayer : public WeightedLayer {
  public:
   LinearLayer(Context& context, const LinearShape& shape, Rng& rng);  // FillDefault
   Var Forward(const Var& x, Mode mode) override;                      // [n, in] -> [n, out]
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
-
-  Var weight;  // [out, in]
-  Var bias;    // [out]; invalid if there is none
 };
 
 struct ConvShape {
@@ -74,15 +78,11 @@ struct ConvShape {
   bool bias = true;
 };
 
-class Conv2dLayer : public Module {
+class Conv2dLayer : public WeightedLayer {
  public:
   // FillDefault with the fan-in of the weight's shape.
   Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng);
   Var Forward(const Var& x, Mode mode) override;
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
-
-  Var weight;  // [out, in, kernel, kernel]
-  Var bias;    // [out]; invalid if there is none
 
  private:
   ConvOptions options_;

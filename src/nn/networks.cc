@@ -19,8 +19,7 @@ Status CheckImage(const Var& x, std::size_t halvings) {
   const std::int64_t step = std::int64_t{1} << halvings;
   const Shape& shape = x.shape();
   if (shape.rank() == 4 && shape[2] % step == 0 && shape[3] % step == 0) return {};
-  return InvalidArgument("U-Net: {} is not an image with sides a multiple of {}", shape.ToString(),
-                         step);
+  return InvalidArgument("U-Net: {} is not an image with sides a multiple of {}", shape, step);
 }
 
 // Doubles height and width (nearest) and pads one pixel: circular to the left and right, replicated
@@ -80,10 +79,10 @@ Result<Loaded> LoadConvolution(const std::vector<NamedTensor>& weights, const st
   TILEGRAD_ASSIGN(const Tensor bias, FindFloat(weights, name + ".bias"));
   if (weight.shape().rank() != 4 || weight.shape()[1] != in)
     return InvalidArgument("VGG16: \"{}.weight\" has shape {}, [out, {}, h, w] is needed", name,
-                           weight.shape().ToString(), in);
+                           weight.shape(), in);
   if (bias.shape() == Shape{weight.shape()[0]}) return Loaded{weight, bias};
   return InvalidArgument("VGG16: \"{}.bias\" has shape {} beside a weight of {}", name,
-                         bias.shape().ToString(), weight.shape().ToString());
+                         bias.shape(), weight.shape());
 }
 
 // (x - mean) / deviation of ImageNet.

@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/optim.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
-#include <span>
 #include <string_view>
 #include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "nn/kernels/adam.h"
-#include "nn/kernels/product_adam.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -22,9 +17,8 @@ Status CheckGradient(const NamedVar& parameter, const Gradient& gradient) {
   const Tensor& p = parameter.value.value();
   if (gradient.valid() && gradient.shape() == p.shape() && gradient.dtype() == p.dtype()) return {};
   return InvalidArgument("adam: parameter \"{}\" is {} of shape {}, its gradient {} of shape {}",
-                         parameter.name, NameOf(p.dtype()), p.shape().ToString(),
-                         gradient.valid() ? NameOf(gradient.dtype()) : "invalid",
-                         gradient.shape().ToString());
+                         parameter.name, NameOf(p.dtype()), p.shape(),
+                         gradient.valid() ? NameOf(gradient.dtype()) : "invalid", gradient.shape());
 }
 
 constexpr std::size_t kPiece = 16384;  // numbers to a task of a loop over many tensors
@@ -122,7 +116,7 @@ Status Adam::Step(std::span<const Gradient> gradients, UpdateShare* share) {
   ++steps_;
   BeginStep();
   share->Begin(*this);
-  context_.workers().For(share->pieces(), [&](std::size_t k, std::size_t) {
+  context_.workers().For(share->pieces(), [&](std::size_t k) {
     const UpdateShare::Piece piece = share->piece(k);
     Update(slots_[piece.parameter], gradients[piece.parameter].a().value(),
            {piece.begin, piece.end});
@@ -208,7 +202,7 @@ void Adam::UpdatePieces(std::span<const Gradient> gradients) {
     bytes += static_cast<double>(numbers * 7 * BytesOf(gradients[piece.slot].dtype()));
   }
   context_.workers().NoteTraffic(bytes);
-  context_.workers().For(pieces_.size(), [&](std::size_t i, std::size_t) {
+  context_.workers().For(pieces_.size(), [&](std::size_t i) {
     const Piece& piece = pieces_[i];
     Update(slots_[piece.slot], gradients[piece.slot].a().value(), piece.numbers);
   });
@@ -305,7 +299,7 @@ void MovingAverage::Update() {
   double bytes = 0;
   for (const NamedTensor& t : tensors_) bytes += 3 * static_cast<double>(t.value.bytes());
   context_.workers().NoteTraffic(bytes);
-  context_.workers().For(pieces_.size(), [&](std::size_t i, std::size_t) {
+  context_.workers().For(pieces_.size(), [&](std::size_t i) {
     const Piece& piece = pieces_[i];
     const Tensor& from = tensors_[piece.tensor].value;
     const std::size_t count = piece.end - piece.begin;

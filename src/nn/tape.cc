@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <limits>
-#include <utility>
 
-#include "base/error.h"
 #include "nn/ops.h"
 #include "nn/tape_node.h"
 
@@ -101,7 +99,7 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
 bool IsPossibleResult(const char* op, const Var& operand, const Shape& result) {
   if (result.IsPossible()) return true;
   operand.context().Fail(InvalidArgument("{}: {} would give {}, which is too large for a tensor",
-                                         op, operand.shape().ToString(), result.ToString()));
+                                         op, operand.shape(), result));
   return false;
 }
 
@@ -116,6 +114,39 @@ void Dismantle(Node& node, std::shared_ptr<Node>& doomed) {
     below->next_doomed = std::move(doomed);
     doomed = below;
   }
+}
+
+// Operations whose value and adjoint are computed outside of the library.
+
+// The adjoints of an external operation's inputs. If a graph of them is recorded, they are
+// marked, so that a second derivative is an error rather than a silent zero.
+Vars ExternalBackward(const ExternalOp& op, Context& context, std::span<const Var> d_outputs) {
+  std::vector<Tensor> tensors;
+  for (const Var& d : d_outputs) tensors.push_back(d.value());
+  std::vector<Tensor> d_inputs = op.backward(tensors);
+  if (d_inputs.size() != op.inputs.size()) {
+    context.Fail(InternalError("{}: backward returned {} adjoints for {} inputs", op.name,
+                               d_inputs.size(), op.inputs.size()));
+    return {};
+  }
+  std::vector<Var> parents = op.inputs;
+  for (const Var& d : d_outputs) {
+    if (d.valid()) parents.push_back(d);
+  }
+  const auto refuse = [&context, name = op.name](const Adjoint&) {
+    context.Fail(InvalidArgument("{} has a first derivative only", name));
+    return Vars();
+  };
+  Vars result;
+  for (std::size_t i = 0; i < d_inputs.size(); ++i) {
+    if (!d_inputs[i].empty() && !(d_inputs[i].shape() == op.inputs[i].shape())) {
+      context.Fail(InternalError("{}: adjoint {} has shape {}, its input {}", op.name, i,
+                                 d_inputs[i].shape(), op.inputs[i].shape()));
+      return {};
+    }
+    result.push_back(d_inputs[i].empty() ? Var() : Record({op.name}, d_inputs[i], parents, refuse));
+  }
+  return result;
 }
 
 }  // namespace
@@ -144,43 +175,6 @@ bool WantsNode(const Context& context, std::span<const Var> inputs) {
   return context.recording() &&
          std::any_of(inputs.begin(), inputs.end(), [](const Var& v) { return v.requires_grad(); });
 }
-
-// Operations whose value and adjoint are computed outside of the library.
-
-namespace {
-
-// The adjoints of an external operation's inputs. If a graph of them is recorded, they are
-// marked, so that a second derivative is an error rather than a silent zero.
-Vars ExternalBackward(const ExternalOp& op, Context& context, std::span<const Var> d_outputs) {
-  std::vector<Tensor> tensors;
-  for (const Var& d : d_outputs) tensors.push_back(d.value());
-  std::vector<Tensor> d_inputs = op.backward(tensors);
-  if (d_inputs.size() != op.inputs.size()) {
-    context.Fail(InternalError("{}: backward returned {} adjoints for {} inputs", op.name,
-                               d_inputs.size(), op.inputs.size()));
-    return {};
-  }
-  std::vector<Var> parents = op.inputs;
-  for (const Var& d : d_outputs) {
-    if (d.valid()) parents.push_back(d);
-  }
-  const auto refuse = [&context, name = op.name](const Adjoint&) {
-    context.Fail(InvalidArgument("{} has a first derivative only", name));
-    return Vars();
-  };
-  Vars result;
-  for (std::size_t i = 0; i < d_inputs.size(); ++i) {
-    if (!d_inputs[i].empty() && !(d_inputs[i].shape() == op.inputs[i].shape())) {
-      context.Fail(InternalError("{}: adjoint {} has shape {}, its input {}", op.name, i,
-                                 d_inputs[i].shape().ToString(), op.inputs[i].shape().ToString()));
-      return {};
-    }
-    result.push_back(d_inputs[i].empty() ? Var() : Record({op.name}, d_inputs[i], parents, refuse));
-  }
-  return result;
-}
-
-}  // namespace
 
 std::vector<Var> External(Context& context, ExternalOp op) {
   std::vector<Var> result;

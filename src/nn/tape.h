@@ -14,8 +14,10 @@
 #include <initializer_list>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "base/function_ref.h"
 #include "base/inline_vector.h"
 #include "nn/context.h"
@@ -186,6 +188,11 @@ Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, 
 
 // Records `status` in the operand's context and returns an invalid Var of it.
 Var Fail(const Var& operand, Status status);
+// The same with InvalidArgument(format, arguments...).
+template <class... A>
+Var Refuse(const Var& operand, fmt::format_string<A...> format, A&&... arguments) {
+  return Fail(operand, InvalidArgument(format, std::forward<A>(arguments)...));
+}
 // True if all are valid, of one context and of float dtype; else records why in the contexts of
 // `operands`.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);

@@ -221,14 +221,14 @@ Status CheckGrad(const Var& output, const Var& d_output) {
   if (!d_output.has_context()) {
     if (output.value().elements() == 1) return {};
     return InvalidArgument("Grad: output has shape {}; give d_output or reduce it to one element",
-                           output.shape().ToString());
+                           output.shape());
   }
   if (d_output.valid() && d_output.shape() == output.shape() &&
       d_output.dtype() == output.dtype()) {
     return {};
   }
-  return InvalidArgument("Grad: d_output has shape {}, output {}", d_output.shape().ToString(),
-                         output.shape().ToString());
+  return InvalidArgument("Grad: d_output has shape {}, output {}", d_output.shape(),
+                         output.shape());
 }
 
 Var Ones(const Var& like) {

@@ -68,8 +68,8 @@ void CopyValues(const Tensor& from, Tensor& to) {
 Status CheckFits(const NamedTensor& to, const Tensor* from) {
   if (from == nullptr) return NotFound("no tensor \"{}\"", to.name);
   if (!(from->shape() == to.value.shape()))
-    return InvalidArgument("tensor \"{}\" has shape {}, {} is needed", to.name,
-                           from->shape().ToString(), to.value.shape().ToString());
+    return InvalidArgument("tensor \"{}\" has shape {}, {} is needed", to.name, from->shape(),
+                           to.value.shape());
   if (from->dtype() == to.value.dtype() || (IsFloat(*from) && IsFloat(to.value))) return {};
   return InvalidArgument("tensor \"{}\" is {}, {} is needed", to.name, NameOf(from->dtype()),
                          NameOf(to.value.dtype()));

@@ -2,6 +2,8 @@
 // Tensors: contiguous, row-major, of rank 0 to 5. Copying a Tensor shares its storage.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cassert>
 #include <cstdint>
@@ -142,3 +144,11 @@ const Tensor* Find(const std::vector<NamedTensor>& tensors, const std::string& n
 Status CopyByName(const std::vector<NamedTensor>& from, std::vector<NamedTensor> to);
 
 }  // namespace tilegrad::nn
+
+// As ToString.
+template <>
+struct fmt::formatter<tilegrad::nn::Shape> : fmt::formatter<std::string> {
+  auto format(const tilegrad::nn::Shape& shape, fmt::format_context& to) const {
+    return fmt::formatter<std::string>::format(shape.ToString(), to);
+  }
+};

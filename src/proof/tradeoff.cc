@@ -247,21 +247,6 @@ Status Measurement::Time() {
   return {};
 }
 
-}  // namespace
-
-Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const Watch& watch) {
-  if (job.errors.empty()) return InvalidArgument("no max_alpha_error to try");
-  for (const double error : job.errors) {
-    if (!(error >= 0 && error <= 1)) {
-      return InvalidArgument("max_alpha_error is {}; it must be in [0, 1]", error);
-    }
-  }
-  if (job.repetitions < 1) return InvalidArgument("repetitions is {}; at least 1", job.repetitions);
-  return Measurement(job, watch).Run();
-}
-
-namespace {
-
 double Cost(const TradeoffRow& row) { return row.forward_ms + row.backward_ms; }
 
 std::string Setting(const TradeoffRow& row) {
@@ -294,7 +279,56 @@ std::string Table(const StudyResult& r) {
 // Zero has no logarithm: half a unit in the last place of 1 replaces it.
 double Shown(double error) { return std::max(error, 0x1p-25); }
 
+StudyScene SceneOf(std::string name, const Mesh& mesh, int size) {
+  StudyScene out;
+  out.name = std::move(name);
+  out.size = size;
+  for (const glm::vec3& p : mesh.positions) {
+    for (int i = 0; i < 3; ++i) out.positions.push_back(p[i]);
+  }
+  for (const Face& face : mesh.faces) out.faces.insert(out.faces.end(), face.begin(), face.end());
+  out.camera = OrbitCamera({30.0, size, size}, 40, 25, 2.732);
+  return out;
+}
+
+void AddBumps(Mesh* mesh) {
+  for (glm::vec3& p : mesh->positions) {
+    p *= 1 + 0.15f * std::sin(22 * p.x) * std::sin(18 * p.y + 1) * std::sin(20 * p.z + 2);
+  }
+}
+
+Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, const Workers& workers,
+                                const Watch& watch) {
+  train::TrainJob job;
+  TILEGRAD_ASSIGN(job.config, train::FindConfig(study.config));
+  TILEGRAD_TRY(
+      train::ApplyOverrides({fmt::format("render.max_alpha_error={}", error)}, &job.config));
+  job.config.schedule.steps = study.steps;
+  job.data = study.data;
+  job.run = study.out / fmt::format("training_{:g}", error);
+  job.existing = train::ExistingRun::kContinue;
+  job.warn = study.warn;
+  TILEGRAD_ASSIGN(const train::RunOutcome outcome, train::Train(job, workers, watch));
+  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(job.run, workers));
+  TILEGRAD_ASSIGN(const train::Evaluation evaluation,
+                  predictor.task().Evaluate({job.run, study.data, predictor}, workers, watch));
+  const train::Score& mean = evaluation.rows.back().mean;
+  return StudyTraining{error, outcome.seconds, outcome.last_step, mean.iou,
+                       mean.f_score.value_or(0)};
+}
+
 }  // namespace
+
+Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const Watch& watch) {
+  if (job.errors.empty()) return InvalidArgument("no max_alpha_error to try");
+  for (const double error : job.errors) {
+    if (!(error >= 0 && error <= 1)) {
+      return InvalidArgument("max_alpha_error is {}; it must be in [0, 1]", error);
+    }
+  }
+  if (job.repetitions < 1) return InvalidArgument("repetitions is {}; at least 1", job.repetitions);
+  return Measurement(job, watch).Run();
+}
 
 std::string StudyMarkdown(const std::vector<StudyResult>& results,
                           const std::vector<StudyTraining>& training) {
@@ -352,28 +386,6 @@ std::string StudyPicture(const std::vector<StudyResult>& results) {
   return train::LogPlotSvg(plot);
 }
 
-namespace {
-
-StudyScene SceneOf(std::string name, const Mesh& mesh, int size) {
-  StudyScene out;
-  out.name = std::move(name);
-  out.size = size;
-  for (const glm::vec3& p : mesh.positions) {
-    for (int i = 0; i < 3; ++i) out.positions.push_back(p[i]);
-  }
-  for (const Face& face : mesh.faces) out.faces.insert(out.faces.end(), face.begin(), face.end());
-  out.camera = OrbitCamera({30.0, size, size}, 40, 25, 2.732);
-  return out;
-}
-
-void AddBumps(Mesh* mesh) {
-  for (glm::vec3& p : mesh->positions) {
-    p *= 1 + 0.15f * std::sin(22 * p.x) * std::sin(18 * p.y + 1) * std::sin(20 * p.z + 2);
-  }
-}
-
-}  // namespace
-
 std::vector<StudyScene> BuiltInScenes() {
   Mesh bumpy = Icosphere(5, 0.5f);
   AddBumps(&bumpy);
@@ -385,30 +397,6 @@ Result<StudyScene> SceneFromFile(const Path& file, int size) {
   TILEGRAD_TRY(NormalizeToBox(loaded.mesh, 0.45f).Within(file.string()));
   return SceneOf(file.stem().string(), loaded.mesh, size);
 }
-
-namespace {
-
-Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, const Workers& workers,
-                                const Watch& watch) {
-  train::TrainJob job;
-  TILEGRAD_ASSIGN(job.config, train::FindConfig(study.config));
-  TILEGRAD_TRY(
-      train::ApplyOverrides({fmt::format("render.max_alpha_error={}", error)}, &job.config));
-  job.config.schedule.steps = study.steps;
-  job.data = study.data;
-  job.run = study.out / fmt::format("training_{:g}", error);
-  job.existing = train::ExistingRun::kContinue;
-  job.warn = study.warn;
-  TILEGRAD_ASSIGN(const train::RunOutcome outcome, train::Train(job, workers, watch));
-  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(job.run, workers));
-  TILEGRAD_ASSIGN(const train::Evaluation evaluation,
-                  predictor.task().Evaluate({job.run, study.data, predictor}, workers, watch));
-  const train::Score& mean = evaluation.rows.back().mean;
-  return StudyTraining{error, outcome.seconds, outcome.last_step, mean.iou,
-                       mean.f_score.value_or(0)};
-}
-
-}  // namespace
 
 Status CheckTrainingStudy(const TrainingStudyJob& job) {
   if (auto dataset = train::Dataset::Open(job.data); !dataset.ok()) return dataset.status();

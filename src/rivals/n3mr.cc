@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rivals/n3mr.h"
 
+#include "base/scalar.h"
 #include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {
@@ -223,15 +224,10 @@ void N3mrBackward(const N3mrOptions& options, const N3mrImageT<T>& image, std::s
   }
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                  \
-  template void SetUpN3mr(std::span<const T>, int, const N3mrOptions&, N3mrImageT<T>*);          \
-  template void DrawN3mr(const N3mrOptions&, RowRange, N3mrImageT<T>*);                          \
-  template void N3mrAlpha(const N3mrOptions&, N3mrImageT<T>*, std::span<T>);                     \
-  template void N3mrPrepareBackward(const N3mrOptions&, std::span<const T>, N3mrImageT<T>*);     \
-  template void N3mrBackward(const N3mrOptions&, const N3mrImageT<T>&, std::size_t, std::size_t, \
-                             std::span<T>);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(SetUpN3mr);
+TILEGRAD_INSTANTIATE(DrawN3mr);
+TILEGRAD_INSTANTIATE(N3mrAlpha);
+TILEGRAD_INSTANTIATE(N3mrPrepareBackward);
+TILEGRAD_INSTANTIATE(N3mrBackward);
 
 }  // namespace tilegrad::rivals

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rivals/n3mr_color.h"
 
+#include "base/scalar.h"
 #include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {
@@ -271,18 +272,10 @@ void N3mrColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_
   }
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                              \
-  template void ReserveN3mrPlanes(const N3mrImageT<T>&, N3mrPlanesT<T>*);                    \
-  template void N3mrShade(const N3mrColorJob<T>&, RowRange, N3mrPlanesT<T>*);                \
-  template void N3mrReducePlanes(const N3mrColorJob<T>&, const N3mrPlanesT<T>&,              \
-                                 const N3mrImages<T>&);                                      \
-  template void N3mrPrepareColorBackward(const N3mrColorJob<T>&, const N3mrImages<const T>&, \
-                                         N3mrPlanesT<T>*);                                   \
-  template void N3mrColorBackward(const N3mrColorJob<T>&, const N3mrImages<const T>&,        \
-                                  const N3mrPlanesT<T>&, std::size_t, std::size_t,           \
-                                  const N3mrColorAdjoints<T>&);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(ReserveN3mrPlanes);
+TILEGRAD_INSTANTIATE(N3mrShade);
+TILEGRAD_INSTANTIATE(N3mrReducePlanes);
+TILEGRAD_INSTANTIATE(N3mrPrepareColorBackward);
+TILEGRAD_INSTANTIATE(N3mrColorBackward);
 
 }  // namespace tilegrad::rivals

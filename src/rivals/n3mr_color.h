@@ -4,10 +4,7 @@
 // surrounding texels. A uniform cube gives a face colour.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 
 #include "rivals/n3mr.h"

@@ -3,11 +3,7 @@
 // float, double, std::complex<double>; the sweep, which is no derivative: float or double.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include "rivals/n3mr.h"

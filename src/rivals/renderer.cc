@@ -11,7 +11,6 @@
 #include "rivals/softras_color_ref.h"
 
 namespace tilegrad::rivals {
-
 namespace {
 
 constexpr std::size_t kRowsAtOnce = 64, kFacesAtOnce = 256;
@@ -20,7 +19,7 @@ constexpr std::size_t kRowsAtOnce = 64, kFacesAtOnce = 256;
 template <class Task>
 void ForRanges(const Workers::Part& part, std::size_t n, std::size_t grain, const Task& task) {
   part.For((n + grain - 1) / grain,
-           [&](std::size_t i, std::size_t) { task(i * grain, std::min(n, (i + 1) * grain)); });
+           [&](std::size_t i) { task(i * grain, std::min(n, (i + 1) * grain)); });
 }
 
 template <class Task>
@@ -29,6 +28,71 @@ void ForRows(const Workers::Part& part, int rows, const Task& task) {
             [&](std::size_t begin, std::size_t end) {
               task(RowRange{static_cast<int>(begin), static_cast<int>(end)});
             });
+}
+
+Status CheckSize(const char* name, std::size_t size, std::size_t expected) {
+  if (size == expected) return {};
+  return InvalidArgument("{} has {} numbers, expected {}", name, size, expected);
+}
+
+Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
+  if (faces.size() % 3 != 0)
+    return InvalidArgument("faces have {} indices, not three each", faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (faces[i] >= 0 && static_cast<std::size_t>(faces[i]) < vertices) continue;
+    return InvalidArgument("corner {} of face {} is vertex {}, but there are {}", i % 3, i / 3,
+                           faces[i], vertices);
+  }
+  return {};
+}
+
+template <class T>
+Status CheckBatch(const BatchT<T>& batch) {
+  if (batch.size < 1 || batch.size > 16384)
+    return InvalidArgument("images have {} pixels a side; must be 1 to 16384", batch.size);
+  if (batch.meshes == 0 || batch.positions.size() % (3 * batch.meshes) != 0 ||
+      batch.cameras.size() % batch.meshes != 0) {
+    return InvalidArgument("{} numbers of positions and {} cameras do not make {} equal meshes",
+                           batch.positions.size(), batch.cameras.size(), batch.meshes);
+  }
+  if (!batch.colors.empty())
+    TILEGRAD_TRY(CheckSize("colors", batch.colors.size(), batch.positions.size()));
+  return CheckFaces(batch.faces, batch.vertices());
+}
+
+Status Positive(const char* name, double value) {
+  if (value > 0 && std::isfinite(value)) return {};
+  return InvalidArgument("{} is {}, but must be positive and finite", name, value);
+}
+
+Status CheckPlanes(const char* rule, double near_plane, double far_plane) {
+  if (near_plane > 0 && near_plane < far_plane && std::isfinite(far_plane)) return {};
+  return InvalidArgument("{}: near {} and far {} must be 0 < near < far", rule, near_plane,
+                         far_plane);
+}
+
+Status CheckResolution(const char* name, int value, int least, int most) {
+  if (value >= least && value <= most) return {};
+  return InvalidArgument("{} is {}; must be {} to {}", name, value, least, most);
+}
+
+// sum <- the sum of `part` over the images of mesh b, in order.
+template <class T, class PartOf>
+void SumViews(std::size_t views, std::size_t b, std::span<T> sum, const PartOf& part_of) {
+  std::fill(sum.begin(), sum.end(), T(0));
+  for (std::size_t v = 0; v < views; ++v) {
+    const std::span<const T> part = part_of(b * views + v);
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part[i];
+  }
+}
+
+template <class T>
+Status CheckTextures(const BatchT<T>& batch, const Options& options) {
+  if (batch.textures.empty()) return {};
+  if (options.rule != Rule::kN3mr) return InvalidArgument("only N3MR has face textures");
+  if (!batch.colors.empty()) return InvalidArgument("a batch has colors or textures, not both");
+  return CheckSize("textures", batch.textures.size(),
+                   batch.meshes * batch.faces.size() * options.n3mr_colors.texels());
 }
 
 }  // namespace
@@ -201,75 +265,6 @@ class ImageStateT {
   N3mrPlanesT<T> n3mr_planes_;
 };
 
-namespace {
-
-Status CheckSize(const char* name, std::size_t size, std::size_t expected) {
-  if (size == expected) return {};
-  return InvalidArgument("{} has {} numbers, expected {}", name, size, expected);
-}
-
-Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
-  if (faces.size() % 3 != 0)
-    return InvalidArgument("faces have {} indices, not three each", faces.size());
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    if (faces[i] >= 0 && static_cast<std::size_t>(faces[i]) < vertices) continue;
-    return InvalidArgument("corner {} of face {} is vertex {}, but there are {}", i % 3, i / 3,
-                           faces[i], vertices);
-  }
-  return {};
-}
-
-template <class T>
-Status CheckBatch(const BatchT<T>& batch) {
-  if (batch.size < 1 || batch.size > 16384)
-    return InvalidArgument("images have {} pixels a side; must be 1 to 16384", batch.size);
-  if (batch.meshes == 0 || batch.positions.size() % (3 * batch.meshes) != 0 ||
-      batch.cameras.size() % batch.meshes != 0) {
-    return InvalidArgument("{} numbers of positions and {} cameras do not make {} equal meshes",
-                           batch.positions.size(), batch.cameras.size(), batch.meshes);
-  }
-  if (!batch.colors.empty())
-    TILEGRAD_TRY(CheckSize("colors", batch.colors.size(), batch.positions.size()));
-  return CheckFaces(batch.faces, batch.vertices());
-}
-
-Status Positive(const char* name, double value) {
-  if (value > 0 && std::isfinite(value)) return {};
-  return InvalidArgument("{} is {}, but must be positive and finite", name, value);
-}
-
-Status CheckPlanes(const char* rule, double near_plane, double far_plane) {
-  if (near_plane > 0 && near_plane < far_plane && std::isfinite(far_plane)) return {};
-  return InvalidArgument("{}: near {} and far {} must be 0 < near < far", rule, near_plane,
-                         far_plane);
-}
-
-Status CheckResolution(const char* name, int value, int least, int most) {
-  if (value >= least && value <= most) return {};
-  return InvalidArgument("{} is {}; must be {} to {}", name, value, least, most);
-}
-
-// sum <- the sum of `part` over the images of mesh b, in order.
-template <class T, class PartOf>
-void SumViews(std::size_t views, std::size_t b, std::span<T> sum, const PartOf& part_of) {
-  std::fill(sum.begin(), sum.end(), T(0));
-  for (std::size_t v = 0; v < views; ++v) {
-    const std::span<const T> part = part_of(b * views + v);
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part[i];
-  }
-}
-
-template <class T>
-Status CheckTextures(const BatchT<T>& batch, const Options& options) {
-  if (batch.textures.empty()) return {};
-  if (options.rule != Rule::kN3mr) return InvalidArgument("only N3MR has face textures");
-  if (!batch.colors.empty()) return InvalidArgument("a batch has colors or textures, not both");
-  return CheckSize("textures", batch.textures.size(),
-                   batch.meshes * batch.faces.size() * options.n3mr_colors.texels());
-}
-
-}  // namespace
-
 Status Validate(const Options& options) {
   const SoftRasOptions& soft = options.softras;
   TILEGRAD_TRY(Positive("SoftRas: sigma", soft.sigma));
@@ -328,7 +323,7 @@ Status RendererT<T>::Backward(const BatchT<T>& batch, const Options& options,
   workers_.ForParts(batch.cameras.size(), [&](std::size_t n, const Workers::Part& part) {
     images_[n].Backward(batch, options, n, part, d_images.Image(n, batch.pixels()));
   });
-  workers_.For(batch.meshes, [&](std::size_t b, std::size_t) {
+  workers_.For(batch.meshes, [&](std::size_t b) {
     const std::size_t views = batch.views(), first = b * views;
     SumViews(views, b, batch.MeshOf(out.positions, first),
              [&](std::size_t n) { return images_[n].d_positions(); });

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of softras.h.
-#if defined(TILEGRAD_RIVALS_SOFTRAS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_RIVALS_SOFTRAS_INL_H_
-#undef TILEGRAD_RIVALS_SOFTRAS_INL_H_
-#else
-#define TILEGRAD_RIVALS_SOFTRAS_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -13,26 +7,23 @@
 #include "rivals/softras_face-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::rivals {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::rivals::HWY_NAMESPACE {
 
 template <SoftDistance kDistance>
 HWY_INLINE void ForwardFaces(const SoftRasOptions& options, RowRange rows, SoftRasImage* image) {
-  const SoftTag d;
   const SoftScale scale(options);
   const SoftAlpha rule = options.alpha;
   for (const SoftRasFace& face : image->faces) {
     ForFaceVectors(face, rows, *image, [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
       const SoftLanes here = SoftFaceAt<kDistance>(face, scale, px, py);
       float* const kept = image->kept.data() + at;
-      const SoftVec before = hn::LoadU(d, kept);
+      const SoftVec before = hn::LoadU(kSoft, kept);
       const SoftVec after = rule == SoftAlpha::kProduct ? hn::Mul(before, here.miss)
                             : rule == SoftAlpha::kSum
                                 ? hn::Add(before, here.probability)
-                                : hn::IfThenElse(hn::Gt(here.probability, hn::Set(d, 0.5f)),
-                                                 hn::Set(d, 1.0f), before);
-      hn::StoreU(after, d, kept);
+                                : hn::IfThenElse(hn::Gt(here.probability, hn::Set(kSoft, 0.5f)),
+                                                 hn::Set(kSoft, 1.0f), before);
+      hn::StoreU(after, kSoft, kept);
     });
   }
 }
@@ -51,27 +42,26 @@ void ForwardAll(const SoftRasOptions& options, RowRange rows, SoftRasImage* imag
 // Where the interpolated depth is between the planes.
 HWY_INLINE SoftMask LanesBetweenPlanes(const SoftRasFace& f, const SoftScale& scale,
                                        const SoftLanes& at) {
-  const SoftTag d;
-  SoftVec sum = hn::Zero(d), over_z = hn::Zero(d);
+  SoftVec sum = hn::Zero(kSoft), over_z = hn::Zero(kSoft);
   for (int k = 0; k < 3; ++k) {
-    const SoftVec w = hn::Min(hn::Max(at.b[k], hn::Zero(d)), hn::Set(d, 1.0f));
+    const SoftVec w = hn::Min(hn::Max(at.b[k], hn::Zero(kSoft)), hn::Set(kSoft, 1.0f));
     sum = hn::Add(sum, w);
-    over_z = hn::MulAdd(w, hn::Set(d, 1.0f / f.z[k]), over_z);
+    over_z = hn::MulAdd(w, hn::Set(kSoft, 1.0f / f.z[k]), over_z);
   }
   const SoftVec z = hn::Div(sum, over_z);
-  return hn::And(hn::Ge(z, hn::Set(d, scale.near_plane)), hn::Le(z, hn::Set(d, scale.far_plane)));
+  return hn::And(hn::Ge(z, hn::Set(kSoft, scale.near_plane)),
+                 hn::Le(z, hn::Set(kSoft, scale.far_plane)));
 }
 
 // dL/dd, from the pixel's factor `push`.
 HWY_INLINE SoftVec DistanceAdjoint(const SoftRasFace& f, const SoftRasOptions& options,
                                    const SoftScale& scale, const SoftLanes& at, SoftVec push) {
-  const SoftTag d;
-  SoftVec d_d = hn::Mul(hn::Mul(push, at.probability), hn::Set(d, scale.inverse_sigma));
+  SoftVec d_d = hn::Mul(hn::Mul(push, at.probability), hn::Set(kSoft, scale.inverse_sigma));
   if (options.alpha == SoftAlpha::kSum) {
     d_d = hn::Mul(d_d, at.miss);
   } else if (!options.exact_product) {
-    const SoftVec share = hn::Mul(at.miss, hn::Set(d, scale.floor_factor));
-    d_d = hn::Mul(d_d, hn::Min(share, hn::Set(d, 1.0f)));
+    const SoftVec share = hn::Mul(at.miss, hn::Set(kSoft, scale.floor_factor));
+    d_d = hn::Mul(d_d, hn::Min(share, hn::Set(kSoft, 1.0f)));
   }
   if (f.may_be_beyond && !options.gradient_beyond_planes) {
     d_d = hn::IfThenElseZero(LanesBetweenPlanes(f, scale, at), d_d);
@@ -82,19 +72,18 @@ HWY_INLINE SoftVec DistanceAdjoint(const SoftRasFace& f, const SoftRasOptions& o
 template <SoftDistance kDistance>
 HWY_INLINE void BackwardFaces(const SoftRasOptions& options, const SoftRasImage& image,
                               std::size_t begin, std::size_t end, float* d_corners) {
-  const SoftTag d;
   const SoftScale scale(options);
   for (std::size_t f = begin; f < end; ++f) {
     const SoftRasFace& face = image.faces[f];
     CornerSums sums;
     for (int k = 0; k < 3; ++k) {
-      sums.x[k] = hn::Zero(d);
-      sums.y[k] = hn::Zero(d);
+      sums.x[k] = hn::Zero(kSoft);
+      sums.y[k] = hn::Zero(kSoft);
     }
     ForFaceVectors(face, {0, image.size}, image,
                    [&](std::size_t at, SoftVec px, SoftVec py) HWY_ATTR {
                      const SoftLanes here = SoftFaceAt<kDistance>(face, scale, px, py);
-                     const SoftVec push = hn::LoadU(d, image.push.data() + at);
+                     const SoftVec push = hn::LoadU(kSoft, image.push.data() + at);
                      const SoftVec d_d = DistanceAdjoint(face, options, scale, here, push);
                      if constexpr (kDistance == SoftDistance::kEuclidean) {
                        AddEuclidean(here, d_d, &sums);
@@ -104,8 +93,8 @@ HWY_INLINE void BackwardFaces(const SoftRasOptions& options, const SoftRasImage&
                    });
     for (std::size_t k = 0; k < 3; ++k) {
       float* const out = d_corners + kCornerNumbers * f + 3 * k;
-      out[0] = hn::GetLane(hn::SumOfLanes(d, sums.x[k]));
-      out[1] = hn::GetLane(hn::SumOfLanes(d, sums.y[k]));
+      out[0] = hn::GetLane(hn::SumOfLanes(kSoft, sums.x[k]));
+      out[1] = hn::GetLane(hn::SumOfLanes(kSoft, sums.y[k]));
       out[2] = 0;
     }
   }
@@ -121,8 +110,5 @@ void BackwardAll(const SoftRasOptions& options, const SoftRasImage& image, std::
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of softras_color.h: lanes are pixels of a row, as in softras_face-inl.h.
-#if defined(TILEGRAD_RIVALS_SOFTRAS_COLOR_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_RIVALS_SOFTRAS_COLOR_INL_H_
-#undef TILEGRAD_RIVALS_SOFTRAS_COLOR_INL_H_
-#else
-#define TILEGRAD_RIVALS_SOFTRAS_COLOR_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -13,9 +7,7 @@
 #include "rivals/softras_face-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::rivals {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::rivals::HWY_NAMESPACE {
 
 // A difference of nearness, -z, times `bits` is the exponent to base 2 of a ratio of weights.
 struct ColorScale {
@@ -39,34 +31,31 @@ struct ColorLanes {
 
 // 2^(difference * bits) for differences <= 0.
 HWY_INLINE SoftVec RelativeWeight(const ColorScale& scale, SoftVec difference) {
-  const SoftTag d;
-  const SoftVec bits = hn::Mul(hn::Neg(difference), hn::Set(d, scale.bits));
-  return tilegrad::HWY_NAMESPACE::Exp2Neg(d, bits).power;
+  const SoftVec bits = hn::Mul(hn::Neg(difference), hn::Set(kSoft, scale.bits));
+  return tilegrad::HWY_NAMESPACE::Exp2Neg(kSoft, bits).power;
 }
 
 HWY_INLINE void SetDepth(const SoftRasFace& f, const SoftScale& soft, ColorLanes* out) {
-  const SoftTag d;
-  SoftVec over_z = hn::Zero(d);
-  out->sum = hn::Zero(d);
+  SoftVec over_z = hn::Zero(kSoft);
+  out->sum = hn::Zero(kSoft);
   for (int k = 0; k < 3; ++k) {
-    out->w[k] = hn::Min(hn::Max(out->soft.b[k], hn::Zero(d)), hn::Set(d, 1.0f));
+    out->w[k] = hn::Min(hn::Max(out->soft.b[k], hn::Zero(kSoft)), hn::Set(kSoft, 1.0f));
     out->sum = hn::Add(out->sum, out->w[k]);
-    over_z = hn::MulAdd(out->w[k], hn::Set(d, 1.0f / f.z[k]), over_z);
+    over_z = hn::MulAdd(out->w[k], hn::Set(kSoft, 1.0f / f.z[k]), over_z);
   }
   for (SoftVec& w : out->w) w = hn::Div(w, out->sum);
   out->z = hn::Div(out->sum, over_z);
-  out->counts = hn::And(out->soft.live, hn::And(hn::Ge(out->z, hn::Set(d, soft.near_plane)),
-                                                hn::Le(out->z, hn::Set(d, soft.far_plane))));
+  out->counts = hn::And(out->soft.live, hn::And(hn::Ge(out->z, hn::Set(kSoft, soft.near_plane)),
+                                                hn::Le(out->z, hn::Set(kSoft, soft.far_plane))));
   out->nearness = hn::Neg(out->z);
 }
 
 // textures: of this face.
 HWY_INLINE void SetColor(const float* textures, ColorLanes* out) {
-  const SoftTag d;
   for (int c = 0; c < 3; ++c) {
-    out->color[c] = hn::Mul(out->w[0], hn::Set(d, textures[c]));
-    out->color[c] = hn::MulAdd(out->w[1], hn::Set(d, textures[3 + c]), out->color[c]);
-    out->color[c] = hn::MulAdd(out->w[2], hn::Set(d, textures[6 + c]), out->color[c]);
+    out->color[c] = hn::Mul(out->w[0], hn::Set(kSoft, textures[c]));
+    out->color[c] = hn::MulAdd(out->w[1], hn::Set(kSoft, textures[3 + c]), out->color[c]);
+    out->color[c] = hn::MulAdd(out->w[2], hn::Set(kSoft, textures[6 + c]), out->color[c]);
   }
 }
 
@@ -92,8 +81,7 @@ struct MixedPixels {
 };
 
 HWY_INLINE void MixFace(const ColorLanes& at, const ColorScale& scale, const MixedPixels& to) {
-  const SoftTag d;
-  const SoftVec before = hn::LoadU(d, to.nearest);
+  const SoftVec before = hn::LoadU(kSoft, to.nearest);
   const SoftVec after = hn::IfThenElse(at.counts, hn::Max(before, at.nearness), before);
   const SoftVec fade = RelativeWeight(scale, hn::Sub(before, after));
   const SoftVec weight = hn::IfThenElseZero(
@@ -101,11 +89,11 @@ HWY_INLINE void MixFace(const ColorLanes& at, const ColorScale& scale, const Mix
       hn::Mul(
           at.soft.probability,
           RelativeWeight(scale, hn::Sub(hn::IfThenElse(at.counts, at.nearness, after), after))));
-  hn::StoreU(after, d, to.nearest);
-  hn::StoreU(hn::MulAdd(hn::LoadU(d, to.total), fade, weight), d, to.total);
+  hn::StoreU(after, kSoft, to.nearest);
+  hn::StoreU(hn::MulAdd(hn::LoadU(kSoft, to.total), fade, weight), kSoft, to.total);
   for (int c = 0; c < 3; ++c) {
     const SoftVec part = hn::IfThenElseZero(at.counts, hn::Mul(weight, at.color[c]));
-    hn::StoreU(hn::MulAdd(hn::LoadU(d, to.color[c]), fade, part), d, to.color[c]);
+    hn::StoreU(hn::MulAdd(hn::LoadU(kSoft, to.color[c]), fade, part), kSoft, to.color[c]);
   }
 }
 
@@ -143,7 +131,7 @@ struct ColorSums {
 };
 
 HWY_INLINE void ClearSums(ColorSums* sums) {
-  const SoftVec zero = hn::Zero(SoftTag());
+  const SoftVec zero = hn::Zero(kSoft);
   for (int k = 0; k < 3; ++k) {
     sums->corners.x[k] = sums->corners.y[k] = sums->over_z[k] = zero;
     for (SoftVec& v : sums->vertex[k]) v = zero;
@@ -155,10 +143,9 @@ struct ColorPush {
   SoftVec g[3], mean;  // dL/dI, and its product with I
 
   HWY_INLINE ColorPush(const SoftRasColorImage& image, std::size_t at) {
-    const SoftTag d;
     const std::size_t plane = image.total.size();
-    for (std::size_t c = 0; c < 3; ++c) g[c] = hn::LoadU(d, &image.push[c * plane + at]);
-    mean = hn::LoadU(d, &image.push[3 * plane + at]);
+    for (std::size_t c = 0; c < 3; ++c) g[c] = hn::LoadU(kSoft, &image.push[c * plane + at]);
+    mean = hn::LoadU(kSoft, &image.push[3 * plane + at]);
   }
 };
 
@@ -182,8 +169,7 @@ HWY_INLINE void AddTexels(const ColorLanes& at, SoftVec weight, const ColorPush&
 // The repair: corners also move the interpolation weights of colour and depth.
 HWY_INLINE void AddWeightMoves(const SoftRasFace& f, const ColorLanes& at, const SoftVec d_w[3],
                                CornerSums* sums) {
-  const SoftTag d;
-  const SoftVec zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const SoftVec zero = hn::Zero(kSoft), one = hn::Set(kSoft, 1.0f);
   SoftVec mean = zero, gx = zero, gy = zero;
   for (int k = 0; k < 3; ++k) mean = hn::MulAdd(at.w[k], d_w[k], mean);
   for (int k = 0; k < 3; ++k) {
@@ -191,8 +177,8 @@ HWY_INLINE void AddWeightMoves(const SoftRasFace& f, const ColorLanes& at, const
     const SoftMask free = hn::And(at.counts, hn::And(hn::Gt(b, zero), hn::Lt(b, one)));
     const SoftVec d_b = hn::IfThenElseZero(free, hn::Div(hn::Sub(d_w[k], mean), at.sum));
     const int edge = (k + 1) % 3;
-    gx = hn::MulAdd(d_b, hn::Set(d, -f.ey[edge] * f.inverse_area), gx);
-    gy = hn::MulAdd(d_b, hn::Set(d, f.ex[edge] * f.inverse_area), gy);
+    gx = hn::MulAdd(d_b, hn::Set(kSoft, -f.ey[edge] * f.inverse_area), gx);
+    gy = hn::MulAdd(d_b, hn::Set(kSoft, f.ex[edge] * f.inverse_area), gy);
   }
   for (int k = 0; k < 3; ++k) {
     sums->x[k] = hn::NegMulAdd(at.soft.b[k], gx, sums->x[k]);
@@ -203,15 +189,15 @@ HWY_INLINE void AddWeightMoves(const SoftRasFace& f, const ColorLanes& at, const
 // Through depth, whose adjoint is d_z; with the repair also through the weights.
 HWY_INLINE void AddDepthMoves(const ColorFace& of, const ColorLanes& at, SoftVec d_z,
                               SoftVec weight, const ColorPush& push, ColorSums* sums) {
-  const SoftTag d;
   const SoftVec d_zz = hn::IfThenElseZero(at.counts, hn::Mul(d_z, hn::Mul(at.z, at.z)));
   for (int k = 0; k < 3; ++k) sums->over_z[k] = hn::MulAdd(d_zz, at.w[k], sums->over_z[k]);
   if (!of.job.colors.position_gradient) return;
   SoftVec d_w[3];
   for (int k = 0; k < 3; ++k) {
-    d_w[k] = hn::Mul(d_zz, hn::Set(d, -1.0f / of.face.z[k]));
+    d_w[k] = hn::Mul(d_zz, hn::Set(kSoft, -1.0f / of.face.z[k]));
     for (int c = 0; c < 3; ++c)
-      d_w[k] = hn::MulAdd(hn::Mul(weight, push.g[c]), hn::Set(d, of.textures[3 * k + c]), d_w[k]);
+      d_w[k] =
+          hn::MulAdd(hn::Mul(weight, push.g[c]), hn::Set(kSoft, of.textures[3 * k + c]), d_w[k]);
   }
   AddWeightMoves(of.face, at, d_w, &sums->corners);
 }
@@ -220,20 +206,20 @@ HWY_INLINE void AddDepthMoves(const ColorFace& of, const ColorLanes& at, SoftVec
 template <SoftDistance kDistance>
 HWY_INLINE void AddMixture(const ColorFace& of, const ColorLanes& at,
                            const SoftRasColorImage& mixed, std::size_t pixel, ColorSums* sums) {
-  const SoftTag d;
   const ColorPush push(mixed, pixel);
-  const SoftVec nearest = hn::LoadU(d, &mixed.nearest[pixel]);
+  const SoftVec nearest = hn::LoadU(kSoft, &mixed.nearest[pixel]);
   const SoftVec behind = hn::Sub(hn::IfThenElse(at.counts, at.nearness, nearest), nearest);
   const SoftVec per_probability = hn::IfThenElseZero(
-      at.counts, hn::Div(RelativeWeight(of.scale, behind), hn::LoadU(d, &mixed.total[pixel])));
+      at.counts, hn::Div(RelativeWeight(of.scale, behind), hn::LoadU(kSoft, &mixed.total[pixel])));
   const SoftVec weight = hn::Mul(at.soft.probability, per_probability);
   SoftVec along = hn::Neg(push.mean);
   for (int c = 0; c < 3; ++c) along = hn::MulAdd(push.g[c], at.color[c], along);
   along = hn::IfThenElseZero(at.counts, along);
   AddTexels(at, weight, push, sums);
   if constexpr (kDistance != SoftDistance::kHard) {
-    const SoftVec slope = hn::Mul(
-        hn::Mul(at.soft.miss, hn::Set(d, 1 / static_cast<float>(of.job.options.sigma))), weight);
+    const SoftVec slope =
+        hn::Mul(hn::Mul(at.soft.miss, hn::Set(kSoft, 1 / static_cast<float>(of.job.options.sigma))),
+                weight);
     const SoftVec d_d = hn::Mul(along, slope);
     if constexpr (kDistance == SoftDistance::kEuclidean) {
       AddEuclidean(at.soft, d_d, &sums->corners);
@@ -241,14 +227,13 @@ HWY_INLINE void AddMixture(const ColorFace& of, const ColorLanes& at,
       AddBarycentric(of.face, at.soft, d_d, &sums->corners);
     }
   }
-  const SoftVec d_z = hn::Mul(hn::Mul(weight, along), hn::Set(d, -of.scale.slope));
+  const SoftVec d_z = hn::Mul(hn::Mul(weight, along), hn::Set(kSoft, -of.scale.slope));
   AddDepthMoves(of, at, d_z, weight, push, sums);
 }
 
 HWY_INLINE void StoreSums(const SoftRasFace& f, const ColorSums& sums, float* d_corners,
                           float* d_textures) {
-  const SoftTag d;
-  const auto total = [&](SoftVec v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
+  const auto total = [&](SoftVec v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(kSoft, v)); };
   for (int k = 0; k < 3; ++k) {
     d_corners[3 * k] += total(sums.corners.x[k]);
     d_corners[3 * k + 1] += total(sums.corners.y[k]);
@@ -295,8 +280,5 @@ void BackwardColors(const SoftRasColorJob& job, const SoftRasColorImage& mixed, 
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

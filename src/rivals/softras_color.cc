@@ -4,7 +4,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "rivals/softras_color.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "rivals/softras_color-inl.h"
 

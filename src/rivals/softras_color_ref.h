@@ -4,8 +4,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
-#include <span>
 
 #include "rivals/softras_color.h"
 #include "rivals/softras_ref.h"

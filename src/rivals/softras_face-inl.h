@@ -14,12 +14,12 @@
 #include "rivals/softras.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::rivals {
-namespace HWY_NAMESPACE {
+namespace tilegrad::rivals::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Most faces are narrower than eight pixels: wider vectors would waste lanes.
 using SoftTag = hn::CappedTag<float, 8>;
+inline constexpr SoftTag kSoft;
 using SoftVec = hn::Vec<SoftTag>;
 using SoftMask = hn::Mask<SoftTag>;
 
@@ -48,23 +48,24 @@ struct SoftLanes {
 };
 
 HWY_INLINE void SetWeights(const SoftRasFace& f, SoftVec px, SoftVec py, SoftLanes* out) {
-  const SoftTag d;
-  const SoftVec inverse_area = hn::Set(d, f.inverse_area);
+  const SoftVec inverse_area = hn::Set(kSoft, f.inverse_area);
   for (int k = 0; k < 3; ++k) {
-    const SoftVec qx = hn::Sub(px, hn::Set(d, f.x[k])), qy = hn::Sub(py, hn::Set(d, f.y[k]));
-    const SoftVec cross = hn::MulSub(hn::Set(d, f.ex[k]), qy, hn::Mul(hn::Set(d, f.ey[k]), qx));
+    const SoftVec qx = hn::Sub(px, hn::Set(kSoft, f.x[k])),
+                  qy = hn::Sub(py, hn::Set(kSoft, f.y[k]));
+    const SoftVec cross =
+        hn::MulSub(hn::Set(kSoft, f.ex[k]), qy, hn::Mul(hn::Set(kSoft, f.ey[k]), qx));
     out->b[(k + 2) % 3] = hn::Mul(cross, inverse_area);  // of the corner beside the edge
   }
 }
 
 HWY_INLINE void SetNearestPoint(const SoftRasFace& f, SoftVec px, SoftVec py, SoftLanes* out) {
-  const SoftTag d;
-  const SoftVec zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const SoftVec zero = hn::Zero(kSoft), one = hn::Set(kSoft, 1.0f);
   for (int k = 0; k < 3; ++k) {
-    const SoftVec ex = hn::Set(d, f.ex[k]), ey = hn::Set(d, f.ey[k]);
-    const SoftVec qx = hn::Sub(px, hn::Set(d, f.x[k])), qy = hn::Sub(py, hn::Set(d, f.y[k]));
+    const SoftVec ex = hn::Set(kSoft, f.ex[k]), ey = hn::Set(kSoft, f.ey[k]);
+    const SoftVec qx = hn::Sub(px, hn::Set(kSoft, f.x[k])),
+                  qy = hn::Sub(py, hn::Set(kSoft, f.y[k]));
     const SoftVec along =
-        hn::Mul(hn::MulAdd(qx, ex, hn::Mul(qy, ey)), hn::Set(d, f.inverse_length[k]));
+        hn::Mul(hn::MulAdd(qx, ex, hn::Mul(qy, ey)), hn::Set(kSoft, f.inverse_length[k]));
     const SoftVec t = hn::Min(hn::Max(along, zero), one);
     const SoftVec rx = hn::MulSub(t, ex, qx), ry = hn::MulSub(t, ey, qy);
     const SoftVec squared = hn::MulAdd(rx, rx, hn::Mul(ry, ry));
@@ -90,8 +91,7 @@ HWY_INLINE void SetNearestPoint(const SoftRasFace& f, SoftVec px, SoftVec py, So
 template <SoftDistance kDistance>
 HWY_INLINE SoftLanes SoftFaceAt(const SoftRasFace& f, const SoftScale& scale, SoftVec px,
                                 SoftVec py) {
-  const SoftTag d;
-  const SoftVec zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const SoftVec zero = hn::Zero(kSoft), one = hn::Set(kSoft, 1.0f);
   SoftLanes out;
   SetWeights(f, px, py, &out);
   const SoftVec least = hn::Min(hn::Min(out.b[0], out.b[1]), out.b[2]);
@@ -108,13 +108,14 @@ HWY_INLINE SoftLanes SoftFaceAt(const SoftRasFace& f, const SoftScale& scale, So
   } else {
     out.d = hn::Mul(least, least);
   }
-  out.live = hn::Or(out.inside, hn::Lt(out.d, hn::Set(d, scale.cutoff)));
+  out.live = hn::Or(out.inside, hn::Lt(out.d, hn::Set(kSoft, scale.cutoff)));
   if constexpr (kDistance == SoftDistance::kBarycentric) {  // the box clips there, too
-    out.live = hn::And(out.live,
-                       hn::And(hn::Ge(px, hn::Set(d, f.low_x)), hn::Le(px, hn::Set(d, f.high_x))));
+    out.live = hn::And(out.live, hn::And(hn::Ge(px, hn::Set(kSoft, f.low_x)),
+                                         hn::Le(px, hn::Set(kSoft, f.high_x))));
   }
   const SoftVec e =
-      tilegrad::HWY_NAMESPACE::Exp2Neg(d, hn::Mul(out.d, hn::Set(d, scale.bits_per_d))).power;
+      tilegrad::HWY_NAMESPACE::Exp2Neg(kSoft, hn::Mul(out.d, hn::Set(kSoft, scale.bits_per_d)))
+          .power;
   const SoftVec large = hn::Div(one, hn::Add(one, e)), small = hn::Mul(e, large);
   out.probability = hn::IfThenElseZero(out.live, hn::IfThenElse(out.inside, large, small));
   out.miss = hn::IfThenElse(out.live, hn::IfThenElse(out.inside, small, large), one);
@@ -122,20 +123,18 @@ HWY_INLINE SoftLanes SoftFaceAt(const SoftRasFace& f, const SoftScale& scale, So
 }
 
 HWY_INLINE SoftVec ColumnCentres(int column, int size) {
-  const SoftTag d;
-  const SoftVec twice = tilegrad::HWY_NAMESPACE::CountFrom(d, static_cast<float>(column));
-  return hn::Mul(hn::Add(hn::Add(twice, twice), hn::Set(d, static_cast<float>(1 - size))),
-                 hn::Set(d, 1.0f / static_cast<float>(size)));
+  const SoftVec twice = tilegrad::HWY_NAMESPACE::CountFrom(kSoft, static_cast<float>(column));
+  return hn::Mul(hn::Add(hn::Add(twice, twice), hn::Set(kSoft, static_cast<float>(1 - size))),
+                 hn::Set(kSoft, 1.0f / static_cast<float>(size)));
 }
 
 // Calls visit(offset in the image's arrays, px, py) for the vectors of a face's box.
 template <class Visit>
 HWY_INLINE void ForFaceVectors(const SoftRasFace& f, RowRange rows, const SoftRasImage& image,
                                const Visit& visit) {
-  const SoftTag d;
-  const int lanes = static_cast<int>(hn::Lanes(d)), size = image.size;
+  const int lanes = static_cast<int>(hn::Lanes(kSoft)), size = image.size;
   for (int i = HWY_MAX(rows.begin, f.row_begin); i < HWY_MIN(rows.end, f.row_end); ++i) {
-    const SoftVec py = hn::Set(d, CentreY<float>(i, size));
+    const SoftVec py = hn::Set(kSoft, CentreY<float>(i, size));
     for (int j = f.column_begin; j < f.column_end; j += lanes) {
       visit(static_cast<std::size_t>(i) * image.stride + static_cast<std::size_t>(j),
             ColumnCentres(j, size), py);
@@ -159,16 +158,16 @@ HWY_INLINE void AddEuclidean(const SoftLanes& at, SoftVec d_d, CornerSums* sums)
 // The smallest weight m moves by -b_k grad m when corner k does.
 HWY_INLINE void AddBarycentric(const SoftRasFace& f, const SoftLanes& at, SoftVec d_d,
                                CornerSums* sums) {
-  const SoftTag d;
   SoftVec least = at.b[0];
   // Weight k falls away from edge k + 1, which leads from corner k + 1 to corner k + 2.
-  SoftVec gx = hn::Set(d, -f.ey[1] * f.inverse_area), gy = hn::Set(d, f.ex[1] * f.inverse_area);
+  SoftVec gx = hn::Set(kSoft, -f.ey[1] * f.inverse_area),
+          gy = hn::Set(kSoft, f.ex[1] * f.inverse_area);
   for (int k = 1; k < 3; ++k) {
     const SoftMask less = hn::Lt(at.b[k], least);
     const int edge = (k + 1) % 3;
     least = hn::IfThenElse(less, at.b[k], least);
-    gx = hn::IfThenElse(less, hn::Set(d, -f.ey[edge] * f.inverse_area), gx);
-    gy = hn::IfThenElse(less, hn::Set(d, f.ex[edge] * f.inverse_area), gy);
+    gx = hn::IfThenElse(less, hn::Set(kSoft, -f.ey[edge] * f.inverse_area), gx);
+    gy = hn::IfThenElse(less, hn::Set(kSoft, f.ex[edge] * f.inverse_area), gy);
   }
   const SoftVec push = hn::Mul(hn::Add(d_d, d_d), hn::Abs(least));
   const SoftVec x = hn::Mul(push, gx), y = hn::Mul(push, gy);
@@ -178,8 +177,7 @@ HWY_INLINE void AddBarycentric(const SoftRasFace& f, const SoftLanes& at, SoftVe
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -3,9 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <span>
 
 #include "rivals/softras.h"
 

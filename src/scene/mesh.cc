@@ -86,70 +86,6 @@ void Keep(std::vector<T>* values, const std::vector<char>& keep_face, std::size_
   values->resize(to);
 }
 
-}  // namespace
-
-Status Validate(const Mesh& mesh) {
-  const std::size_t vertices = mesh.positions.size(), faces = mesh.faces.size();
-  TILEGRAD_TRY(CheckCount("normals", mesh.normals.size(), vertices, "vertex"));
-  TILEGRAD_TRY(CheckCount("colors", mesh.colors.size(), vertices, "vertex"));
-  TILEGRAD_TRY(CheckCount("corner_uvs", mesh.corner_uvs.size(), 3 * faces, "corner"));
-  TILEGRAD_TRY(CheckCount("corner_normals", mesh.corner_normals.size(), 3 * faces, "corner"));
-  TILEGRAD_TRY(CheckCount("corner_colors", mesh.corner_colors.size(), 3 * faces, "corner"));
-  if (!mesh.colors.empty() && !mesh.corner_colors.empty())
-    return InvalidArgument("the mesh has both colors and corner_colors; give one of them");
-  TILEGRAD_TRY(CheckCount("face_materials", mesh.face_materials.size(), faces, "face"));
-  TILEGRAD_TRY(CheckFaces(mesh));
-  TILEGRAD_TRY(CheckMaterials(mesh));
-  TILEGRAD_TRY(CheckFinite("positions", mesh.positions));
-  TILEGRAD_TRY(CheckFinite("normals", mesh.normals));
-  TILEGRAD_TRY(CheckFinite("colors", mesh.colors));
-  TILEGRAD_TRY(CheckFinite("corner_colors", mesh.corner_colors));
-  TILEGRAD_TRY(CheckFinite("corner_uvs", mesh.corner_uvs));
-  return CheckFinite("corner_normals", mesh.corner_normals);
-}
-
-Bounds MeshBounds(const Mesh& mesh) {
-  Bounds b{mesh.positions[mesh.faces[0][0]], mesh.positions[mesh.faces[0][0]]};
-  for (const Face& face : mesh.faces) {
-    for (std::int32_t v : face) {
-      b.low = glm::min(b.low, mesh.positions[v]);
-      b.high = glm::max(b.high, mesh.positions[v]);
-    }
-  }
-  return b;
-}
-
-Status NormalizeToBox(Mesh& mesh, float half_extent) {
-  if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
-  const Bounds b = MeshBounds(mesh);
-  // In double: the sum of two large coordinates must not overflow or cancel.
-  const glm::dvec3 low(b.low), high(b.high), centre = 0.5 * (low + high), half = 0.5 * (high - low);
-  const double largest = std::max({half.x, half.y, half.z});
-  if (!(largest > 0)) return InvalidArgument("the mesh has no extent: all vertices coincide");
-  for (glm::vec3& p : mesh.positions)
-    p = glm::vec3((glm::dvec3(p) - centre) * (half_extent / largest));
-  return {};
-}
-
-bool KeepFaces(const std::vector<char>& keep, Mesh* mesh) {
-  const auto left_out = static_cast<std::size_t>(std::count(keep.begin(), keep.end(), 0));
-  if (left_out == keep.size()) return false;
-  if (left_out == 0) return true;
-  Keep(&mesh->faces, keep, 1);
-  Keep(&mesh->face_materials, keep, 1);
-  Keep(&mesh->corner_uvs, keep, 3);
-  Keep(&mesh->corner_colors, keep, 3);
-  Keep(&mesh->corner_normals, keep, 3);
-  return true;
-}
-
-void SetUnlit(Mesh& mesh, const std::string& name) {
-  if (mesh.materials.empty()) mesh.materials = {{.name = name, .base_color = glm::vec4(1)}};
-  for (Material& material : mesh.materials) material.unlit = true;
-}
-
-namespace {
-
 // turn(row) of each row of the rotation.
 template <class Turn>
 Camera WithRows(Camera camera, Turn turn) {
@@ -159,42 +95,6 @@ Camera WithRows(Camera camera, Turn turn) {
   }
   return camera;
 }
-
-}  // namespace
-
-glm::vec3 Upright(UpAxis up, glm::vec3 v) {
-  if (up == UpAxis::kZ) return {v.x, v.z, -v.y};
-  if (up == UpAxis::kX) return {-v.y, v.x, v.z};
-  return v;
-}
-
-std::optional<UpAxis> UpAxisNamed(std::string_view name) {
-  if (name == "y" || name == "Y") return UpAxis::kY;
-  if (name == "z" || name == "Z") return UpAxis::kZ;
-  if (name == "x" || name == "X") return UpAxis::kX;
-  return std::nullopt;
-}
-
-void TurnUpright(UpAxis up, Mesh* mesh) {
-  if (up == UpAxis::kY) return;
-  for (auto* vectors : {&mesh->positions, &mesh->normals, &mesh->corner_normals})
-    for (glm::vec3& v : *vectors) v = Upright(up, v);
-}
-
-// The rows of a rotation are directions in the world.
-Camera UprightCamera(UpAxis up, Camera camera) {
-  return WithRows(camera, [&](glm::vec3 row) { return Upright(up, row); });
-}
-
-// A row r of the rotation meets Upright(v) as the row R^T r meets v.
-Camera CameraOfFile(UpAxis up, Camera camera) {
-  return WithRows(camera, [&](glm::vec3 r) {
-    if (up == UpAxis::kZ) return glm::vec3(r.x, -r.z, r.y);
-    return up == UpAxis::kX ? glm::vec3(r.y, -r.x, r.z) : r;
-  });
-}
-
-namespace {
 
 constexpr std::size_t kMaxEarCorners = 256;
 
@@ -262,18 +162,6 @@ class EarClipper {
   std::vector<std::int32_t> left_;  // corners not yet clipped, in order
 };
 
-}  // namespace
-
-void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& triangles) {
-  triangles.clear();
-  const std::size_t n = corners.size();
-  if (n > 3 && n <= kMaxEarCorners) return EarClipper(corners).Run(triangles);
-  for (std::int32_t k = 2; k < static_cast<std::int32_t>(n); ++k)
-    triangles.push_back({0, k - 1, k});
-}
-
-namespace {
-
 // The distance that the eye needs along one view, and how far the mesh extends towards it.
 struct Reach {
   double distance = 0, towards_eye = -1e300;
@@ -326,6 +214,106 @@ Status Check(const Framing& framing, double extent) {
 }
 
 }  // namespace
+
+Status Validate(const Mesh& mesh) {
+  const std::size_t vertices = mesh.positions.size(), faces = mesh.faces.size();
+  TILEGRAD_TRY(CheckCount("normals", mesh.normals.size(), vertices, "vertex"));
+  TILEGRAD_TRY(CheckCount("colors", mesh.colors.size(), vertices, "vertex"));
+  TILEGRAD_TRY(CheckCount("corner_uvs", mesh.corner_uvs.size(), 3 * faces, "corner"));
+  TILEGRAD_TRY(CheckCount("corner_normals", mesh.corner_normals.size(), 3 * faces, "corner"));
+  TILEGRAD_TRY(CheckCount("corner_colors", mesh.corner_colors.size(), 3 * faces, "corner"));
+  if (!mesh.colors.empty() && !mesh.corner_colors.empty())
+    return InvalidArgument("the mesh has both colors and corner_colors; give one of them");
+  TILEGRAD_TRY(CheckCount("face_materials", mesh.face_materials.size(), faces, "face"));
+  TILEGRAD_TRY(CheckFaces(mesh));
+  TILEGRAD_TRY(CheckMaterials(mesh));
+  TILEGRAD_TRY(CheckFinite("positions", mesh.positions));
+  TILEGRAD_TRY(CheckFinite("normals", mesh.normals));
+  TILEGRAD_TRY(CheckFinite("colors", mesh.colors));
+  TILEGRAD_TRY(CheckFinite("corner_colors", mesh.corner_colors));
+  TILEGRAD_TRY(CheckFinite("corner_uvs", mesh.corner_uvs));
+  return CheckFinite("corner_normals", mesh.corner_normals);
+}
+
+Bounds MeshBounds(const Mesh& mesh) {
+  Bounds b{mesh.positions[mesh.faces[0][0]], mesh.positions[mesh.faces[0][0]]};
+  for (const Face& face : mesh.faces) {
+    for (std::int32_t v : face) {
+      b.low = glm::min(b.low, mesh.positions[v]);
+      b.high = glm::max(b.high, mesh.positions[v]);
+    }
+  }
+  return b;
+}
+
+Status NormalizeToBox(Mesh& mesh, float half_extent) {
+  if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
+  const Bounds b = MeshBounds(mesh);
+  // In double: the sum of two large coordinates must not overflow or cancel.
+  const glm::dvec3 low(b.low), high(b.high), centre = 0.5 * (low + high), half = 0.5 * (high - low);
+  const double largest = std::max({half.x, half.y, half.z});
+  if (!(largest > 0)) return InvalidArgument("the mesh has no extent: all vertices coincide");
+  for (glm::vec3& p : mesh.positions)
+    p = glm::vec3((glm::dvec3(p) - centre) * (half_extent / largest));
+  return {};
+}
+
+bool KeepFaces(const std::vector<char>& keep, Mesh* mesh) {
+  const auto left_out = static_cast<std::size_t>(std::count(keep.begin(), keep.end(), 0));
+  if (left_out == keep.size()) return false;
+  if (left_out == 0) return true;
+  Keep(&mesh->faces, keep, 1);
+  Keep(&mesh->face_materials, keep, 1);
+  Keep(&mesh->corner_uvs, keep, 3);
+  Keep(&mesh->corner_colors, keep, 3);
+  Keep(&mesh->corner_normals, keep, 3);
+  return true;
+}
+
+void SetUnlit(Mesh& mesh, const std::string& name) {
+  if (mesh.materials.empty()) mesh.materials = {{.name = name, .base_color = glm::vec4(1)}};
+  for (Material& material : mesh.materials) material.unlit = true;
+}
+
+glm::vec3 Upright(UpAxis up, glm::vec3 v) {
+  if (up == UpAxis::kZ) return {v.x, v.z, -v.y};
+  if (up == UpAxis::kX) return {-v.y, v.x, v.z};
+  return v;
+}
+
+std::optional<UpAxis> UpAxisNamed(std::string_view name) {
+  if (name == "y" || name == "Y") return UpAxis::kY;
+  if (name == "z" || name == "Z") return UpAxis::kZ;
+  if (name == "x" || name == "X") return UpAxis::kX;
+  return std::nullopt;
+}
+
+void TurnUpright(UpAxis up, Mesh* mesh) {
+  if (up == UpAxis::kY) return;
+  for (auto* vectors : {&mesh->positions, &mesh->normals, &mesh->corner_normals})
+    for (glm::vec3& v : *vectors) v = Upright(up, v);
+}
+
+// The rows of a rotation are directions in the world.
+Camera UprightCamera(UpAxis up, Camera camera) {
+  return WithRows(camera, [&](glm::vec3 row) { return Upright(up, row); });
+}
+
+// A row r of the rotation meets Upright(v) as the row R^T r meets v.
+Camera CameraOfFile(UpAxis up, Camera camera) {
+  return WithRows(camera, [&](glm::vec3 r) {
+    if (up == UpAxis::kZ) return glm::vec3(r.x, -r.z, r.y);
+    return up == UpAxis::kX ? glm::vec3(r.y, -r.x, r.z) : r;
+  });
+}
+
+void TriangulatePolygon(std::span<const glm::vec3> corners, std::vector<Face>& triangles) {
+  triangles.clear();
+  const std::size_t n = corners.size();
+  if (n > 3 && n <= kMaxEarCorners) return EarClipper(corners).Run(triangles);
+  for (std::int32_t k = 2; k < static_cast<std::int32_t>(n); ++k)
+    triangles.push_back({0, k - 1, k});
+}
 
 Result<std::vector<Camera>> FrameMesh(const Mesh& mesh, const Framing& framing,
                                       std::span<const ViewAngle> views) {

@@ -167,16 +167,6 @@ class Simplification {
   std::priority_queue<Candidate, std::vector<Candidate>, Later> queue_;
 };
 
-}  // namespace
-
-Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
-  TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(mesh.positions, mesh.faces));
-  TILEGRAD_TRY(Simplification(limits, &edit).Run());
-  return edit.Pack();
-}
-
-namespace {
-
 glm::vec3 Normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) { return glm::cross(b - a, c - a); }
 
 // Whether two vectors, of any length, are farther apart than the angle of this cosine.
@@ -194,6 +184,12 @@ std::size_t CornerOf(const Face& face, std::int32_t vertex) {
 }
 
 }  // namespace
+
+Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
+  TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(mesh.positions, mesh.faces));
+  TILEGRAD_TRY(Simplification(limits, &edit).Run());
+  return edit.Pack();
+}
 
 Result<EditMesh> EditMesh::Make(std::vector<glm::vec3> positions, std::vector<Face> faces) {
   EditMesh mesh;

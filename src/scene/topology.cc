@@ -64,17 +64,6 @@ void CollectNeighbors(std::size_t vertices, Topology& out) {
   }
 }
 
-}  // namespace
-
-Topology BuildTopology(std::span<const Face> faces, std::size_t vertices) {
-  Topology out;
-  CollectEdges(SortedSides(faces), out);
-  CollectNeighbors(vertices, out);
-  return out;
-}
-
-namespace {
-
 using Index = std::size_t;
 
 // For each vertex the first one at the same position.
@@ -157,6 +146,13 @@ void ColorsToCorners(Mesh* mesh) {
 }
 
 }  // namespace
+
+Topology BuildTopology(std::span<const Face> faces, std::size_t vertices) {
+  Topology out;
+  CollectEdges(SortedSides(faces), out);
+  CollectNeighbors(vertices, out);
+  return out;
+}
 
 void SplitAtCreases(double degrees, Mesh* mesh) {
   UnionFind groups = JoinSmoothSides(*mesh, degrees);

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of combine.h. Lanes are pixels.
-#if defined(TILEGRAD_SHADE_COMBINE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_SHADE_COMBINE_INL_H_
-#undef TILEGRAD_SHADE_COMBINE_INL_H_
-#else
-#define TILEGRAD_SHADE_COMBINE_INL_H_
-#endif
 
 #include <hwy/highway.h>
-
-#include <cstddef>
 
 #include "shade/combine.h"
 #include "shade/run_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::shade::HWY_NAMESPACE {
 
 // One channel of a vector of pixels.
 struct CombineLanes {
@@ -29,32 +19,30 @@ struct CombineLanes {
 };
 
 HWY_INLINE CombineLanes CombineChannel(const CombineInput& input, std::size_t c, std::size_t i) {
-  const RunTag d;
-  const auto one = hn::Set(d, 1.0f);
+  const auto one = hn::Set(kRun, 1.0f);
   CombineLanes out;
   out.texture = input.texture != nullptr ? LoadRun(input.texture[c], i) : one;
   out.vertex_color = input.vertex_color != nullptr ? LoadRun(input.vertex_color[c], i) : one;
   out.plain = hn::Mul(out.texture, out.vertex_color);
-  out.surface = hn::Mul(hn::Set(d, input.factors.base[c]), out.plain);  // (7): I_c
+  out.surface = hn::Mul(hn::Set(kRun, input.factors.base[c]), out.plain);  // (7): I_c
   out.light = one;
   if (input.light != nullptr) {
-    out.light = hn::MulAdd(hn::Set(d, input.factors.diffuse[c]), LoadRun(*input.light, i),
-                           hn::Set(d, input.factors.ambient[c]));  // (7): I_l
+    out.light = hn::MulAdd(hn::Set(kRun, input.factors.diffuse[c]), LoadRun(*input.light, i),
+                           hn::Set(kRun, input.factors.ambient[c]));  // (7): I_l
   }
   out.color = hn::Mul(out.light, out.surface);  // (7): I_l I_c
   if (input.highlight != nullptr) {
-    out.color =
-        hn::MulAdd(hn::Set(d, input.factors.specular[c]), LoadRun(*input.highlight, i), out.color);
+    out.color = hn::MulAdd(hn::Set(kRun, input.factors.specular[c]), LoadRun(*input.highlight, i),
+                           out.color);
   }
   return out;
 }
 
 void CombineRun(std::size_t count, const CombineInput& input, RunPlane* color) {
-  const RunTag d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
     for (std::size_t c = 0; c < 3; ++c) {
       auto value = CombineChannel(input, c, i).color;
-      if (input.clamp) value = hn::Min(hn::Max(value, hn::Zero(d)), hn::Set(d, 1.0f));
+      if (input.clamp) value = hn::Min(hn::Max(value, hn::Zero(kRun)), hn::Set(kRun, 1.0f));
       StoreRun(value, &color[c], i);
     }
   }
@@ -64,7 +52,7 @@ void CombineRun(std::size_t count, const CombineInput& input, RunPlane* color) {
 struct FactorSums {
   RunVec base, ambient, diffuse, specular;
 
-  HWY_INLINE FactorSums() { base = ambient = diffuse = specular = hn::Zero(RunTag()); }
+  HWY_INLINE FactorSums() { base = ambient = diffuse = specular = hn::Zero(kRun); }
   HWY_INLINE void AddTo(std::size_t c, ColorFactorsT<double>* out) const {
     out->base[c] += SumOf(base);
     out->ambient[c] += SumOf(ambient);
@@ -81,15 +69,15 @@ HWY_INLINE void PullAll(RunVec v, std::size_t c, RunPlane* to, std::size_t i) {
 HWY_INLINE void CombineChannelAdjoint(const CombineInput& input, const RunPlane& d_color,
                                       std::size_t c, const CombineAdjoint& out, std::size_t i,
                                       FactorSums* sums) {
-  const RunTag d;
   const CombineLanes at = CombineChannel(input, c, i);
   auto pull = LoadRun(d_color, i);
   if (input.clamp) {
-    const auto inside = hn::And(hn::Ge(at.color, hn::Zero(d)), hn::Le(at.color, hn::Set(d, 1.0f)));
+    const auto inside =
+        hn::And(hn::Ge(at.color, hn::Zero(kRun)), hn::Le(at.color, hn::Set(kRun, 1.0f)));
     pull = hn::IfThenElseZero(inside, pull);
   }
   const auto d_surface = hn::Mul(pull, at.light);
-  const auto d_plain = hn::Mul(d_surface, hn::Set(d, input.factors.base[c]));
+  const auto d_plain = hn::Mul(d_surface, hn::Set(kRun, input.factors.base[c]));
   if (out.d_texture != nullptr) StoreRun(hn::Mul(d_plain, at.vertex_color), &out.d_texture[c], i);
   if (out.d_vertex_color != nullptr) {
     StoreRun(hn::Mul(d_plain, at.texture), &out.d_vertex_color[c], i);
@@ -100,13 +88,13 @@ HWY_INLINE void CombineChannelAdjoint(const CombineInput& input, const RunPlane&
     sums->ambient = hn::Add(sums->ambient, d_light);
     sums->diffuse = hn::MulAdd(d_light, LoadRun(*input.light, i), sums->diffuse);
     if (out.d_light != nullptr) {
-      PullAll(hn::Mul(d_light, hn::Set(d, input.factors.diffuse[c])), c, out.d_light, i);
+      PullAll(hn::Mul(d_light, hn::Set(kRun, input.factors.diffuse[c])), c, out.d_light, i);
     }
   }
   if (input.highlight == nullptr) return;
   sums->specular = hn::MulAdd(pull, LoadRun(*input.highlight, i), sums->specular);
   if (out.d_highlight != nullptr) {
-    PullAll(hn::Mul(pull, hn::Set(d, input.factors.specular[c])), c, out.d_highlight, i);
+    PullAll(hn::Mul(pull, hn::Set(kRun, input.factors.specular[c])), c, out.d_highlight, i);
   }
 }
 
@@ -114,15 +102,12 @@ void CombineRunAdjoint(std::size_t count, const CombineInput& input, const RunPl
                        const CombineAdjoint& out) {
   for (std::size_t c = 0; c < 3; ++c) {
     FactorSums sums;
-    for (std::size_t i = 0; i < count; i += hn::Lanes(RunTag())) {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
       CombineChannelAdjoint(input, d_color[c], c, out, i, &sums);
     }
     if (out.d_factors != nullptr) sums.AddTo(c, out.d_factors);
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

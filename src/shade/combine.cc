@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/combine.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/combine-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(CombineRun);
 HWY_EXPORT(CombineRunAdjoint);
-
-}  // namespace
 
 void Combine(std::size_t count, const CombineInput& input, RunPlane* color) {
   HWY_DYNAMIC_DISPATCH(CombineRun)(count, input, color);

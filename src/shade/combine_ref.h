@@ -2,8 +2,6 @@
 // Scalar reference of combine.h. T: float, double, std::complex<double>.
 #pragma once
 
-#include <cstddef>
-
 #include "base/scalar.h"
 #include "shade/combine.h"
 #include "shade/vec3_ref.h"

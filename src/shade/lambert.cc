@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/lambert.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/lambert-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(LambertRun);
 HWY_EXPORT(LambertRunAdjoint);
-
-}  // namespace
 
 void Lambert(std::size_t count, const RunPlane* normal, const RunLights& lights, RunPlane* light) {
   HWY_DYNAMIC_DISPATCH(LambertRun)(count, normal, lights, light);

@@ -2,9 +2,6 @@
 // Scalar reference of lambert.h. T: float, double, std::complex<double>.
 #pragma once
 
-#include <cstddef>
-#include <span>
-
 #include "base/scalar.h"
 #include "shade/lambert.h"
 #include "shade/vec3_ref.h"

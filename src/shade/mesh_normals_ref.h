@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <limits>
-#include <span>
 
 #include "shade/mesh_normals.h"
 

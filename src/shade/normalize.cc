@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/normalize.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/normalize-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(NormalizeRun);
 HWY_EXPORT(NormalizeRunAdjoint);
-
-}  // namespace
 
 void Normalize(std::size_t count, const RunPlane* x, float least, RunPlane* unit,
                RunPlane* inverse_length) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 
 #include "base/scalar.h"
 #include "shade/normalize.h"

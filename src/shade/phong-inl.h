@@ -1,24 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of phong.h. Lanes are pixels.
-#if defined(TILEGRAD_SHADE_PHONG_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_SHADE_PHONG_INL_H_
-#undef TILEGRAD_SHADE_PHONG_INL_H_
-#else
-#define TILEGRAD_SHADE_PHONG_INL_H_
-#endif
 
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
-
-#include <cstddef>
 
 #include "shade/phong.h"
 #include "shade/run_lights-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::shade::HWY_NAMESPACE {
 
 // The reflection of one light at a vector of pixels.
 struct PhongLanes {
@@ -29,8 +19,8 @@ struct PhongLanes {
 };
 
 HWY_INLINE PhongLanes ReflectLanes(const PhongInput& input, const Run3& light, std::size_t i) {
-  const RunTag d;
-  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), least = hn::Set(d, kLeastReflection);
+  const auto zero = hn::Zero(kRun), one = hn::Set(kRun, 1.0f),
+             least = hn::Set(kRun, kLeastReflection);
   PhongLanes out;
   out.normal = LoadRun3(input.normal, i);
   out.eye = LoadRun3(input.eye, i);
@@ -39,19 +29,18 @@ HWY_INLINE PhongLanes ReflectLanes(const PhongInput& input, const Run3& light, s
   out.cosine_inside = hn::And(hn::Ge(cosine, zero), hn::Le(cosine, one));
   out.cosine = hn::Min(hn::Max(cosine, zero), one);
   const auto twice = hn::Add(out.cosine, out.cosine);
-  out.reflected = AddScaled(Scale(hn::Set(d, -1.0f), light), twice, out.normal);  // R
-  const auto toward = Dot(out.reflected, out.eye);                                // (8): R . V
+  out.reflected = AddScaled(Scale(hn::Set(kRun, -1.0f), light), twice, out.normal);  // R
+  const auto toward = Dot(out.reflected, out.eye);                                   // (8): R . V
   out.eye_inside = hn::And(hn::Ge(toward, least), hn::Le(toward, one));
   out.toward_eye = hn::Min(hn::Max(toward, least), one);
-  out.logarithm = hn::Log(d, out.toward_eye);
-  out.power = hn::Exp(d, hn::Mul(hn::Set(d, input.shininess), out.logarithm));  // (8)
+  out.logarithm = hn::Log(kRun, out.toward_eye);
+  out.power = hn::Exp(kRun, hn::Mul(hn::Set(kRun, input.shininess), out.logarithm));  // (8)
   return out;
 }
 
 void PhongRun(std::size_t count, const PhongInput& input, RunPlane* highlight) {
-  const RunTag d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    auto sum = hn::Zero(d);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
+    auto sum = hn::Zero(kRun);
     for (std::size_t k = 0; k < LightCount(input.lights); ++k) {
       const LightLanes l = LightAt(input.lights, k, i);
       sum = hn::MulAdd(l.intensity, ReflectLanes(input, l.direction, i).power, sum);  // (8)
@@ -63,9 +52,8 @@ void PhongRun(std::size_t count, const PhongInput& input, RunPlane* highlight) {
 // The adjoint of ReflectLanes; d_power is dL/d(power). Returns dL/d(light direction).
 HWY_INLINE Run3 PullReflection(const PhongLanes& p, RunVec d_power, const PhongInput& input,
                                const PhongAdjoint& out, std::size_t i) {
-  const RunTag d;
   const auto steep =
-      hn::Div(hn::Mul(hn::Mul(d_power, p.power), hn::Set(d, input.shininess)), p.toward_eye);
+      hn::Div(hn::Mul(hn::Mul(d_power, p.power), hn::Set(kRun, input.shininess)), p.toward_eye);
   const auto d_r = hn::IfThenElseZero(p.eye_inside, steep);
   if (out.d_eye != nullptr) AddRun3(Scale(d_r, p.reflected), out.d_eye, i);
   const auto twice = hn::Add(d_r, d_r);
@@ -79,11 +67,10 @@ HWY_INLINE Run3 PullReflection(const PhongLanes& p, RunVec d_power, const PhongI
 
 void PhongRunAdjoint(std::size_t count, const PhongInput& input, const RunPlane& d_highlight,
                      const PhongAdjoint& out) {
-  const RunTag d;
-  auto d_shininess = hn::Zero(d);
+  auto d_shininess = hn::Zero(kRun);
   for (std::size_t k = 0; k < LightCount(input.lights); ++k) {
     LightSums sums;
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
       const LightLanes l = LightAt(input.lights, k, i);
       const PhongLanes p = ReflectLanes(input, l.direction, i);
       const auto d_light = LoadRun(d_highlight, i), d_power = hn::Mul(d_light, l.intensity);
@@ -96,8 +83,5 @@ void PhongRunAdjoint(std::size_t count, const PhongInput& input, const RunPlane&
   if (out.d_shininess != nullptr) *out.d_shininess += SumOf(d_shininess);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/phong.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/phong-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(PhongRun);
 HWY_EXPORT(PhongRunAdjoint);
-
-}  // namespace
 
 void Phong(std::size_t count, const PhongInput& input, RunPlane* highlight) {
   HWY_DYNAMIC_DISPATCH(PhongRun)(count, input, highlight);

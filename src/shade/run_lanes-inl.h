@@ -14,17 +14,15 @@
 #include "shade/pixel_run.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
+namespace tilegrad::shade::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using RunTag = hn::ScalableTag<float>;
+inline constexpr RunTag kRun;
 using RunVec = hn::Vec<RunTag>;
 
-HWY_INLINE RunVec LoadRun(const RunPlane& p, std::size_t i) { return hn::Load(RunTag(), p.at + i); }
-HWY_INLINE void StoreRun(RunVec v, RunPlane* p, std::size_t i) {
-  hn::Store(v, RunTag(), p->at + i);
-}
+HWY_INLINE RunVec LoadRun(const RunPlane& p, std::size_t i) { return hn::Load(kRun, p.at + i); }
+HWY_INLINE void StoreRun(RunVec v, RunPlane* p, std::size_t i) { hn::Store(v, kRun, p->at + i); }
 HWY_INLINE void AddRun(RunVec v, RunPlane* p, std::size_t i) {
   StoreRun(hn::Add(LoadRun(*p, i), v), p, i);
 }
@@ -58,22 +56,16 @@ HWY_INLINE Run3 AddScaled(const Run3& a, RunVec s, const Run3& b) {
 HWY_INLINE Run3 Scale(RunVec s, const Run3& a) {
   return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
 }
-HWY_INLINE Run3 ZeroRun3() {
-  const RunTag d;
-  return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-}
+HWY_INLINE Run3 ZeroRun3() { return {hn::Zero(kRun), hn::Zero(kRun), hn::Zero(kRun)}; }
 HWY_INLINE Run3 SetRun3(const float* v) {
-  const RunTag d;
-  return {hn::Set(d, v[0]), hn::Set(d, v[1]), hn::Set(d, v[2])};
+  return {hn::Set(kRun, v[0]), hn::Set(kRun, v[1]), hn::Set(kRun, v[2])};
 }
 
 HWY_INLINE double SumOf(RunVec v) {
-  const RunTag d;
-  return static_cast<double>(hn::GetLane(hn::SumOfLanes(d, v)));
+  return static_cast<double>(hn::GetLane(hn::SumOfLanes(kRun, v)));
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

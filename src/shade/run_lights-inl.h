@@ -15,9 +15,7 @@
 #include "shade/run_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::shade::HWY_NAMESPACE {
 
 HWY_INLINE std::size_t LightCount(const RunLights& lights) {
   return lights.per_pixel != nullptr ? 1 : lights.uniform.size();
@@ -30,10 +28,9 @@ struct LightLanes {
 };
 
 HWY_INLINE LightLanes LightAt(const RunLights& lights, std::size_t k, std::size_t i) {
-  const RunTag d;
-  if (lights.per_pixel != nullptr) return {LoadRun3(lights.per_pixel, i), hn::Set(d, 1.0f)};
+  if (lights.per_pixel != nullptr) return {LoadRun3(lights.per_pixel, i), hn::Set(kRun, 1.0f)};
   const Light& l = lights.uniform[k];
-  return {SetRun3(l.direction.data()), hn::Set(d, l.intensity)};
+  return {SetRun3(l.direction.data()), hn::Set(kRun, l.intensity)};
 }
 
 // The gradient of one light, summed over a run.
@@ -41,7 +38,7 @@ struct LightSums {
   Run3 direction;
   RunVec intensity;
 
-  HWY_INLINE LightSums() : direction(ZeroRun3()), intensity(hn::Zero(RunTag())) {}
+  HWY_INLINE LightSums() : direction(ZeroRun3()), intensity(hn::Zero(kRun)) {}
   HWY_INLINE void AddTo(LightT<double>* light) const {
     light->direction[0] += SumOf(direction.x);
     light->direction[1] += SumOf(direction.y);
@@ -54,12 +51,11 @@ struct LightSums {
 HWY_INLINE void PullLight(const RunLightAdjoint& out, const Run3& d_direction, RunVec d_intensity,
                           std::size_t i, LightSums* sums) {
   if (out.per_pixel != nullptr) AddRun3(d_direction, out.per_pixel, i);
-  sums->direction = AddScaled(sums->direction, hn::Set(RunTag(), 1.0f), d_direction);
+  sums->direction = AddScaled(sums->direction, hn::Set(kRun, 1.0f), d_direction);
   sums->intensity = hn::Add(sums->intensity, d_intensity);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

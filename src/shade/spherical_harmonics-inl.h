@@ -1,27 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of spherical_harmonics.h. Lanes are pixels.
-#if defined(TILEGRAD_SHADE_SPHERICAL_HARMONICS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_SHADE_SPHERICAL_HARMONICS_INL_H_
-#undef TILEGRAD_SHADE_SPHERICAL_HARMONICS_INL_H_
-#else
-#define TILEGRAD_SHADE_SPHERICAL_HARMONICS_INL_H_
-#endif
 
 #include <hwy/highway.h>
-
-#include <cstddef>
 
 #include "shade/run_lanes-inl.h"
 #include "shade/spherical_harmonics.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::shade::HWY_NAMESPACE {
 
 HWY_INLINE hn::Mask<RunTag> HasDirectionLanes(const Run3& n) {
-  const RunTag d;
-  return hn::Gt(Dot(n, n), hn::Zero(d));
+  return hn::Gt(Dot(n, n), hn::Zero(kRun));
 }
 
 struct MonomialLanes {
@@ -30,25 +19,23 @@ struct MonomialLanes {
 
 HWY_INLINE MonomialLanes MonomialsOf(const Run3& n) {
   const auto difference = hn::Mul(hn::Sub(n.x, n.y), hn::Add(n.x, n.y));
-  return {{hn::Set(RunTag(), 1.0f), n.x, n.y, n.z, hn::Mul(n.x, n.y), hn::Mul(n.y, n.z),
+  return {{hn::Set(kRun, 1.0f), n.x, n.y, n.z, hn::Mul(n.x, n.y), hn::Mul(n.y, n.z),
            hn::Mul(n.z, n.z), hn::Mul(n.x, n.z), difference}};
 }
 
 void ShLightRun(std::size_t count, const RunPlane* normal, const ShPolynomial& p, RunPlane* light) {
-  const RunTag d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
     const Run3 n = LoadRun3(normal, i);
     const MonomialLanes m = MonomialsOf(n);
-    auto sum = hn::Set(d, p[0]);
-    for (int k = 1; k < 9; ++k) sum = hn::MulAdd(hn::Set(d, p[k]), m.at[k], sum);  // (11)
+    auto sum = hn::Set(kRun, p[0]);
+    for (int k = 1; k < 9; ++k) sum = hn::MulAdd(hn::Set(kRun, p[k]), m.at[k], sum);  // (11)
     StoreRun(hn::IfThenElseZero(HasDirectionLanes(n), sum), light, i);
   }
 }
 
 // Gradient of the polynomial.
 HWY_INLINE Run3 ShSlope(const ShPolynomial& p, const Run3& n) {
-  const RunTag d;
-  const auto set = [&](int k) HWY_ATTR { return hn::Set(d, p[k]); };
+  const auto set = [&](int k) HWY_ATTR { return hn::Set(kRun, p[k]); };
   const auto x2 = hn::Add(n.x, n.x), y2 = hn::Add(n.y, n.y), z2 = hn::Add(n.z, n.z);
   const auto along_x =
       hn::MulAdd(set(4), n.y, hn::MulAdd(set(7), n.z, hn::MulAdd(set(8), x2, set(1))));
@@ -62,10 +49,9 @@ HWY_INLINE Run3 ShSlope(const ShPolynomial& p, const Run3& n) {
 void ShLightRunAdjoint(std::size_t count, const RunPlane* normal, const ShPolynomial& p,
                        const RunPlane& d_light, RunPlane* d_normal,
                        ShPolynomialT<double>* d_polynomial) {
-  const RunTag d;
   MonomialLanes sums;
-  for (auto& sum : sums.at) sum = hn::Zero(d);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  for (auto& sum : sums.at) sum = hn::Zero(kRun);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
     const Run3 n = LoadRun3(normal, i);
     const auto pull = hn::IfThenElseZero(HasDirectionLanes(n), LoadRun(d_light, i));
     if (d_normal != nullptr) AddRun3(Scale(pull, ShSlope(p, n)), d_normal, i);
@@ -77,8 +63,5 @@ void ShLightRunAdjoint(std::size_t count, const RunPlane* normal, const ShPolyno
   for (int k = 0; k < 9; ++k) (*d_polynomial)[k] += SumOf(sums.at[k]);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

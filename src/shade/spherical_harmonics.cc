@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/spherical_harmonics.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/spherical_harmonics-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(ShLightRun);
 HWY_EXPORT(ShLightRunAdjoint);
-
-}  // namespace
 
 void ShLight(std::size_t count, const RunPlane* normal, const ShPolynomial& polynomial,
              RunPlane* light) {

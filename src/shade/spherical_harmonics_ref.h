@@ -2,7 +2,6 @@
 // Scalar reference of spherical_harmonics.h, and the basis. T: float, double, std::complex<double>.
 #pragma once
 
-#include <cstddef>
 #include <span>
 
 #include "base/scalar.h"

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of texture.h. Lanes are pixels.
-#if defined(TILEGRAD_SHADE_TEXTURE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_SHADE_TEXTURE_INL_H_
-#undef TILEGRAD_SHADE_TEXTURE_INL_H_
-#else
-#define TILEGRAD_SHADE_TEXTURE_INL_H_
-#endif
 
 #include <hwy/highway.h>
-
-#include <cstddef>
-#include <cstdint>
 
 #include "shade/run_lanes-inl.h"
 #include "shade/texture.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::shade {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::shade::HWY_NAMESPACE {
 
 using RunIntTag = hn::RebindToSigned<RunTag>;
+inline constexpr RunIntTag kRunInt;
 using RunInt = hn::Vec<RunIntTag>;
 using TexelTag = hn::FixedTag<float, 4>;
 using Texel = hn::Vec<TexelTag>;
@@ -37,62 +27,59 @@ struct WrappedLanes {
 };
 
 HWY_INLINE WrappedLanes WrapLanes(RunVec u, Wrap wrap) {
-  const RunTag d;
-  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const auto zero = hn::Zero(kRun), one = hn::Set(kRun, 1.0f);
   // Beyond 2^23 a float has no fraction; clamped to that, the coordinate and its neighbours stay
   // integers.
-  const auto finite = hn::Lt(hn::Abs(u), hn::Set(d, 0x1p126f));
+  const auto finite = hn::Lt(hn::Abs(u), hn::Set(kRun, 0x1p126f));
   if (wrap == Wrap::kClamp) {
-    const auto kept = hn::Min(hn::Max(u, hn::Set(d, -1.0f)), hn::Set(d, 2.0f));
+    const auto kept = hn::Min(hn::Max(u, hn::Set(kRun, -1.0f)), hn::Set(kRun, 2.0f));
     return {hn::IfThenElseZero(finite, kept),
             hn::IfThenElseZero(hn::And(finite, hn::Eq(kept, u)), one)};
   }
   if (wrap != Wrap::kMirror) {
     return {hn::IfThenElseZero(finite, hn::Sub(u, hn::Floor(u))), hn::IfThenElseZero(finite, one)};
   }
-  const auto half = hn::Floor(hn::Mul(u, hn::Set(d, 0.5f)));
+  const auto half = hn::Floor(hn::Mul(u, hn::Set(kRun, 0.5f)));
   const auto two = hn::IfThenElse(finite, hn::Sub(u, hn::Add(half, half)), zero);
   const auto back = hn::Gt(two, one);
-  return {hn::IfThenElse(back, hn::Sub(hn::Set(d, 2.0f), two), two),
-          hn::IfThenElseZero(finite, hn::IfThenElse(back, hn::Set(d, -1.0f), one))};
+  return {hn::IfThenElse(back, hn::Sub(hn::Set(kRun, 2.0f), two), two),
+          hn::IfThenElseZero(finite, hn::IfThenElse(back, hn::Set(kRun, -1.0f), one))};
 }
 
 HWY_INLINE RunInt ClampIndex(RunInt i, RunInt most) {
-  return hn::Min(hn::Max(i, hn::Zero(RunIntTag())), most);
+  return hn::Min(hn::Max(i, hn::Zero(kRunInt)), most);
 }
 
 // `most`: the last index.
 HWY_INLINE RunInt WrapLaneIndex(RunInt i, RunInt most, Wrap wrap) {
   if (wrap != Wrap::kRepeat) return ClampIndex(i, most);
-  const auto zero = hn::Zero(RunIntTag());
+  const auto zero = hn::Zero(kRunInt);
   return hn::IfThenElse(hn::Lt(i, zero), most, hn::IfThenElse(hn::Gt(i, most), zero, i));
 }
 
 // `u`: wrapped with mode `way`; `n`: texels of the axis, at the level of each pixel.
 HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const TextureInput& input,
                         std::size_t i, AxisRun* out) {
-  const RunTag d;
-  const RunIntTag di;
   const bool nearest = input.filter == Filter::kNearest;
-  const auto most = hn::Sub(n, hn::Set(di, 1));
-  const auto scale = hn::ConvertTo(d, n);
+  const auto most = hn::Sub(n, hn::Set(kRunInt, 1));
+  const auto scale = hn::ConvertTo(kRun, n);
   auto x = hn::Mul(u.at, scale);
-  if (!nearest) x = hn::Sub(x, hn::Set(d, 0.5f));
+  if (!nearest) x = hn::Sub(x, hn::Set(kRun, 0.5f));
   const auto cell = hn::Floor(x);
-  const auto low = hn::ConvertTo(di, cell);
+  const auto low = hn::ConvertTo(kRunInt, cell);
   if (nearest) {
     const auto index = ClampIndex(low, most);
-    hn::Store(index, di, out->low + i);
-    hn::Store(index, di, out->high + i);
-    hn::Store(hn::Zero(d), d, out->weight + i);
-    hn::Store(hn::Zero(d), d, out->slope + i);
+    hn::Store(index, kRunInt, out->low + i);
+    hn::Store(index, kRunInt, out->high + i);
+    hn::Store(hn::Zero(kRun), kRun, out->weight + i);
+    hn::Store(hn::Zero(kRun), kRun, out->slope + i);
     return;
   }
-  hn::Store(WrapLaneIndex(low, most, way), di, out->low + i);
-  const auto high = hn::Add(low, hn::Set(di, 1));
-  hn::Store(WrapLaneIndex(high, most, way), di, out->high + i);
-  hn::Store(hn::Sub(x, cell), d, out->weight + i);
-  hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
+  hn::Store(WrapLaneIndex(low, most, way), kRunInt, out->low + i);
+  const auto high = hn::Add(low, hn::Set(kRunInt, 1));
+  hn::Store(WrapLaneIndex(high, most, way), kRunInt, out->high + i);
+  hn::Store(hn::Sub(x, cell), kRun, out->weight + i);
+  hn::Store(hn::Mul(u.slope, scale), kRun, out->slope + i);
 }
 
 // The footprint of a run at one level per pixel.
@@ -103,21 +90,19 @@ struct FootprintRun {
 // Texels along an axis that has `n` at the finest level, at the levels of a vector of pixels:
 // halved and rounded down, at least 1.
 HWY_INLINE RunInt SizeAt(int n, RunInt level) {
-  const RunIntTag di;
-  return hn::Max(hn::Shr(hn::Set(di, n), level), hn::Set(di, 1));
+  return hn::Max(hn::Shr(hn::Set(kRunInt, n), level), hn::Set(kRunInt, 1));
 }
 
 // `levels`: of the pixels of the run.
 HWY_INLINE void SetFootprints(std::size_t count, const TextureInput& input,
                               const std::int32_t* levels, FootprintRun* out) {
-  const RunTag d;
   const Wrap across = WrapAlongU(input.wrap), down = WrapAlongV(input.wrap);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto level = hn::Load(RunIntTag(), levels + i);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
+    const auto level = hn::Load(kRunInt, levels + i);
     const WrappedLanes u = WrapLanes(LoadRun(input.uv[0], i), across);
     SetAxis(u, SizeAt(input.levels[0].width, level), across, input, i, &out->column);
     WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), down);
-    v = {hn::Sub(hn::Set(d, 1.0f), v.at), hn::Neg(v.slope)};
+    v = {hn::Sub(hn::Set(kRun, 1.0f), v.at), hn::Neg(v.slope)};
     SetAxis(v, SizeAt(input.levels[0].height, level), down, input, i, &out->row);
   }
 }
@@ -154,18 +139,16 @@ struct alignas(128) MixRun {
 };
 
 HWY_INLINE void MixLevelsRun(std::size_t count, const TextureInput& input, MixRun* out) {
-  const RunTag d;
-  const RunIntTag di;
   const bool trilinear = input.filter == Filter::kTrilinear;
-  const auto last = hn::Set(di, static_cast<std::int32_t>(input.levels.size()) - 1);
-  const auto most = hn::ConvertTo(d, last);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto level = trilinear ? LoadRun(*input.level, i) : hn::Zero(d);
-    const auto kept = hn::IfThenElseZero(hn::Gt(level, hn::Zero(d)), hn::Min(level, most));
-    const auto fine = hn::ConvertTo(di, hn::Floor(kept));
-    hn::Store(fine, di, out->fine + i);
-    hn::Store(hn::Min(hn::Add(fine, hn::Set(di, 1)), last), di, out->coarse + i);
-    hn::Store(hn::Sub(kept, hn::Floor(kept)), d, out->share + i);
+  const auto last = hn::Set(kRunInt, static_cast<std::int32_t>(input.levels.size()) - 1);
+  const auto most = hn::ConvertTo(kRun, last);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
+    const auto level = trilinear ? LoadRun(*input.level, i) : hn::Zero(kRun);
+    const auto kept = hn::IfThenElseZero(hn::Gt(level, hn::Zero(kRun)), hn::Min(level, most));
+    const auto fine = hn::ConvertTo(kRunInt, hn::Floor(kept));
+    hn::Store(fine, kRunInt, out->fine + i);
+    hn::Store(hn::Min(hn::Add(fine, hn::Set(kRunInt, 1)), last), kRunInt, out->coarse + i);
+    hn::Store(hn::Sub(kept, hn::Floor(kept)), kRun, out->share + i);
   }
 }
 
@@ -178,16 +161,15 @@ HWY_INLINE Texel SampleAt(const TextureInput& input, const FootprintRun& at, std
 
 // [pixel][4] to planes.
 HWY_INLINE void StorePlanes(const float* quads, std::size_t count, RunPlane* color) {
-  const RunTag d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
     RunVec r, g, b, rest;
-    hn::LoadInterleaved4(d, quads + 4 * i, r, g, b, rest);
+    hn::LoadInterleaved4(kRun, quads + 4 * i, r, g, b, rest);
     StoreRun3({r, g, b}, color, i);
   }
 }
 
 HWY_INLINE std::size_t WholeVectors(std::size_t count) {
-  const std::size_t lanes = hn::Lanes(RunTag());
+  const std::size_t lanes = hn::Lanes(kRun);
   return (count + lanes - 1) / lanes * lanes;
 }
 
@@ -284,7 +266,6 @@ HWY_INLINE void PullRun(std::size_t count, const TextureInput& input, const RunP
 
 HWY_INLINE void PullMixed(std::size_t count, const TextureInput& input, const RunPlane* d_color,
                           const PullTo& to) {
-  const RunTag d;
   MixRun mix;
   MixLevelsRun(count, input, &mix);
   if (input.filter != Filter::kTrilinear) {
@@ -292,8 +273,8 @@ HWY_INLINE void PullMixed(std::size_t count, const TextureInput& input, const Ru
     return;
   }
   RunPlane rest;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    StoreRun(hn::Sub(hn::Set(d, 1.0f), hn::Load(d, mix.share + i)), &rest, i);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
+    StoreRun(hn::Sub(hn::Set(kRun, 1.0f), hn::Load(kRun, mix.share + i)), &rest, i);
   }
   PullRun(count, input, d_color, {mix.fine, rest.at, 2}, to);
   PullRun(count, input, d_color, {mix.coarse, mix.share, 2},
@@ -301,12 +282,11 @@ HWY_INLINE void PullMixed(std::size_t count, const TextureInput& input, const Ru
 }
 
 HWY_INLINE void SumWeightPull(std::size_t count, const WeightPull& pull, RunPlane* d_uv) {
-  const RunTag d;
   const float* const from[2] = {pull.a, pull.b};
   for (int k = 0; k < 2; ++k) {
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kRun)) {
       RunVec r, g, b, rest;
-      hn::LoadInterleaved4(d, from[k] + 4 * i, r, g, b, rest);
+      hn::LoadInterleaved4(kRun, from[k] + 4 * i, r, g, b, rest);
       StoreRun(hn::Add(r, hn::Add(g, b)), &d_uv[k], i);
     }
   }
@@ -316,18 +296,14 @@ void SampleRunAdjoint(std::size_t count, const TextureInput& input, const RunPla
                       RunPlane* d_uv, TexelShare* shares) {
   WeightPull pull;
   if (d_uv != nullptr) {
-    const RunTag d;
-    for (std::size_t i = 0; i < 4 * WholeVectors(count); i += hn::Lanes(d)) {
-      hn::Store(hn::Zero(d), d, pull.a + i);
-      hn::Store(hn::Zero(d), d, pull.b + i);
+    for (std::size_t i = 0; i < 4 * WholeVectors(count); i += hn::Lanes(kRun)) {
+      hn::Store(hn::Zero(kRun), kRun, pull.a + i);
+      hn::Store(hn::Zero(kRun), kRun, pull.b + i);
     }
   }
   PullMixed(count, input, d_color, {d_uv == nullptr ? nullptr : &pull, shares});
   if (d_uv != nullptr) SumWeightPull(count, pull, d_uv);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

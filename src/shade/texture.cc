@@ -4,18 +4,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shade/texture.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "shade/texture-inl.h"
 
 #if HWY_ONCE
 namespace tilegrad::shade {
-namespace {
-
 HWY_EXPORT(SampleRun);
 HWY_EXPORT(SampleRunAdjoint);
-
-}  // namespace
 
 void SampleTexture(std::size_t count, const TextureInput& input, RunPlane* color) {
   HWY_DYNAMIC_DISPATCH(SampleRun)(count, input, color);

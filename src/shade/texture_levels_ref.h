@@ -3,12 +3,7 @@
 // std::complex<double>.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstddef>
-#include <span>
-#include <vector>
 
 #include "base/scalar.h"
 #include "shade/texture_levels.h"

@@ -5,9 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
-#include <cstddef>
-#include <span>
 
 #include "base/scalar.h"
 #include "shade/texture.h"

@@ -206,6 +206,18 @@ TEST(Workers, RangesDependOnSizeAndGrainOnly) {
   }
 }
 
+TEST(Workers, TasksNeedNoWorker) {
+  const Workers workers(3);
+  EXPECT_EQ(workers.size(), 3u);
+  std::vector<int> calls(10);
+  workers.For(10, [&](std::size_t i) { ++calls[i]; });
+  workers.ForRanges(10, 3, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) ++calls[i];
+  });
+  workers.ForEach(10, 3, [&](std::size_t i) { ++calls[i]; });
+  EXPECT_EQ(calls, std::vector<int>(10, 3));
+}
+
 TEST(Rng, StreamsAreReproducible) {
   Rng a(7, 3), b(7, 3), other(7, 4);
   for (int i = 0; i < 10; ++i) a.Next();

@@ -164,27 +164,7 @@ void BindMaskOptions(py::module_& m) {
           "faces, edge_eps (NDC^2) added to squared lengths.");
 }
 
-}  // namespace
-
-void BindKaolin(py::module_& m) {
-  BindMaskOptions(m);
-  m.def("rasterize_projected", &RasterizeFaces,
-        "face_vertices_image (N, F, 3, 2), face_vertices_z (N, F, 3), face_features (N, F, 3, C),\n"
-        "valid_faces (N, F) uint8 or None, eps in NDC^2 -> the image (N, H, W, C), face_idx\n"
-        "(N, H, W) int32");
-  m.def("rasterize_projected_backward", &RasterizeFacesBackward,
-        "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and "
-        "face_features\n(N, F, 3, C); empty if not requested");
-  m.def("projected_soft_mask", &SoftMask,
-        "face_vertices_image (N, F, 3, 2), selected_face_idx (N, H, W) int32 -> the mask\n"
-        "(N, H, W), and how far it may be from equation 6");
-  m.def("projected_soft_mask_backward", &SoftMaskBackward,
-        "soft_mask and its gradient (N, H, W) -> the gradient of face_vertices_image (N, F, 3, 2)");
-}
-
 // What tilegrad.fragments needs of the engine.
-
-namespace {
 
 namespace pytorch3d = compat::pytorch3d;
 
@@ -252,6 +232,22 @@ void BindLayeredOptions(py::module_& m) {
 }
 
 }  // namespace
+
+void BindKaolin(py::module_& m) {
+  BindMaskOptions(m);
+  m.def("rasterize_projected", &RasterizeFaces,
+        "face_vertices_image (N, F, 3, 2), face_vertices_z (N, F, 3), face_features (N, F, 3, C),\n"
+        "valid_faces (N, F) uint8 or None, eps in NDC^2 -> the image (N, H, W, C), face_idx\n"
+        "(N, H, W) int32");
+  m.def("rasterize_projected_backward", &RasterizeFacesBackward,
+        "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and "
+        "face_features\n(N, F, 3, C); empty if not requested");
+  m.def("projected_soft_mask", &SoftMask,
+        "face_vertices_image (N, F, 3, 2), selected_face_idx (N, H, W) int32 -> the mask\n"
+        "(N, H, W), and how far it may be from equation 6");
+  m.def("projected_soft_mask_backward", &SoftMaskBackward,
+        "soft_mask and its gradient (N, H, W) -> the gradient of face_vertices_image (N, F, 3, 2)");
+}
 
 void BindPytorch3d(py::module_& m) {
   BindLayeredOptions(m);

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of face_visibility.h; lanes are columns. No fused operations: the same bits on every
 // instruction set.
-#if defined(TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
-#undef TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
-#else
-#define TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 
 #include "compat/kaolin/face_visibility.h"
 #include "raster/conventions.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::kaolin {
-namespace HWY_NAMESPACE {
+namespace tilegrad::compat::kaolin::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Pixels [column, column_end) x [row, row_end) of the image, whose centres are in a face's box.
@@ -166,8 +156,5 @@ void DrawProjectedDouble(const ProjectedFacesT<double>& faces, const PixelCentre
   DrawProjectedFaces<double>(faces, pixels, eps, row_begin, row_end, scratch);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::kaolin
+}  // namespace tilegrad::compat::kaolin::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -4,7 +4,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compat/kaolin/face_visibility.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "compat/kaolin/face_visibility-inl.h"
 

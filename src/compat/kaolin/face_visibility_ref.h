@@ -2,10 +2,7 @@
 // Scalar reference of face_visibility.h: tests every face at every pixel.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <vector>
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/scalar.h"
 #include "compat/kaolin/face_visibility.h"
 #include "raster/conventions.h"
 #include "render/validate.h"
@@ -41,27 +42,7 @@ void InterpolateRows(const ProjectedFacesT<T>& faces, const PixelCentresT<T>& pi
   }
 }
 
-// The pixels of an image grouped by visible face, in pixel order.
-struct PixelsOfFaces {
-  std::vector<std::size_t> begin;  // [F + 1]
-  std::vector<std::uint32_t> pixels;
-
-  PixelsOfFaces(std::span<const std::int32_t> face_ids, std::size_t faces) : begin(faces + 1) {
-    for (const std::int32_t id : face_ids) {
-      if (id >= 0) ++begin[static_cast<std::size_t>(id) + 1];
-    }
-    for (std::size_t f = 0; f < faces; ++f) begin[f + 1] += begin[f];
-    pixels.resize(begin[faces]);
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < face_ids.size(); ++i) {
-      if (face_ids[i] < 0) continue;
-      pixels[next[static_cast<std::size_t>(face_ids[i])]++] = static_cast<std::uint32_t>(i);
-    }
-  }
-  std::span<const std::uint32_t> of(std::size_t face) const {
-    return std::span(pixels).subspan(begin[face], begin[face + 1] - begin[face]);
-  }
-};
+using PixelsOfFaces = EntriesOfFaces<std::uint32_t>;
 
 // The backward pass of one face of one image.
 template <class T>
@@ -166,7 +147,7 @@ Status RasterizeProjected(const ProjectedBatchT<T>& batch, const ProjectedRaster
   const PixelCentresT<T> centres(options.size.width, options.size.height);
   const T eps = static_cast<T>(options.eps);
   const std::size_t bands = (centres.height + kBandRows - 1) / kBandRows;
-  std::vector<FaceVisibilityScratchT<T>> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<FaceVisibilityScratchT<T>> scratch(workers.size());
   workers.For(batch.images * bands, [&](std::size_t task, std::size_t worker) {
     const std::size_t n = task / bands, row = task % bands * kBandRows;
     const std::size_t row_end = std::min(row + kBandRows, centres.height);
@@ -193,12 +174,11 @@ Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
   TILEGRAD_TRY(ValidateAdjoint(batch, options.size, channels, adjoint));
   const PixelCentresT<T> centres(options.size.width, options.size.height);
   const std::size_t pixels = PixelCount(options.size);
-  std::vector<PixelsOfFaces> lists(batch.images, PixelsOfFaces({}, 0));
-  workers.For(batch.images, [&](std::size_t n, std::size_t) {
+  std::vector<PixelsOfFaces> lists(batch.images, PixelsOfFaces(adjoint.face_ids.first(0), 0));
+  workers.For(batch.images, [&](std::size_t n) {
     lists[n] = PixelsOfFaces(adjoint.face_ids.subspan(n * pixels, pixels), batch.faces);
   });
-  std::vector<std::vector<double>> sums(static_cast<std::size_t>(workers.count()),
-                                        std::vector<double>(3 * channels));
+  std::vector<std::vector<double>> sums(workers.size(), std::vector<double>(3 * channels));
   const auto backward = [&](std::size_t index, std::span<double> d_features) {
     const std::size_t n = index / batch.faces;
     const std::size_t from = 3 * index * channels;
@@ -221,15 +201,7 @@ Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
   return CheckFinite("d_face_features", std::span<const T>(adjoint.d_features));
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                  \
-  template Status RasterizeProjected(const ProjectedBatchT<T>&, const ProjectedRasterOptions&,   \
-                                     std::span<const T>, std::size_t, const Workers&,            \
-                                     std::span<std::int32_t>, std::span<T>);                     \
-  template Status RasterizeProjectedBackward(                                                    \
-      const ProjectedBatchT<T>&, const ProjectedRasterOptions&, std::span<const T>, std::size_t, \
-      const Workers&, const ProjectedRasterAdjoint<T>&)
-TILEGRAD_INSTANTIATE(float);
-TILEGRAD_INSTANTIATE(double);
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(RasterizeProjected);
+TILEGRAD_INSTANTIATE(RasterizeProjectedBackward);
 
 }  // namespace tilegrad::compat::kaolin

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/scalar.h"
 #include "compat/kaolin/projected_raster.h"
 #include "raster/soft_mask/soft_mask.h"
 #include "render/pipeline/paper_bin.h"
@@ -76,8 +77,7 @@ std::vector<SoftImage> BuildSoftImages(const ProjectedBatchT<float>& batch,
                                        const ProjectedMaskOptions& options,
                                        const Workers& workers) {
   std::vector<SoftImage> images(batch.images);
-  workers.For(batch.images,
-              [&](std::size_t n, std::size_t) { images[n].Build(batch.image(n), options); });
+  workers.For(batch.images, [&](std::size_t n) { images[n].Build(batch.image(n), options); });
   return images;
 }
 
@@ -87,7 +87,7 @@ double VectorMask(const ProjectedBatchT<float>& batch, const ProjectedMaskOption
   const std::vector<SoftImage> images = BuildSoftImages(batch, options, workers);
   const Bins bins{options.size, batch.images};
   const std::size_t pixels = PixelCount(options.size);
-  std::vector<raster::SoftMaskScratch> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<raster::SoftMaskScratch> scratch(workers.size());
   std::vector<double> spent(bins.tasks());
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t worker) {
     const std::size_t n = bins.image(task);
@@ -117,7 +117,7 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
   const std::vector<SoftImage> images = BuildSoftImages(batch, options, workers);
   const Bins bins{options.size, batch.images};
   const std::size_t pixels = PixelCount(options.size);
-  std::vector<raster::SoftMaskScratch> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<raster::SoftMaskScratch> scratch(workers.size());
   std::vector<AlignedVector<raster::SoftFaceGradient>> gradients(bins.tasks());
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t worker) {
     const std::size_t first = bins.image(task) * pixels;
@@ -127,7 +127,7 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
         {adjoint.alpha.subspan(first, pixels), {}, adjoint.d_alpha.subspan(first, pixels)},
         &gradients[task], &scratch[worker]);
   });
-  workers.For(batch.images, [&](std::size_t n, std::size_t) {
+  workers.For(batch.images, [&](std::size_t n) {
     for (std::size_t bin = 0; bin < bins.grid.cells(); ++bin) {
       AddFaceGradients(gradients[n * bins.grid.cells() + bin], options.size,
                        adjoint.d_xy.data() + 6 * n * batch.faces);
@@ -170,8 +170,7 @@ using FacesOfImages = std::vector<std::vector<raster::NdcFace<T>>>;
 template <class T>
 FacesOfImages<T> NdcFacesOf(const ProjectedBatchT<T>& batch, const Workers& workers) {
   FacesOfImages<T> out(batch.images);
-  workers.For(batch.images,
-              [&](std::size_t n, std::size_t) { out[n] = NdcFacesOf(batch.image(n)); });
+  workers.For(batch.images, [&](std::size_t n) { out[n] = NdcFacesOf(batch.image(n)); });
   return out;
 }
 
@@ -182,7 +181,7 @@ double ScalarMask(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions& o
   const raster::PaperSoftMask rule = ScalarRule(options, batch.faces);
   const Bins bins{options.size, batch.images};
   const FacesOfImages<T> faces = NdcFacesOf(batch, workers);
-  workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
+  workers.For(bins.tasks(), [&](std::size_t task) {
     PaperForward<T>(faces[bins.image(task)], rule, bins.region(task, face_ids),
                     alpha.data() + bins.first(task));
   });
@@ -209,12 +208,12 @@ void ScalarMaskBackward(const ProjectedBatchT<T>& batch, const ProjectedMaskOpti
   const Bins bins{options.size, batch.images};
   const FacesOfImages<T> faces = NdcFacesOf(batch, workers);
   std::vector<std::vector<NearFacesT<T>>> gradients(bins.tasks());  // of tiles
-  workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
+  workers.For(bins.tasks(), [&](std::size_t task) {
     gradients[task] =
         PaperBackward<T>(faces[bins.image(task)], rule, bins.region(task, adjoint.face_ids),
                          adjoint.d_alpha.data() + bins.first(task));
   });
-  workers.For(batch.images, [&](std::size_t n, std::size_t) {
+  workers.For(batch.images, [&](std::size_t n) {
     for (std::size_t bin = 0; bin < bins.grid.cells(); ++bin) {
       for (const NearFacesT<T>& tile : gradients[n * bins.grid.cells() + bin]) {
         AddTile(tile, adjoint.d_xy.data() + 6 * n * batch.faces);
@@ -280,15 +279,7 @@ Status ProjectedSoftMaskBackward(const ProjectedBatchT<T>& batch,
   return CheckFinite("d_face_vertices_image", std::span<const T>(adjoint.d_xy));
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                              \
-  template Result<double> ProjectedSoftMask(                                                 \
-      const ProjectedBatchT<T>&, const ProjectedMaskOptions&, std::span<const std::int32_t>, \
-      const Workers&, std::span<T>);                                                         \
-  template Status ProjectedSoftMaskBackward(const ProjectedBatchT<T>&,                       \
-                                            const ProjectedMaskOptions&, const Workers&,     \
-                                            const ProjectedMaskAdjoint<T>&)
-TILEGRAD_INSTANTIATE(float);
-TILEGRAD_INSTANTIATE(double);
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(ProjectedSoftMask);
+TILEGRAD_INSTANTIATE(ProjectedSoftMaskBackward);
 
 }  // namespace tilegrad::compat::kaolin

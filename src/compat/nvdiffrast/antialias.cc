@@ -309,8 +309,7 @@ Result<BlendLists> FindBlends(const AntialiasInput<T>& input, const Workers& wor
   BlendLists out(grid.bands());
   if (grid.pixels() == 0) return out;
   std::vector<std::size_t> bad(grid.bands());
-  std::vector<BlendFinder<T>> finders(static_cast<std::size_t>(workers.count()),
-                                      BlendFinder<T>(input));
+  std::vector<BlendFinder<T>> finders(workers.size(), BlendFinder<T>(input));
   workers.For(grid.bands(), [&](std::size_t index, std::size_t worker) {
     copy.OfBand(input, grid.band(index));
     bad[index] = finders[worker].Find(grid.band(index), &out[index]);
@@ -373,13 +372,35 @@ void PullColor(const AntialiasInput<T>& input, const Blend& blend, const T* d_ou
   }
 }
 
+// Vertices of an edge, the lower one first, and one of its sides. Sorting brings those of one edge
+// together.
+struct Side {
+  std::uint64_t edge;
+  std::int32_t side;
+  bool operator<(const Side& other) const {
+    return edge != other.edge ? edge < other.edge : side < other.side;
+  }
+};
+
+std::vector<Side> SortedSides(FaceList faces) {
+  std::vector<Side> sides(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    const auto [a, b] = std::minmax(faces[i], faces[next]);
+    sides[i] = {static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint64_t>(b),
+                static_cast<std::int32_t>(i)};
+  }
+  std::sort(sides.begin(), sides.end());
+  return sides;
+}
+
 }  // namespace
 
 template <class T>
 Status Antialias(const AntialiasInput<T>& input, const Workers& workers, std::span<T> out) {
   TILEGRAD_TRY(CheckInput(input));
   TILEGRAD_ASSIGN(const BlendLists blends, FindBlends(input, workers, {input.color, out}));
-  workers.For(input.grid.images, [&](std::size_t image, std::size_t) {
+  workers.For(input.grid.images, [&](std::size_t image) {
     ForBlendsOf(blends, input.grid, image, [&](const Blend& blend) {
       for (std::size_t c = 0; c < input.channels; ++c) {
         const T to = input.color[blend.to * input.channels + c];
@@ -412,39 +433,8 @@ Status AntialiasBackward(const AntialiasInput<T>& input, std::span<const T> d_ou
   return {};
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                   \
-  template Status Antialias(const AntialiasInput<T>&, const Workers&, std::span<T>);              \
-  template Status AntialiasBackward(const AntialiasInput<T>&, std::span<const T>, const Workers&, \
-                                    const AntialiasGradients<T>&);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
-
-namespace {
-
-// Vertices of an edge, the lower one first, and one of its sides. Sorting brings those of one edge
-// together.
-struct Side {
-  std::uint64_t edge;
-  std::int32_t side;
-  bool operator<(const Side& other) const {
-    return edge != other.edge ? edge < other.edge : side < other.side;
-  }
-};
-
-std::vector<Side> SortedSides(FaceList faces) {
-  std::vector<Side> sides(faces.size());
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
-    const auto [a, b] = std::minmax(faces[i], faces[next]);
-    sides[i] = {static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint64_t>(b),
-                static_cast<std::int32_t>(i)};
-  }
-  std::sort(sides.begin(), sides.end());
-  return sides;
-}
-
-}  // namespace
+TILEGRAD_INSTANTIATE(Antialias);
+TILEGRAD_INSTANTIATE(AntialiasBackward);
 
 EdgeRings BuildEdgeRings(FaceList faces) {
   const std::vector<Side> sides = SortedSides(faces);

@@ -4,20 +4,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compat/nvdiffrast/barycentrics.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "compat/nvdiffrast/barycentrics-inl.h"
-#include "compat/nvdiffrast/barycentrics_backward-inl.h"
 
 #if HWY_ONCE
 
 namespace tilegrad::compat::nvdiffrast {
-namespace {
-
 HWY_EXPORT(WriteRow);
 HWY_EXPORT(PullBand);
-
-}  // namespace
 
 PixelCentres::PixelCentres(const PixelGrid& grid)
     : x(grid.row() + kPadding), y(static_cast<std::size_t>(grid.height)) {

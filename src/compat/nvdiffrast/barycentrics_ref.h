@@ -12,7 +12,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/scalar.h"
 #include "compat/nvdiffrast/clip_mesh.h"

@@ -2,6 +2,7 @@
 #include "compat/nvdiffrast/clip_mesh.h"
 
 #include "base/error.h"
+#include "base/scalar.h"
 
 namespace tilegrad::compat::nvdiffrast {
 
@@ -35,15 +36,11 @@ Status CheckNoPixel(std::span<const std::size_t> bad, std::span<const T> rast, s
   }
   return {};
 }
-template Status CheckNoPixel(std::span<const std::size_t>, std::span<const float>, std::size_t);
-template Status CheckNoPixel(std::span<const std::size_t>, std::span<const double>, std::size_t);
+TILEGRAD_INSTANTIATE(CheckNoPixel);
 
 BandSums::BandSums(std::size_t rows, std::size_t channels, std::size_t bands,
                    const Workers& workers)
-    : rows_(rows),
-      channels_(channels),
-      bands_(bands),
-      slots_(static_cast<std::size_t>(workers.count())) {}
+    : rows_(rows), channels_(channels), bands_(bands), slots_(workers.size()) {}
 
 BandSums::Adder::Adder(BandSums* sums, std::size_t band, std::size_t worker)
     : rows_(sums->bands_[band].rows), sums_(sums->bands_[band].sums), channels_(sums->channels_) {
@@ -98,10 +95,9 @@ template <class T>
 void BandSums::AddTo(std::span<T> out, const Workers& workers, std::size_t first) const {
   // The division of rows among workers does not matter: each row has its own sum.
   const std::size_t rows = out.size() / channels_;
-  const auto count = static_cast<std::size_t>(workers.count());
-  workers.ForRanges(
-      rows, (rows + count - 1) / count,
-      [&](std::size_t begin, std::size_t end, std::size_t) { AddRows(out, begin, end, first); });
+  const auto count = workers.size();
+  workers.ForRanges(rows, (rows + count - 1) / count,
+                    [&](std::size_t begin, std::size_t end) { AddRows(out, begin, end, first); });
 }
 
 template void BandSums::AddTo(std::span<float>, const Workers&, std::size_t) const;

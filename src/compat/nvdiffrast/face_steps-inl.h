@@ -1,26 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of face_steps.h. Lanes are pixels.
-#if defined(TILEGRAD_COMPAT_NVDIFFRAST_FACE_STEPS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_COMPAT_NVDIFFRAST_FACE_STEPS_INL_H_
-#undef TILEGRAD_COMPAT_NVDIFFRAST_FACE_STEPS_INL_H_
-#else
-#define TILEGRAD_COMPAT_NVDIFFRAST_FACE_STEPS_INL_H_
-#endif
 
 #include <hwy/highway.h>
-
-#include <cstddef>
-#include <cstdint>
-#include <span>
 
 #include "compat/nvdiffrast/face_steps.h"
 #include "compat/nvdiffrast/face_steps_ref.h"
 #include "compat/nvdiffrast/quads-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 
 using IdTag = HWY_CAPPED(float, 16);
 using IdIntTag = hn::RebindToSigned<IdTag>;
@@ -69,8 +57,5 @@ void FindRowSteps(const FaceRow& row, const FaceRow& above, std::size_t width,
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -4,19 +4,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compat/nvdiffrast/face_steps.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "compat/nvdiffrast/face_steps-inl.h"
 
 #if HWY_ONCE
 
 namespace tilegrad::compat::nvdiffrast {
-namespace {
-
 HWY_EXPORT(ReadRow);
 HWY_EXPORT(FindRowSteps);
-
-}  // namespace
 
 std::size_t ReadFaceRow(std::span<const float> rast, std::size_t faces, FaceRow* out) {
   return HWY_DYNAMIC_DISPATCH(ReadRow)(rast, faces, out);

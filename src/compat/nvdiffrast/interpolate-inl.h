@@ -2,27 +2,16 @@
 // Vector body of interpolate.h. Lanes are the channels of a pixel (quads-inl.h). Only sums depend
 // on how many adjacent pixels show the same face: faces are small, and a branch at the end of each
 // would be mispredicted every time.
-#if defined(TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_
-#undef TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_
-#else
-#define TILEGRAD_COMPAT_NVDIFFRAST_INTERPOLATE_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 
-#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/interpolate.h"
 #include "compat/nvdiffrast/quads-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 
 // Inputs of a band's pixels: their faces, weights and corner attributes; lanes are channels
 // (quads-inl.h).
@@ -41,9 +30,9 @@ struct EdgeQuads {
       : u(hn::Sub(q.a, q.c)), v(hn::Sub(q.b, q.c)) {}
   // For numbers 0 to 3 and 4 to 7 of (dA/dX, dA/dY) of the four attributes.
   HWY_INLINE EdgeQuads Twice(std::size_t half) const {
-    const QuadTag d;
-    return half == 0 ? EdgeQuads(hn::InterleaveLower(d, u, u), hn::InterleaveLower(d, v, v))
-                     : EdgeQuads(hn::InterleaveUpper(d, u, u), hn::InterleaveUpper(d, v, v));
+    return half == 0
+               ? EdgeQuads(hn::InterleaveLower(kQuad, u, u), hn::InterleaveLower(kQuad, v, v))
+               : EdgeQuads(hn::InterleaveUpper(kQuad, u, u), hn::InterleaveUpper(kQuad, v, v));
   }
 };
 
@@ -70,8 +59,7 @@ struct AttributeRows {
     if (HWY_UNLIKELY(HWY_MAX(HWY_MAX(v[0], v[1]), v[2]) >= whole)) {
       return {LoadQuad(a, end), LoadQuad(b, end), LoadQuad(last, end)};
     }
-    const QuadTag d;
-    return {hn::LoadU(d, a), hn::LoadU(d, b), hn::LoadU(d, last)};
+    return {hn::LoadU(kQuad, a), hn::LoadU(kQuad, b), hn::LoadU(kQuad, last)};
   }
 };
 
@@ -147,10 +135,9 @@ struct WeightQuads {
   Quad u, v, w;
 
   HWY_INLINE explicit WeightQuads(const float* rast) {
-    const QuadTag d;
-    u = hn::Set(d, rast[0]);
-    v = hn::Set(d, rast[1]);
-    w = hn::Sub(hn::Sub(hn::Set(d, 1.0f), u), v);
+    u = hn::Set(kQuad, rast[0]);
+    v = hn::Set(kQuad, rast[1]);
+    w = hn::Sub(hn::Sub(hn::Set(kQuad, 1.0f), u), v);
   }
 };
 
@@ -159,10 +146,9 @@ struct SlopeQuads {
   Quad u, v;
 
   HWY_INLINE explicit SlopeQuads(const float* rast_db) {
-    const QuadTag d;
-    const Quad db = hn::LoadU(d, rast_db);
-    u = hn::ConcatLowerLower(d, db, db);
-    v = hn::ConcatUpperUpper(d, db, db);
+    const Quad db = hn::LoadU(kQuad, rast_db);
+    u = hn::ConcatLowerLower(kQuad, db, db);
+    v = hn::ConcatUpperUpper(kQuad, db, db);
   }
 };
 
@@ -259,9 +245,9 @@ class RunSums {
   }
   HWY_INLINE Quad Sum(std::size_t i) const {
     if constexpr (K::kKnown) return kept_[i];
-    return hn::Load(QuadTag(), memory_ + 4 * i);
+    return hn::Load(kQuad, memory_ + 4 * i);
   }
-  HWY_INLINE void Put(Quad v, std::size_t i) { hn::Store(v, QuadTag(), memory_ + 4 * i); }
+  HWY_INLINE void Put(Quad v, std::size_t i) { hn::Store(v, kQuad, memory_ + 4 * i); }
   HWY_INLINE void Add(std::size_t i, Quad weight, Quad g) {
     if constexpr (K::kKnown) {
       kept_[i] = hn::MulAdd(weight, g, kept_[i]);
@@ -270,9 +256,9 @@ class RunSums {
     }
   }
   HWY_INLINE void Clear() {
-    for (Quad& q : kept_) q = hn::Zero(QuadTag());
+    for (Quad& q : kept_) q = hn::Zero(kQuad);
     for (std::size_t i = 0; i < 3 * values_ + 2 * slopes_ && !K::kKnown; ++i) {
-      Put(hn::Zero(QuadTag()), i);
+      Put(hn::Zero(kQuad), i);
     }
   }
 
@@ -286,10 +272,9 @@ class RunSums {
 
 // (sum of u, sum of v, 0, 0)
 HWY_INLINE Quad SumsOfTwo(Quad u, Quad v) {
-  const QuadTag d;
-  const Quad pairs = hn::Add(hn::InterleaveLower(d, u, v), hn::InterleaveUpper(d, u, v));
-  const Quad sums = hn::Add(pairs, hn::ConcatUpperUpper(d, pairs, pairs));
-  return hn::ConcatLowerLower(d, hn::Zero(d), sums);
+  const Quad pairs = hn::Add(hn::InterleaveLower(kQuad, u, v), hn::InterleaveUpper(kQuad, u, v));
+  const Quad sums = hn::Add(pairs, hn::ConcatUpperUpper(kQuad, pairs, pairs));
+  return hn::ConcatLowerLower(kQuad, hn::Zero(kQuad), sums);
 }
 
 // sum += g times e in the lanes of `counts`.
@@ -316,8 +301,7 @@ HWY_INLINE void PullPixels(const BandAtHand& band, std::size_t begin, std::size_
   FaceNumbers numbers = *at;  // copies stay in registers
   RunSums<K> sums = *run;
   const PixelCotangents d = cotangents;
-  const QuadTag tag;
-  const Quad zero = hn::Zero(tag);
+  const Quad zero = hn::Zero(kQuad);
   const std::size_t n = band.values.n, da = band.slopes;
   for (std::size_t p = begin; p < end; ++p) {
     const std::int32_t face = numbers.At(p);
@@ -343,11 +327,11 @@ HWY_INLINE void PullPixels(const BandAtHand& band, std::size_t begin, std::size_
       AddProducts(LanesBelow(i, da), g, SlopeEdges<K>(band.sloped, v, i, q), &slope_pull);
       sums.AddSlopes(i, SlopeQuads(band.rast_db + 4 * p), g);
     }
-    if (d.rast != nullptr) hn::StoreU(SumsOfTwo(pull.u, pull.v), tag, d.rast + 4 * p);
+    if (d.rast != nullptr) hn::StoreU(SumsOfTwo(pull.u, pull.v), kQuad, d.rast + 4 * p);
     if (d.rast_db == nullptr) continue;
-    hn::StoreU(hn::Add(hn::ConcatLowerLower(tag, slope_pull.v, slope_pull.u),
-                       hn::ConcatUpperUpper(tag, slope_pull.v, slope_pull.u)),
-               tag, d.rast_db + 4 * p);
+    hn::StoreU(hn::Add(hn::ConcatLowerLower(kQuad, slope_pull.v, slope_pull.u),
+                       hn::ConcatUpperUpper(kQuad, slope_pull.v, slope_pull.u)),
+               kQuad, d.rast_db + 4 * p);
   }
   *at = numbers;
   *run = sums;
@@ -397,8 +381,5 @@ std::size_t InterpolateBandBackward(const InterpolateTask& task,
   return numbers.bad();
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

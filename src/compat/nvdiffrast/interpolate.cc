@@ -4,8 +4,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compat/nvdiffrast/interpolate.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
+#include "base/scalar.h"
 #include "compat/nvdiffrast/interpolate-inl.h"
 
 #if HWY_ONCE
@@ -102,9 +102,9 @@ Status RunBackward(InterpolateInput<float> input, const InterpolateCotangents<fl
   const bool wanted = !out.d_attributes.empty();
   const std::size_t bands = wanted ? input.grid.bands() : 0, sums = InterpolateSums(input);
   // For the band that each worker is processing.
-  BandSums faces(input.faces.size() / 3, sums, static_cast<std::size_t>(workers.count()), workers);
+  BandSums faces(input.faces.size() / 3, sums, workers.size(), workers);
   BandSums vertices(input.attributes.rows(), input.attributes.channels, bands, workers);
-  std::vector<AlignedVector<float>> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<AlignedVector<float>> scratch(workers.size());
   TILEGRAD_TRY(ForBands(input, workers, [&](const InterpolateTask& task, std::size_t worker) {
     scratch[worker].resize(sums);
     const auto pull = [&](BandSums::Adder* adder) {
@@ -148,14 +148,8 @@ Status InterpolateBackward(const InterpolateInput<T>& input,
   return RunBackward(input, cotangents, workers, out);
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                    \
-  template Status Interpolate(const InterpolateInput<T>&, const Workers&,                          \
-                              const InterpolateOutput<T>&);                                        \
-  template Status InterpolateBackward(const InterpolateInput<T>&, const InterpolateCotangents<T>&, \
-                                      const Workers&, const InterpolateGradients<T>&);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(Interpolate);
+TILEGRAD_INSTANTIATE(InterpolateBackward);
 
 }  // namespace tilegrad::compat::nvdiffrast
 #endif

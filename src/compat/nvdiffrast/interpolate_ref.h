@@ -4,10 +4,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 
-#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/interpolate.h"
 
 namespace tilegrad::compat::nvdiffrast {
@@ -154,7 +151,7 @@ void InterpolatePixel(const InterpolateInput<T>& input, std::size_t image, std::
 template <class T>
 void InterpolateRef(const InterpolateInput<T>& input, const Workers& workers,
                     const InterpolateOutput<T>& out) {
-  workers.For(input.grid.bands(), [&](std::size_t index, std::size_t) {
+  workers.For(input.grid.bands(), [&](std::size_t index) {
     const Band band = input.grid.band(index);
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
       interpolate_ref::InterpolatePixel(input, band.image, pixel, out);

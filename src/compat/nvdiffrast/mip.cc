@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/error.h"
+#include "base/scalar.h"
 #include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::compat::nvdiffrast {
@@ -83,16 +84,13 @@ void HalveTexture(const TextureLevel<T>& fine, std::size_t channels, const Worke
   const auto two_rows = [&](std::size_t c, std::size_t a, std::size_t b) {
     to[c] = share * (from[a] + from[b]) + share * (from[a + below] + from[b + below]);
   };
-  workers.ForRanges(coarse.size() / halving.coarse_row, kRowGrain,
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t row = begin; row < end; ++row) {
-                        if (below == 0) {
-                          halving.ForRow(row, one_row);
-                        } else {
-                          halving.ForRow(row, two_rows);
-                        }
-                      }
-                    });
+  workers.ForEach(coarse.size() / halving.coarse_row, kRowGrain, [&](std::size_t row) {
+    if (below == 0) {
+      halving.ForRow(row, one_row);
+    } else {
+      halving.ForRow(row, two_rows);
+    }
+  });
 }
 
 template <class T>
@@ -111,18 +109,11 @@ void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
     to[a + below] += part;
     to[b + below] += part;
   };
-  workers.ForRanges(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t row = begin; row < end; ++row) halving.ForRow(row, pull);
-                    });
+  workers.ForEach(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
+                  [&](std::size_t row) { halving.ForRow(row, pull); });
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                  \
-  template void HalveTexture(const TextureLevel<T>&, std::size_t, const Workers&, std::span<T>); \
-  template void HalveTextureBackward(const TextureLevel<T>&, const MipSize&, std::size_t,        \
-                                     const Workers&, std::span<T>);
-TILEGRAD_INSTANTIATE(float)
-TILEGRAD_INSTANTIATE(double)
-#undef TILEGRAD_INSTANTIATE
+TILEGRAD_INSTANTIATE(HalveTexture);
+TILEGRAD_INSTANTIATE(HalveTextureBackward);
 
 }  // namespace tilegrad::compat::nvdiffrast

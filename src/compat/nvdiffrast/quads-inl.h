@@ -16,11 +16,11 @@
 #include <cstring>
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using QuadTag = hn::FixedTag<float, 4>;
+inline constexpr QuadTag kQuad;
 using Quad = hn::Vec<QuadTag>;
 using QuadMask = hn::Mask<QuadTag>;
 
@@ -31,23 +31,23 @@ inline constexpr int kMostRun = 64;
 inline HWY_NOINLINE Quad LoadShortQuad(const float* from, const float* end) {
   HWY_ALIGN float some[4] = {};
   std::memcpy(some, from, static_cast<std::size_t>(end - from) * sizeof(float));
-  return hn::Load(QuadTag(), some);
+  return hn::Load(kQuad, some);
 }
 inline HWY_NOINLINE void StoreShortQuad(Quad v, float* to, const float* end) {
   HWY_ALIGN float some[4];
-  hn::Store(v, QuadTag(), some);
+  hn::Store(v, kQuad, some);
   std::memcpy(to, some, static_cast<std::size_t>(end - to) * sizeof(float));
 }
 
 // Up to four numbers, those before `end`. kWhole: all four are.
 template <bool kWhole = false>
 HWY_INLINE Quad LoadQuad(const float* from, const float* end) {
-  if (kWhole || HWY_LIKELY(end - from >= 4)) return hn::LoadU(QuadTag(), from);
+  if (kWhole || HWY_LIKELY(end - from >= 4)) return hn::LoadU(kQuad, from);
   return LoadShortQuad(from, end);
 }
 template <bool kWhole = false>
 HWY_INLINE void StoreQuad(Quad v, float* to, const float* end) {
-  if (kWhole || HWY_LIKELY(end - to >= 4)) return hn::StoreU(v, QuadTag(), to);
+  if (kWhole || HWY_LIKELY(end - to >= 4)) return hn::StoreU(v, kQuad, to);
   StoreShortQuad(v, to, end);
 }
 
@@ -83,11 +83,10 @@ struct FaceIds {
 
 // The lanes from number `first` on that are below `count`.
 HWY_INLINE QuadMask LanesBelow(std::size_t first, std::size_t count) {
-  return hn::FirstN(QuadTag(), HWY_MIN(count - first, std::size_t{4}));
+  return hn::FirstN(kQuad, HWY_MIN(count - first, std::size_t{4}));
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

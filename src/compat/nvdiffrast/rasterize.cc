@@ -10,6 +10,7 @@
 #include "base/aligned.h"
 #include "base/error.h"
 #include "base/inline_vector.h"
+#include "base/scalar.h"
 #include "compat/nvdiffrast/barycentrics.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/rasterize_input.h"
@@ -373,48 +374,6 @@ void DrawBin(const Drawing<T>& drawing, const PreparedImage& image, std::size_t 
   WriteBin(drawing, {n, rect, mesh, scratch->seen});
 }
 
-}  // namespace
-
-struct Rasterizer::Scratch {
-  std::vector<PreparedImage> images;
-  std::vector<std::unique_ptr<BinScratch>> bins;  // of workers
-};
-
-Rasterizer::Rasterizer() : scratch_(std::make_unique<Scratch>()) {}
-Rasterizer::~Rasterizer() = default;
-
-template <class T>
-Status Rasterizer::Run(const RasterizeInput<T>& input, const Workers& workers,
-                       const RasterizeOutput<T>& out) {
-  TILEGRAD_TRY(CheckInput(input));
-  const std::size_t n = input.grid.images;
-  auto& images = scratch_->images;
-  auto& bins = scratch_->bins;
-  if (images.size() < n) images.resize(n);
-  while (bins.size() < static_cast<std::size_t>(workers.count())) {
-    bins.push_back(std::make_unique<BinScratch>());
-  }
-  if (n == 1) {
-    Prepare(input, 0, &workers, &images[0]);
-  } else {
-    workers.For(n, [&](std::size_t i, std::size_t) { Prepare(input, i, nullptr, &images[i]); });
-  }
-  const Drawing<T> drawing(input, out);
-  const std::size_t count = raster::BinGrid(input.grid.width, input.grid.height).cells();
-  workers.For(n * count, [&](std::size_t task, std::size_t worker) {
-    const std::size_t image = task / count;
-    DrawBin(drawing, images[image], image, task % count, bins[worker].get());
-  });
-  return {};
-}
-
-template Status Rasterizer::Run(const RasterizeInput<float>&, const Workers&,
-                                const RasterizeOutput<float>&);
-template Status Rasterizer::Run(const RasterizeInput<double>&, const Workers&,
-                                const RasterizeOutput<double>&);
-
-namespace {
-
 template <class T>
 Status CheckFinite(const VertexRows<T>& positions) {
   for (std::size_t i = 0; i < positions.values.size(); ++i) {
@@ -435,6 +394,44 @@ Status CheckRanges(std::span<const std::int32_t> ranges, std::size_t faces) {
 }
 
 }  // namespace
+
+struct Rasterizer::Scratch {
+  std::vector<PreparedImage> images;
+  std::vector<std::unique_ptr<BinScratch>> bins;  // of workers
+};
+
+Rasterizer::Rasterizer() : scratch_(std::make_unique<Scratch>()) {}
+Rasterizer::~Rasterizer() = default;
+
+template <class T>
+Status Rasterizer::Run(const RasterizeInput<T>& input, const Workers& workers,
+                       const RasterizeOutput<T>& out) {
+  TILEGRAD_TRY(CheckInput(input));
+  const std::size_t n = input.grid.images;
+  auto& images = scratch_->images;
+  auto& bins = scratch_->bins;
+  if (images.size() < n) images.resize(n);
+  while (bins.size() < workers.size()) {
+    bins.push_back(std::make_unique<BinScratch>());
+  }
+  if (n == 1) {
+    Prepare(input, 0, &workers, &images[0]);
+  } else {
+    workers.For(n, [&](std::size_t i) { Prepare(input, i, nullptr, &images[i]); });
+  }
+  const Drawing<T> drawing(input, out);
+  const std::size_t count = raster::BinGrid(input.grid.width, input.grid.height).cells();
+  workers.For(n * count, [&](std::size_t task, std::size_t worker) {
+    const std::size_t image = task / count;
+    DrawBin(drawing, images[image], image, task % count, bins[worker].get());
+  });
+  return {};
+}
+
+template Status Rasterizer::Run(const RasterizeInput<float>&, const Workers&,
+                                const RasterizeOutput<float>&);
+template Status Rasterizer::Run(const RasterizeInput<double>&, const Workers&,
+                                const RasterizeOutput<double>&);
 
 template <class T>
 Status CheckInput(const RasterizeInput<T>& input) {

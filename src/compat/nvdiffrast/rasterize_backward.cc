@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/scalar.h"
 #include "compat/nvdiffrast/barycentrics.h"
 #include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/rasterize_input.h"
@@ -104,9 +105,6 @@ Status RasterizeBackward(const RasterizeInput<T>& input, const RasterizeCotangen
   return {};
 }
 
-template Status RasterizeBackward(const RasterizeInput<float>&, const RasterizeCotangents<float>&,
-                                  const Workers&, std::span<float>);
-template Status RasterizeBackward(const RasterizeInput<double>&, const RasterizeCotangents<double>&,
-                                  const Workers&, std::span<double>);
+TILEGRAD_INSTANTIATE(RasterizeBackward);
 
 }  // namespace tilegrad::compat::nvdiffrast

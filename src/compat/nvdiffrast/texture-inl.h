@@ -11,9 +11,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 
 #include "base/prefetch.h"
 #include "compat/nvdiffrast/quads-inl.h"
@@ -21,9 +18,7 @@
 #include "compat/nvdiffrast/texture_taps-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMostLevels = 33;
 
@@ -51,7 +46,7 @@ struct ImageLevels {
   HWY_INLINE Quad Load(std::size_t level, std::int32_t texel, std::size_t c) const {
     const float* from = at[level] + static_cast<std::size_t>(texel) * channels + c;
     const auto left = static_cast<std::size_t>(end[level] - from);
-    return hn::LoadU(QuadTag(), left < kTail ? tails[level] + kTail - left : from);
+    return hn::LoadU(kQuad, left < kTail ? tails[level] + kTail - left : from);
   }
 };
 
@@ -63,17 +58,16 @@ struct TapQuads {
 // The same where some of the taps are no texels.
 inline HWY_NOINLINE TapQuads LoadSomeTaps(const ImageLevels& levels, std::size_t level,
                                           const std::int32_t* texels, std::size_t c) {
-  const QuadTag d;
   TapQuads out;
-  Quad sum = hn::Zero(d);
+  Quad sum = hn::Zero(kQuad);
   int mean = -1;
   for (int k = 0; k < 4; ++k) {
     const std::int32_t texel = texels[k];
     if (texel == Taps::kMean) mean = k;
-    out.t[k] = texel < 0 ? hn::Zero(d) : levels.Load(level, texel, c);
+    out.t[k] = texel < 0 ? hn::Zero(kQuad) : levels.Load(level, texel, c);
     sum = hn::Add(sum, out.t[k]);
   }
-  if (mean >= 0) out.t[mean] = hn::Mul(sum, hn::Set(d, 1.0f / 3));
+  if (mean >= 0) out.t[mean] = hn::Mul(sum, hn::Set(kQuad, 1.0f / 3));
   return out;
 }
 
@@ -87,7 +81,7 @@ HWY_INLINE TapQuads LoadTaps(const ImageLevels& levels, const TapRun& taps, std:
     const float* from = levels.at[level] + c;
     for (int k = 0; k < 4; ++k) {
       const auto texel = static_cast<std::size_t>(texels[k]);
-      out.t[k] = hn::LoadU(QuadTag(), from + texel * levels.channels);
+      out.t[k] = hn::LoadU(kQuad, from + texel * levels.channels);
     }
     return out;
   }
@@ -126,7 +120,7 @@ HWY_INLINE void ForRuns(const TextureInput<float>& input, const Band& band, cons
 }
 
 HWY_INLINE Quad Mixture(const TapQuads& q, const float (&weight)[4], Quad sum) {
-  for (int k = 0; k < 4; ++k) sum = hn::MulAdd(hn::Set(QuadTag(), weight[k]), q.t[k], sum);
+  for (int k = 0; k < 4; ++k) sum = hn::MulAdd(hn::Set(kQuad, weight[k]), q.t[k], sum);
   return sum;
 }
 
@@ -147,7 +141,7 @@ HWY_INLINE void SamplePixels(const ImageLevels& levels, const LookupRun& run, st
         StoreQuad(fine.t[0], to + c, end);
         continue;
       }
-      Quad sum = Mixture(fine, run.taps[0].weight[p], hn::Zero(QuadTag()));
+      Quad sum = Mixture(fine, run.taps[0].weight[p], hn::Zero(kQuad));
       if (kReads == Reads::kTwoLevels && run.taps[1].level[p] >= 0) {
         sum = Mixture(LoadTaps(levels, run.taps[1], p, c), run.taps[1].weight[p], sum);
       }
@@ -188,8 +182,7 @@ void SampleBand(const TextureInput<float>& input, const Band& band, std::span<fl
   });
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

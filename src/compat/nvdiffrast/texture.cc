@@ -4,7 +4,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compat/nvdiffrast/texture.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
 
 #include "compat/nvdiffrast/texture-inl.h"
 #include "compat/nvdiffrast/texture_backward-inl.h"
@@ -12,7 +11,6 @@
 #if HWY_ONCE
 
 #include <algorithm>
-#include <vector>
 
 #include "compat/nvdiffrast/texture_ref.h"
 
@@ -26,11 +24,10 @@ constexpr std::size_t kFillGrain = std::size_t{1} << 16;
 
 void Clear(std::span<const std::span<float>> d_levels, const Workers& workers) {
   for (const std::span<float> level : d_levels) {
-    workers.ForRanges(level.size(), kFillGrain,
-                      [&](std::size_t begin, std::size_t end, std::size_t) {
-                        std::fill(level.begin() + static_cast<std::ptrdiff_t>(begin),
-                                  level.begin() + static_cast<std::ptrdiff_t>(end), 0.0f);
-                      });
+    workers.ForRanges(level.size(), kFillGrain, [&](std::size_t begin, std::size_t end) {
+      std::fill(level.begin() + static_cast<std::ptrdiff_t>(begin),
+                level.begin() + static_cast<std::ptrdiff_t>(end), 0.0f);
+    });
   }
 }
 
@@ -39,8 +36,8 @@ void Clear(std::span<const std::span<float>> d_levels, const Workers& workers) {
 void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
                 const Workers& workers, const TextureGradients<float>& out) {
   Clear(out.d_levels, workers);
-  const auto parts = static_cast<std::size_t>(workers.count());
-  workers.For(parts, [&](std::size_t part, std::size_t) {
+  const auto parts = workers.size();
+  workers.For(parts, [&](std::size_t part) {
     std::vector<float*> at(out.d_levels.size());
     const TexelPart texels{static_cast<std::uint32_t>(part), static_cast<std::uint32_t>(parts),
                            at.data()};
@@ -61,7 +58,7 @@ void PullTexels(const TextureInput<float>& input, std::span<const float> d_out,
 
 template <>
 void SampleTexture(const TextureInput<float>& input, const Workers& workers, std::span<float> out) {
-  workers.For(input.grid.bands(), [&](std::size_t band, std::size_t) {
+  workers.For(input.grid.bands(), [&](std::size_t band) {
     HWY_DYNAMIC_DISPATCH(SampleBand)(input, input.grid.band(band), out);
   });
 }
@@ -84,7 +81,7 @@ void SampleTextureBackward(const TextureInput<float>& input, std::span<const flo
   }
   if (!wanted.d_levels.empty()) return PullTexels(input, d_out, workers, wanted);
   if (!wanted.HasCoordinates()) return;
-  workers.For(input.grid.bands(), [&](std::size_t band, std::size_t) {
+  workers.For(input.grid.bands(), [&](std::size_t band) {
     HWY_DYNAMIC_DISPATCH(PullBand)(input, input.grid.band(band), d_out, TexelPart(), wanted);
   });
 }

@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of texture.h, backward: from the texel addresses of a run of pixels the gradients of
 // texels, with channels as lanes (quads-inl.h), and of coordinates, with pixels as lanes.
-#if defined(TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_BACKWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_BACKWARD_INL_H_
-#undef TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_BACKWARD_INL_H_
-#else
-#define TILEGRAD_COMPAT_NVDIFFRAST_TEXTURE_BACKWARD_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
 
 #include "compat/nvdiffrast/quads-inl.h"
 #include "compat/nvdiffrast/texture-inl.h"
@@ -22,16 +13,14 @@
 #include "compat/nvdiffrast/texture_taps-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 
 // Whether a pixel's cotangent has a nonzero number. Mostly the background has none: it samples the
 // texel at (0, 0) and is masked afterwards.
 HWY_INLINE bool HasCotangent(const float* d_out, std::size_t n, const float* end) {
   for (std::size_t c = 0; c < n; c += 4) {
-    const auto some = hn::Ne(LoadQuad(d_out + c, end), hn::Zero(QuadTag()));
-    if (!hn::AllFalse(QuadTag(), hn::And(some, LanesBelow(c, n)))) return true;
+    const auto some = hn::Ne(LoadQuad(d_out + c, end), hn::Zero(kQuad));
+    if (!hn::AllFalse(kQuad, hn::And(some, LanesBelow(c, n)))) return true;
   }
   return false;
 }
@@ -53,7 +42,6 @@ class TexelSums {
   std::size_t channels() const { return channels_; }
   // Adds v to channels from `first` on; v is 0 beyond the last channel.
   HWY_INLINE void Add(std::size_t level, std::int32_t texel, std::size_t first, Quad v) const {
-    const QuadTag d;
     const std::uint32_t block = static_cast<std::uint32_t>(texel) / kBlock;
     if (texel < 0 || (part_.parts > 1 && block % part_.parts != part_.part)) return;
     float* to = part_.levels[level] + static_cast<std::size_t>(texel) * channels_ + first;
@@ -61,13 +49,12 @@ class TexelSums {
     if (HWY_UNLIKELY(HWY_MIN(of_block, ends_[level]) - to < 4)) {
       return AddSome(to, HWY_MIN(channels_ - first, std::size_t{4}), v);
     }
-    AddTo(d, v, to);
+    AddTo(kQuad, v, to);
   }
   // The same for two texels of up to four channels. Of neighbours both are read before one is
   // written, and nothing is written beyond them: a load that overlaps a recent store in part waits
   // until that is in the cache.
   HWY_INLINE void AddPair(std::size_t level, const std::int32_t* texels, const Quad* v) const {
-    const QuadTag d;
     const hn::Half<QuadTag> half;
     const std::int32_t texel = texels[0];
     const std::uint32_t block = static_cast<std::uint32_t>(texel) / kBlock;
@@ -81,20 +68,20 @@ class TexelSums {
     float* to = part_.levels[level] + static_cast<std::size_t>(texel) * channels_;
     switch (channels_) {
       case 1:
-        return AddTo(half, hn::LowerHalf(half, hn::InterleaveLower(d, v[0], v[1])), to);
+        return AddTo(half, hn::LowerHalf(half, hn::InterleaveLower(kQuad, v[0], v[1])), to);
       case 2:
-        return AddTo(d, hn::ConcatLowerLower(d, v[1], v[0]), to);
+        return AddTo(kQuad, hn::ConcatLowerLower(kQuad, v[1], v[0]), to);
       case 3: {
-        const Quad first = hn::IfThenElse(hn::FirstN(d, 3), v[0], hn::Broadcast<0>(v[1]));
-        const auto rest = hn::LowerHalf(half, hn::ShiftRightLanes<1>(d, v[1]));
-        const Quad sum = hn::Add(hn::LoadU(d, to), first);
+        const Quad first = hn::IfThenElse(hn::FirstN(kQuad, 3), v[0], hn::Broadcast<0>(v[1]));
+        const auto rest = hn::LowerHalf(half, hn::ShiftRightLanes<1>(kQuad, v[1]));
+        const Quad sum = hn::Add(hn::LoadU(kQuad, to), first);
         AddTo(half, rest, to + 4);
-        return hn::StoreU(Finite(d, sum), d, to);
+        return hn::StoreU(Finite(kQuad, sum), kQuad, to);
       }
       default:
-        const Quad sum = hn::Add(hn::LoadU(d, to), v[0]);
-        AddTo(d, v[1], to + 4);
-        return hn::StoreU(Finite(d, sum), d, to);
+        const Quad sum = hn::Add(hn::LoadU(kQuad, to), v[0]);
+        AddTo(kQuad, v[1], to + 4);
+        return hn::StoreU(Finite(kQuad, sum), kQuad, to);
     }
   }
 
@@ -111,10 +98,9 @@ class TexelSums {
     return hn::IfThenElse(hn::Lt(capped, hn::Neg(most)), hn::Neg(most), capped);
   }
   static HWY_NOINLINE void AddSome(float* to, std::size_t n, Quad v) {
-    const QuadTag d;
     HWY_ALIGN float some[4] = {};
     std::copy(to, to + n, some);
-    hn::Store(Finite(d, hn::Add(hn::Load(d, some), v)), d, some);
+    hn::Store(Finite(kQuad, hn::Add(hn::Load(kQuad, some), v)), kQuad, some);
     std::copy(some, some + n, to);
   }
 
@@ -127,12 +113,11 @@ class TexelSums {
 class CellSums {
  public:
   HWY_INLINE explicit CellSums(const TexelSums& to) : to_(to) {
-    for (Quad& s : sum_) s = hn::Zero(QuadTag());
+    for (Quad& s : sum_) s = hn::Zero(kQuad);
   }
 
   HWY_INLINE void Add(const TapRun& taps, std::size_t p, Quad g) {
     const hn::RebindToSigned<QuadTag> di;
-    const QuadTag d;
     const auto texel = hn::Load(di, taps.texel[p]);
     if (pixels_ == kMostRun || taps.level[p] != level_ ||
         !hn::AllTrue(di, hn::Eq(texel, hn::Load(di, texel_)))) {
@@ -141,21 +126,20 @@ class CellSums {
       level_ = taps.level[p];
     }
     ++pixels_;
-    for (int k = 0; k < 4; ++k) sum_[k] = hn::MulAdd(hn::Set(d, taps.weight[p][k]), g, sum_[k]);
+    for (int k = 0; k < 4; ++k) sum_[k] = hn::MulAdd(hn::Set(kQuad, taps.weight[p][k]), g, sum_[k]);
   }
   HWY_INLINE void Flush() {
-    const QuadTag d;
     if (level_ >= 0) {
       for (int mean = 0; mean < 4; ++mean) {
         if (HWY_LIKELY(texel_[mean] != Taps::kMean)) continue;
-        const Quad third = hn::Mul(sum_[mean], hn::Set(d, 1.0f / 3));
+        const Quad third = hn::Mul(sum_[mean], hn::Set(kQuad, 1.0f / 3));
         for (Quad& s : sum_) s = hn::Add(s, third);
       }
       for (int k = 0; k < 4; k += 2) {
         to_.AddPair(static_cast<std::size_t>(level_), texel_ + k, sum_ + k);
       }
     }
-    for (Quad& s : sum_) s = hn::Zero(d);
+    for (Quad& s : sum_) s = hn::Zero(kQuad);
     level_ = -1;
     pixels_ = 0;
   }
@@ -180,7 +164,7 @@ HWY_INLINE void AddManyChannels(const TapRun& taps, std::size_t p, const float* 
   float mean = 0;
   for (int k = 0; k < 4; ++k) mean += texel[k] == Taps::kMean ? taps.weight[p][k] / 3 : 0.0f;
   for (int k = 0; k < 4; ++k) {
-    const Quad weight = hn::Set(QuadTag(), taps.weight[p][k] + mean);
+    const Quad weight = hn::Set(kQuad, taps.weight[p][k] + mean);
     for (std::size_t c = 0; c < sums.channels(); c += 4) {
       sums.Add(static_cast<std::size_t>(taps.level[p]), texel[k], c,
                hn::Mul(weight, CotangentQuad(g, c, sums.channels(), end)));
@@ -207,7 +191,7 @@ struct alignas(128) PullRun {
 
   HWY_INLINE void Clear(std::size_t p) {
     for (auto* quads : {a[0], a[1], b[0], b[1], mix}) {
-      hn::Store(hn::Zero(QuadTag()), QuadTag(), quads[p]);
+      hn::Store(hn::Zero(kQuad), kQuad, quads[p]);
     }
   }
 };
@@ -219,9 +203,8 @@ struct LevelPull {
   // Channels c to c + 3 of pixel p.
   HWY_INLINE LevelPull(const ImageLevels& levels, const TapRun& taps, std::size_t p, std::size_t c,
                        Quad g) {
-    const QuadTag d;
     const TapQuads q = LoadTaps(levels, taps, p, c);
-    const Quad at_a = hn::Set(d, taps.a[p]), at_b = hn::Set(d, taps.b[p]);
+    const Quad at_a = hn::Set(kQuad, taps.a[p]), at_b = hn::Set(kQuad, taps.b[p]);
     const Quad low = hn::Sub(q.t[1], q.t[0]), high = hn::Sub(q.t[3], q.t[2]);
     const Quad bottom = hn::MulAdd(at_a, low, q.t[0]);
     const Quad along_b = hn::Sub(hn::MulAdd(at_a, high, q.t[2]), bottom);
@@ -233,10 +216,9 @@ struct LevelPull {
 
 HWY_INLINE void PullPixel(const ImageLevels& levels, const LookupRun& run, std::size_t p,
                           const float* d_out, const float* end, PullRun* pull) {
-  const QuadTag d;
   const std::size_t n = levels.channels;
   const bool mixes = run.taps[1].level[p] >= 0;
-  Quad a[2], b[2], mix = hn::Zero(d);
+  Quad a[2], b[2], mix = hn::Zero(kQuad);
   a[0] = a[1] = b[0] = b[1] = mix;
   for (std::size_t c = 0; c < n; c += 4) {
     const QuadMask counts = LanesBelow(c, n);
@@ -253,15 +235,15 @@ HWY_INLINE void PullPixel(const ImageLevels& levels, const LookupRun& run, std::
     add(hn::Mul(g, hn::Sub(coarse.value, fine.value)), &mix);
   }
   for (int i = 0; i < 2; ++i) {
-    hn::Store(a[i], d, pull->a[i][p]);
-    hn::Store(b[i], d, pull->b[i][p]);
+    hn::Store(a[i], kQuad, pull->a[i][p]);
+    hn::Store(b[i], kQuad, pull->b[i][p]);
   }
-  hn::Store(mix, d, pull->mix[p]);
+  hn::Store(mix, kQuad, pull->mix[p]);
 }
 
 HWY_INLINE RunVec SumQuads(const float (*quads)[4]) {
   RunVec a, b, c, e;
-  hn::LoadInterleaved4(RunTag(), quads[0], a, b, c, e);
+  hn::LoadInterleaved4(kLanes, quads[0], a, b, c, e);
   return hn::Add(hn::Add(a, b), hn::Add(c, e));
 }
 
@@ -273,22 +255,23 @@ struct CoordinateCotangents {
 HWY_INLINE CoordinateCotangents PullCoordinates(const TextureInput<float>& input,
                                                 const RunCoordinates& at, const LookupRun& run,
                                                 const PullRun& pull, std::size_t i) {
-  const RunTag d;
   const bool cube = input.boundary == TextureBoundary::kCube;
   const PointLanes point = FindPoints(input, at, i);
   CoordinateCotangents out;
   RunVec d_st[2], d_slopes[4];
-  const RunVec mix = hn::Load(d, run.mix + i), rest = hn::Sub(hn::Set(d, 1.0f), mix);
-  d_st[0] = hn::Mul(hn::Mul(rest, SumQuads(pull.a[0] + i)), hn::Load(d, run.taps[0].slope_a + i));
-  d_st[1] = hn::Mul(hn::Mul(rest, SumQuads(pull.b[0] + i)), hn::Load(d, run.taps[0].slope_b + i));
-  out.level = hn::Zero(d);
-  for (RunVec& s : d_slopes) s = hn::Zero(d);
+  const RunVec mix = hn::Load(kLanes, run.mix + i), rest = hn::Sub(hn::Set(kLanes, 1.0f), mix);
+  d_st[0] =
+      hn::Mul(hn::Mul(rest, SumQuads(pull.a[0] + i)), hn::Load(kLanes, run.taps[0].slope_a + i));
+  d_st[1] =
+      hn::Mul(hn::Mul(rest, SumQuads(pull.b[0] + i)), hn::Load(kLanes, run.taps[0].slope_b + i));
+  out.level = hn::Zero(kLanes);
+  for (RunVec& s : d_slopes) s = hn::Zero(kLanes);
   const auto mixes = hn::RebindMask(
-      d, hn::Gt(hn::Load(RunIntTag(), run.taps[1].level + i), hn::Set(RunIntTag(), -1)));
-  if (!hn::AllFalse(d, mixes)) {
+      kLanes, hn::Gt(hn::Load(kIntLanes, run.taps[1].level + i), hn::Set(kIntLanes, -1)));
+  if (!hn::AllFalse(kLanes, mixes)) {
     const auto coarse = [&](const float(*quads)[4], const float* slope) HWY_ATTR {
-      return hn::IfThenElseZero(mixes,
-                                hn::Mul(hn::Mul(mix, SumQuads(quads + i)), hn::Load(d, slope + i)));
+      return hn::IfThenElseZero(
+          mixes, hn::Mul(hn::Mul(mix, SumQuads(quads + i)), hn::Load(kLanes, slope + i)));
     };
     d_st[0] = hn::Add(d_st[0], coarse(pull.a[1], run.taps[1].slope_a));
     d_st[1] = hn::Add(d_st[1], coarse(pull.b[1], run.taps[1].slope_b));
@@ -310,12 +293,12 @@ HWY_INLINE CoordinateCotangents PullCoordinates(const TextureInput<float>& input
 
 // Writes n numbers of each of the first `count` pixels of a vector.
 HWY_INLINE void WriteNumbers(const RunVec* v, std::size_t n, std::size_t count, float* to) {
-  const RunTag d;
   HWY_ALIGN float numbers[6][16];
-  if (n == 1 && count == hn::Lanes(d)) return hn::StoreU(v[0], d, to);
-  if (n == 2 && count == hn::Lanes(d)) return hn::StoreInterleaved2(v[0], v[1], d, to);
-  if (n == 4 && count == hn::Lanes(d)) return hn::StoreInterleaved4(v[0], v[1], v[2], v[3], d, to);
-  for (std::size_t k = 0; k < n; ++k) hn::Store(v[k], d, numbers[k]);
+  if (n == 1 && count == hn::Lanes(kLanes)) return hn::StoreU(v[0], kLanes, to);
+  if (n == 2 && count == hn::Lanes(kLanes)) return hn::StoreInterleaved2(v[0], v[1], kLanes, to);
+  if (n == 4 && count == hn::Lanes(kLanes))
+    return hn::StoreInterleaved4(v[0], v[1], v[2], v[3], kLanes, to);
+  for (std::size_t k = 0; k < n; ++k) hn::Store(v[k], kLanes, numbers[k]);
   for (std::size_t p = 0; p < count; ++p) {
     for (std::size_t k = 0; k < n; ++k) to[n * p + k] = numbers[k][p];
   }
@@ -324,7 +307,7 @@ HWY_INLINE void WriteNumbers(const RunVec* v, std::size_t n, std::size_t count, 
 HWY_INLINE void WriteCoordinates(const TextureInput<float>& input, const RunCoordinates& at,
                                  const LookupRun& run, const PullRun& pull,
                                  const TextureGradients<float>& out) {
-  const std::size_t n = input.coordinates(), lanes = hn::Lanes(RunTag());
+  const std::size_t n = input.coordinates(), lanes = hn::Lanes(kLanes);
   for (std::size_t i = 0; i < at.count; i += lanes) {
     const CoordinateCotangents d = PullCoordinates(input, at, run, pull, i);
     const std::size_t pixel = at.first + i, some = HWY_MIN(lanes, at.count - i);
@@ -362,14 +345,11 @@ void PullBand(const TextureInput<float>& input, const Band& band, std::span<cons
       if (coordinates) PullPixel(levels, run, p, g, end, &pull);
     }
     if (!coordinates) return;
-    for (std::size_t p = count; p % hn::Lanes(RunTag()) != 0; ++p) pull.Clear(p);
+    for (std::size_t p = count; p % hn::Lanes(kLanes) != 0; ++p) pull.Clear(p);
     WriteCoordinates(input, at, run, pull, out);
   });
   for (CellSums& c : cells) c.Flush();
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -4,11 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <span>
-#include <vector>
 
-#include "compat/nvdiffrast/clip_mesh.h"
 #include "compat/nvdiffrast/texture.h"
 #include "compat/nvdiffrast/texture_taps.h"
 
@@ -247,7 +243,7 @@ std::vector<std::size_t> LevelStarts(const TextureInput<T>& input) {
 template <class T>
 void SampleTextureRef(const TextureInput<T>& input, const Workers& workers, std::span<T> out) {
   using namespace texture_ref;
-  workers.For(input.grid.bands(), [&](std::size_t index, std::size_t) {
+  workers.For(input.grid.bands(), [&](std::size_t index) {
     const Band band = input.grid.band(index);
     PixelLookup lookup{};
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {

@@ -11,19 +11,16 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <numbers>
 #include <span>
 
-#include "compat/nvdiffrast/texture.h"
 #include "compat/nvdiffrast/texture_taps.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::compat::nvdiffrast {
-namespace HWY_NAMESPACE {
+namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Vector body of texture_taps.h: the texture points that pixels look up, their footprints and
@@ -31,6 +28,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using RunTag = HWY_CAPPED(float, 16);
 using RunIntTag = hn::RebindToSigned<RunTag>;
+inline constexpr RunTag kLanes;
+inline constexpr RunIntTag kIntLanes;
 using RunVec = hn::Vec<RunTag>;
 using RunInt = hn::Vec<RunIntTag>;
 using RunMask = hn::Mask<RunTag>;
@@ -50,7 +49,7 @@ struct RunCoordinates {
     const auto place = [&](std::span<const float> from, std::size_t numbers) -> const float* {
       if (from.empty()) return nullptr;
       const float* at = from.data() + first * numbers;
-      if (count % hn::Lanes(RunTag()) == 0) return at;
+      if (count % hn::Lanes(kLanes) == 0) return at;
       std::memset(free, 0, kRun * numbers * sizeof(float));
       std::memcpy(free, at, count * numbers * sizeof(float));
       at = free;
@@ -74,7 +73,7 @@ struct PointLanes {
   RunVec d_major[2];             // by X and Y
 };
 
-HWY_INLINE RunMask FiniteLanes(RunVec v) { return hn::Eq(hn::Sub(v, v), hn::Zero(RunTag())); }
+HWY_INLINE RunMask FiniteLanes(RunVec v) { return hn::Eq(hn::Sub(v, v), hn::Zero(kLanes)); }
 
 // A vector (x, y, z) in the axes of faces: kCubeFaces of texture_cube.h.
 struct FaceFrame {
@@ -100,42 +99,38 @@ struct FromFaceFrame {
 };
 
 HWY_INLINE void FindPlainPoints(const RunCoordinates& at, std::size_t i, PointLanes* out) {
-  const RunTag d;
-  hn::LoadInterleaved2(d, at.uv + 2 * i, out->st[0], out->st[1]);
+  hn::LoadInterleaved2(kLanes, at.uv + 2 * i, out->st[0], out->st[1]);
   out->valid = hn::And(FiniteLanes(out->st[0]), FiniteLanes(out->st[1]));
-  out->face = hn::Zero(RunIntTag());
+  out->face = hn::Zero(kIntLanes);
   if (at.uv_da == nullptr) return;
-  hn::LoadInterleaved4(d, at.uv_da + 4 * i, out->slopes[0], out->slopes[1], out->slopes[2],
+  hn::LoadInterleaved4(kLanes, at.uv_da + 4 * i, out->slopes[0], out->slopes[1], out->slopes[2],
                        out->slopes[3]);
 }
 
 HWY_INLINE void FindAxes(const RunVec (&r)[3], PointLanes* out) {
-  const RunTag d;
-  const RunIntTag di;
   const RunVec x = hn::Abs(r[0]), y = hn::Abs(r[1]), z = hn::Abs(r[2]);
   out->axis[2] = hn::Gt(z, hn::Max(x, y));
   out->axis[1] = hn::AndNot(out->axis[2], hn::Gt(y, x));
   out->axis[0] = hn::Not(hn::Or(out->axis[1], out->axis[2]));
   const RunVec largest =
       hn::IfThenElse(out->axis[0], r[0], hn::IfThenElse(out->axis[1], r[1], r[2]));
-  const RunMask negative = hn::Lt(largest, hn::Zero(d));
+  const RunMask negative = hn::Lt(largest, hn::Zero(kLanes));
   out->valid =
-      hn::And(hn::Ne(largest, hn::Zero(d)), FiniteLanes(hn::Add(r[0], hn::Add(r[1], r[2]))));
-  out->sign = hn::IfThenElse(negative, hn::Set(d, -1.0f), hn::Set(d, 1.0f));
+      hn::And(hn::Ne(largest, hn::Zero(kLanes)), FiniteLanes(hn::Add(r[0], hn::Add(r[1], r[2]))));
+  out->sign = hn::IfThenElse(negative, hn::Set(kLanes, -1.0f), hn::Set(kLanes, 1.0f));
   const auto number = [&](const RunMask& mask, std::int32_t v) HWY_ATTR {
-    return hn::IfThenElseZero(hn::RebindMask(di, mask), hn::Set(di, v));
+    return hn::IfThenElseZero(hn::RebindMask(kIntLanes, mask), hn::Set(kIntLanes, v));
   };
   out->face =
       hn::Add(number(negative, 1), hn::Add(number(out->axis[1], 2), number(out->axis[2], 4)));
 }
 
 HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLanes* out) {
-  const RunTag d;
   RunVec r[3];
-  hn::LoadInterleaved3(d, at.uv + 3 * i, r[0], r[1], r[2]);
+  hn::LoadInterleaved3(kLanes, at.uv + 3 * i, r[0], r[1], r[2]);
   FindAxes(r, out);
   const FaceFrame frame(*out, r[0], r[1], r[2]);
-  const RunVec half = hn::Set(d, 0.5f);
+  const RunVec half = hn::Set(kLanes, 0.5f);
   out->major = frame.major;
   out->ratio[0] = hn::Div(frame.s, frame.major);
   out->ratio[1] = hn::Div(frame.t, frame.major);
@@ -143,13 +138,13 @@ HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLan
   if (at.uv_da == nullptr) return;
   RunVec x[2], y[2], z[2];
   HWY_ALIGN float planes[6][16];
-  for (std::size_t p = 0; p < hn::Lanes(d); ++p) {
+  for (std::size_t p = 0; p < hn::Lanes(kLanes); ++p) {
     for (std::size_t k = 0; k < 6; ++k) planes[k][p] = at.uv_da[6 * (i + p) + k];
   }
   for (int k = 0; k < 2; ++k) {
-    x[k] = hn::Load(d, planes[k]);
-    y[k] = hn::Load(d, planes[2 + k]);
-    z[k] = hn::Load(d, planes[4 + k]);
+    x[k] = hn::Load(kLanes, planes[k]);
+    y[k] = hn::Load(kLanes, planes[2 + k]);
+    z[k] = hn::Load(kLanes, planes[4 + k]);
     const FaceFrame by(*out, x[k], y[k], z[k]);
     const RunVec scale = hn::Div(half, frame.major);
     out->d_major[k] = by.major;
@@ -162,8 +157,8 @@ HWY_INLINE PointLanes FindPoints(const TextureInput<float>& input, const RunCoor
                                  std::size_t i) {
   PointLanes out;
   // Adjoints multiply both by 0 if there are no derivatives: garbage could be NaN.
-  for (RunVec& s : out.slopes) s = hn::Zero(RunTag());
-  for (RunVec& m : out.d_major) m = hn::Zero(RunTag());
+  for (RunVec& s : out.slopes) s = hn::Zero(kLanes);
+  for (RunVec& m : out.d_major) m = hn::Zero(kLanes);
   if (input.boundary == TextureBoundary::kCube) {
     FindCubePoints(at, i, &out);
   } else {
@@ -175,7 +170,7 @@ HWY_INLINE PointLanes FindPoints(const TextureInput<float>& input, const RunCoor
 
 // 2^e for e in [-126, 127].
 HWY_INLINE RunVec PowerOfTwo(RunInt e) {
-  return hn::BitCast(RunTag(), hn::ShiftLeft<23>(hn::Add(e, hn::Set(RunIntTag(), 127))));
+  return hn::BitCast(kLanes, hn::ShiftLeft<23>(hn::Add(e, hn::Set(kIntLanes, 127))));
 }
 
 // Footprint of texture_taps.cc: J times 2^-exponent, so that no square overflows. Powers of two
@@ -186,22 +181,22 @@ struct FootprintLanes {
   RunVec half, c, root, square;
 
   HWY_INLINE FootprintLanes(const RunVec (&slopes)[4], const MipSize& size) {
-    const RunTag d;
-    const RunIntTag di;
-    RunVec largest = hn::Zero(d);
+    RunVec largest = hn::Zero(kLanes);
     for (int i = 0; i < 4; ++i) {
-      j[i] = hn::Mul(slopes[i], hn::Set(d, static_cast<float>(i < 2 ? size.width : size.height)));
+      j[i] =
+          hn::Mul(slopes[i], hn::Set(kLanes, static_cast<float>(i < 2 ? size.width : size.height)));
       largest = hn::Max(largest, hn::Abs(j[i]));
     }
-    exponent = hn::Sub(hn::ShiftRight<23>(hn::BitCast(di, largest)), hn::Set(di, 127));
-    exponent = hn::Max(hn::Min(exponent, hn::Set(di, 126)), hn::Set(di, -126));
+    exponent =
+        hn::Sub(hn::ShiftRight<23>(hn::BitCast(kIntLanes, largest)), hn::Set(kIntLanes, 127));
+    exponent = hn::Max(hn::Min(exponent, hn::Set(kIntLanes, 126)), hn::Set(kIntLanes, -126));
     const RunVec down = PowerOfTwo(hn::Neg(exponent));
-    scale[0] = hn::Mul(down, hn::Set(d, static_cast<float>(size.width)));
-    scale[1] = hn::Mul(down, hn::Set(d, static_cast<float>(size.height)));
+    scale[0] = hn::Mul(down, hn::Set(kLanes, static_cast<float>(size.width)));
+    scale[1] = hn::Mul(down, hn::Set(kLanes, static_cast<float>(size.height)));
     for (RunVec& v : j) v = hn::Mul(v, down);
     const RunVec a = hn::MulAdd(j[0], j[0], hn::Mul(j[2], j[2]));
     const RunVec b = hn::MulAdd(j[1], j[1], hn::Mul(j[3], j[3]));
-    const RunVec one_half = hn::Set(d, 0.5f);
+    const RunVec one_half = hn::Set(kLanes, 0.5f);
     half = hn::Mul(one_half, hn::Sub(a, b));
     c = hn::MulAdd(j[0], j[1], hn::Mul(j[2], j[3]));
     root = hn::Sqrt(hn::MulAdd(half, half, hn::Mul(c, c)));
@@ -211,35 +206,33 @@ struct FootprintLanes {
 
 // For x > 0; exact if x is a power of two.
 HWY_INLINE RunVec Log2Lanes(RunVec x) {
-  const RunTag d;
-  const RunIntTag di;
   // x = 2^e m, m in [sqrt(1/2), sqrt(2)).
-  const RunInt bits = hn::BitCast(di, x);
-  const RunInt e = hn::Sub(hn::ShiftRight<23>(hn::Add(bits, hn::Set(di, 0x3f800000 - 0x3f3504f3))),
-                           hn::Set(di, 127));
-  const RunVec m = hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<23>(e)));
-  return hn::MulAdd(hn::Log(d, m), hn::Set(d, std::numbers::log2e_v<float>), hn::ConvertTo(d, e));
+  const RunInt bits = hn::BitCast(kIntLanes, x);
+  const RunInt e =
+      hn::Sub(hn::ShiftRight<23>(hn::Add(bits, hn::Set(kIntLanes, 0x3f800000 - 0x3f3504f3))),
+              hn::Set(kIntLanes, 127));
+  const RunVec m = hn::BitCast(kLanes, hn::Sub(bits, hn::ShiftLeft<23>(e)));
+  return hn::MulAdd(hn::Log(kLanes, m), hn::Set(kLanes, std::numbers::log2e_v<float>),
+                    hn::ConvertTo(kLanes, e));
 }
 
 // LevelOf of texture_taps.h.
 HWY_INLINE RunVec LevelLanes(const FootprintLanes& f) {
-  const RunTag d;
   const RunVec level =
-      hn::MulAdd(hn::Set(d, 0.5f), Log2Lanes(f.square), hn::ConvertTo(d, f.exponent));
-  return hn::IfThenElse(hn::Gt(f.square, hn::Zero(d)), level,
-                        hn::Set(d, -std::numeric_limits<float>::infinity()));
+      hn::MulAdd(hn::Set(kLanes, 0.5f), Log2Lanes(f.square), hn::ConvertTo(kLanes, f.exponent));
+  return hn::IfThenElse(hn::Gt(f.square, hn::Zero(kLanes)), level,
+                        hn::Set(kLanes, -std::numeric_limits<float>::infinity()));
 }
 
 // LevelAdjoint of texture_taps.h.
 HWY_INLINE void LevelAdjointLanes(const FootprintLanes& f, RunVec d_level, RunVec (&d_slopes)[4]) {
-  const RunTag d;
-  const RunVec zero = hn::Zero(d), half = hn::Set(d, 0.5f), two = hn::Set(d, 2.0f);
+  const RunVec zero = hn::Zero(kLanes), half = hn::Set(kLanes, 0.5f), two = hn::Set(kLanes, 2.0f);
   const RunMask oval = hn::Gt(f.root, zero), some = hn::Gt(f.square, zero);
   const RunVec cosine = hn::IfThenElseZero(oval, hn::Div(f.half, f.root));
   const RunVec sine = hn::IfThenElseZero(oval, hn::Div(f.c, f.root));
   const RunVec d_square = hn::IfThenElseZero(
       hn::And(some, hn::Ne(d_level, zero)),
-      hn::Div(hn::Mul(d_level, hn::Set(d, 0.5f / std::numbers::ln2_v<float>)), f.square));
+      hn::Div(hn::Mul(d_level, hn::Set(kLanes, 0.5f / std::numbers::ln2_v<float>)), f.square));
   const RunVec d_a = hn::Mul(half, hn::MulAdd(cosine, d_square, d_square));
   const RunVec d_b = hn::Mul(half, hn::NegMulAdd(cosine, d_square, d_square));
   const RunVec d_c = hn::Mul(sine, d_square);
@@ -255,9 +248,9 @@ HWY_INLINE void LevelAdjointLanes(const FootprintLanes& f, RunVec d_level, RunVe
 HWY_INLINE void CubeAdjointLanes(const PointLanes& p, const RunVec (&d_st)[2],
                                  const RunVec (&d_slopes)[4], RunVec (&d_uv)[3],
                                  RunVec (&d_uv_da)[6]) {
-  const RunTag d;
-  const RunVec half = hn::Set(d, 0.5f), inverse = hn::Div(hn::Set(d, 1.0f), p.major);
-  RunVec axis[2], d_major = hn::Zero(d), by_axis[2][2], by_major[2] = {hn::Zero(d), hn::Zero(d)};
+  const RunVec half = hn::Set(kLanes, 0.5f), inverse = hn::Div(hn::Set(kLanes, 1.0f), p.major);
+  RunVec axis[2], d_major = hn::Zero(kLanes), by_axis[2][2],
+                  by_major[2] = {hn::Zero(kLanes), hn::Zero(kLanes)};
   for (int k = 0; k < 2; ++k) {
     RunVec d_p = hn::Mul(half, d_st[k]);
     for (int i = 0; i < 2; ++i) {
@@ -308,19 +301,18 @@ struct LevelLanesOf {
 
   HWY_INLINE LevelLanesOf(const TextureInput<float>& input, const RunCoordinates& at, std::size_t i,
                           const PointLanes& point) {
-    const RunTag d;
-    const RunVec zero = hn::Zero(d);
-    fine = hn::Zero(RunIntTag());
+    const RunVec zero = hn::Zero(kLanes);
+    fine = hn::Zero(kIntLanes);
     mix = zero;
     mixes = hn::Lt(zero, zero);
     if (!UsesLevels(input.filter)) return;
     RunVec level = zero;
     if (at.uv_da != nullptr) level = LevelLanes(FootprintLanes(point.slopes, input.levels[0].size));
-    if (at.bias != nullptr) level = hn::Add(level, hn::LoadU(d, at.bias + i));
-    const RunVec last = hn::Set(d, static_cast<float>(input.levels.size() - 1));
+    if (at.bias != nullptr) level = hn::Add(level, hn::LoadU(kLanes, at.bias + i));
+    const RunVec last = hn::Set(kLanes, static_cast<float>(input.levels.size() - 1));
     const RunMask above = hn::And(point.valid, hn::Gt(level, zero));
     const RunVec kept = hn::IfThenElseZero(above, hn::Min(level, last));
-    fine = hn::ConvertTo(RunIntTag(), kept);  // towards zero: the floor
+    fine = hn::ConvertTo(kIntLanes, kept);  // towards zero: the floor
     if (input.filter == TextureFilter::kLinearMipmapNearest) return;
     mixes = hn::And(above, hn::Lt(level, last));
     mix = hn::IfThenElseZero(mixes, hn::Sub(kept, hn::Floor(kept)));
@@ -333,49 +325,47 @@ struct AxisLanes {
   RunVec weight, slope;
 
   HWY_INLINE AxisLanes(RunVec s, RunInt n, const TextureInput<float>& input) {
-    const RunTag d;
-    const RunIntTag di;
-    const RunVec size = hn::ConvertTo(d, n), zero = hn::Zero(d);
-    const RunInt last = hn::Sub(n, hn::Set(di, 1)), none = hn::Set(di, -1);
+    const RunVec size = hn::ConvertTo(kLanes, n), zero = hn::Zero(kLanes);
+    const RunInt last = hn::Sub(n, hn::Set(kIntLanes, 1)), none = hn::Set(kIntLanes, -1);
     if (input.boundary == TextureBoundary::kWrap) s = hn::Sub(s, hn::Floor(s));
     RunVec x = hn::Mul(s, size);
     weight = slope = zero;
     if (input.filter == TextureFilter::kNearest) {
       // Far away is outside, too, and must fit into an integer.
-      const RunVec cell = hn::Floor(hn::Min(hn::Max(x, hn::Set(d, -1.0f)), size));
-      low = hn::Max(none, hn::Min(hn::ConvertTo(di, cell), n));
-      if (input.boundary != TextureBoundary::kZero) low = hn::Max(hn::Zero(di), hn::Min(low, last));
+      const RunVec cell = hn::Floor(hn::Min(hn::Max(x, hn::Set(kLanes, -1.0f)), size));
+      low = hn::Max(none, hn::Min(hn::ConvertTo(kIntLanes, cell), n));
+      if (input.boundary != TextureBoundary::kZero)
+        low = hn::Max(hn::Zero(kIntLanes), hn::Min(low, last));
       high = low;
       return;
     }
-    x = hn::Sub(x, hn::Set(d, 0.5f));
+    x = hn::Sub(x, hn::Set(kLanes, 0.5f));
     slope = size;
-    RunMask inside = hn::And(hn::Gt(x, hn::Set(d, -1.0f)), hn::Lt(x, size));
+    RunMask inside = hn::And(hn::Gt(x, hn::Set(kLanes, -1.0f)), hn::Lt(x, size));
     if (input.boundary == TextureBoundary::kClamp) {
-      inside = hn::And(hn::Gt(x, zero), hn::Lt(x, hn::ConvertTo(d, last)));
-      x = hn::Min(hn::Max(x, zero), hn::ConvertTo(d, last));
+      inside = hn::And(hn::Gt(x, zero), hn::Lt(x, hn::ConvertTo(kLanes, last)));
+      x = hn::Min(hn::Max(x, zero), hn::ConvertTo(kLanes, last));
       slope = hn::IfThenElseZero(inside, slope);
     } else {
-      x = hn::Min(hn::Max(x, hn::Set(d, -1.0f)), size);
+      x = hn::Min(hn::Max(x, hn::Set(kLanes, -1.0f)), size);
     }
     const RunVec cell = hn::Floor(x);
-    low = hn::Max(none, hn::Min(hn::ConvertTo(di, cell), last));
-    high = hn::Add(low, hn::Set(di, 1));
+    low = hn::Max(none, hn::Min(hn::ConvertTo(kIntLanes, cell), last));
+    high = hn::Add(low, hn::Set(kIntLanes, 1));
     weight = hn::Sub(x, cell);
-    SetBeyond(input.boundary, hn::RebindMask(di, inside), n);
+    SetBeyond(input.boundary, hn::RebindMask(kIntLanes, inside), n);
   }
 
  private:
   HWY_INLINE void SetBeyond(TextureBoundary boundary, hn::Mask<RunIntTag> inside, RunInt n) {
-    const RunIntTag di;
-    const RunInt zero = hn::Zero(di), last = hn::Sub(n, hn::Set(di, 1));
+    const RunInt zero = hn::Zero(kIntLanes), last = hn::Sub(n, hn::Set(kIntLanes, 1));
     if (boundary == TextureBoundary::kWrap) {
       low = hn::IfThenElse(hn::Lt(low, zero), last, low);
       high = hn::IfThenElse(hn::Gt(high, last), zero, high);
     } else if (boundary == TextureBoundary::kClamp) {
       low = hn::Max(low, zero);
       high = hn::IfThenElse(inside, hn::Min(high, last), low);
-      weight = hn::IfThenElseZero(hn::RebindMask(RunTag(), inside), weight);
+      weight = hn::IfThenElseZero(hn::RebindMask(kLanes, inside), weight);
     } else if (boundary == TextureBoundary::kZero) {
       low = hn::IfThenElse(inside, low, n);
       high = hn::IfThenElse(inside, high, n);
@@ -389,13 +379,13 @@ struct TexelLanes {
   bool outside;  // some taps may be
 
   HWY_INLINE RunInt At(RunInt x, RunInt y) const {
-    const RunIntTag di;
     const RunInt texel = hn::Add(hn::Add(first, hn::Mul(y, width)), x);
     if (!outside) return texel;
-    const auto in = [&](RunInt v, RunInt n)
-                        HWY_ATTR { return hn::And(hn::Gt(v, hn::Set(di, -1)), hn::Lt(v, n)); };
+    const auto in = [&](RunInt v, RunInt n) HWY_ATTR {
+      return hn::And(hn::Gt(v, hn::Set(kIntLanes, -1)), hn::Lt(v, n));
+    };
     return hn::IfThenElse(hn::And(in(x, width), in(y, height)), texel,
-                          hn::Set(di, static_cast<std::int32_t>(Taps::kNothing)));
+                          hn::Set(kIntLanes, static_cast<std::int32_t>(Taps::kNothing)));
   }
 };
 
@@ -404,14 +394,13 @@ inline HWY_NOINLINE void CrossEdges(const MipSize& size, const AxisLanes& x, con
                                     RunInt face, hn::Mask<RunIntTag> cross, std::size_t i,
                                     TapRun* out) {
   HWY_ALIGN std::int32_t columns[2][16], rows[2][16], faces[16];
-  const RunIntTag di;
-  face = hn::IfThenElse(cross, face, hn::Set(di, -1));
-  hn::Store(x.low, di, columns[0]);
-  hn::Store(x.high, di, columns[1]);
-  hn::Store(y.low, di, rows[0]);
-  hn::Store(y.high, di, rows[1]);
-  hn::Store(face, di, faces);
-  for (std::size_t p = 0; p < hn::Lanes(di); ++p) {
+  face = hn::IfThenElse(cross, face, hn::Set(kIntLanes, -1));
+  hn::Store(x.low, kIntLanes, columns[0]);
+  hn::Store(x.high, kIntLanes, columns[1]);
+  hn::Store(y.low, kIntLanes, rows[0]);
+  hn::Store(y.high, kIntLanes, rows[1]);
+  hn::Store(face, kIntLanes, faces);
+  for (std::size_t p = 0; p < hn::Lanes(kIntLanes); ++p) {
     if (faces[p] < 0) continue;
     const int side = HWY_MAX(1, size.width >> HWY_MAX(out->level[i + p], 0));
     for (int k = 0; k < 4; ++k) {
@@ -425,14 +414,13 @@ inline HWY_NOINLINE void CrossEdges(const MipSize& size, const AxisLanes& x, con
 // none.
 HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& point, RunInt level,
                         RunVec share, std::size_t i, TapRun* out) {
-  const RunTag d;
-  const RunIntTag di;
-  const RunInt one = hn::Set(di, 1), none = hn::Set(di, static_cast<std::int32_t>(Taps::kNothing));
-  const RunInt shift = hn::Max(level, hn::Zero(di));
+  const RunInt one = hn::Set(kIntLanes, 1),
+               none = hn::Set(kIntLanes, static_cast<std::int32_t>(Taps::kNothing));
+  const RunInt shift = hn::Max(level, hn::Zero(kIntLanes));
   const MipSize& base = input.levels[0].size;
   TexelLanes texels;
-  texels.width = hn::Max(hn::Shr(hn::Set(di, base.width), shift), one);
-  texels.height = hn::Max(hn::Shr(hn::Set(di, base.height), shift), one);
+  texels.width = hn::Max(hn::Shr(hn::Set(kIntLanes, base.width), shift), one);
+  texels.height = hn::Max(hn::Shr(hn::Set(kIntLanes, base.height), shift), one);
   const RunInt of_face = hn::Mul(texels.width, texels.height);
   texels.first = hn::Mul(point.face, of_face);
   texels.outside =
@@ -440,52 +428,52 @@ HWY_INLINE void SetTaps(const TextureInput<float>& input, const PointLanes& poin
   const AxisLanes x(point.st[0], texels.width, input), y(point.st[1], texels.height, input);
   RunInt at[4] = {texels.At(x.low, y.low), texels.At(x.high, y.low), texels.At(x.low, y.high),
                   texels.At(x.high, y.high)};
-  const auto there = hn::And(hn::RebindMask(di, point.valid), hn::Gt(level, hn::Set(di, -1)));
+  const auto there =
+      hn::And(hn::RebindMask(kIntLanes, point.valid), hn::Gt(level, hn::Set(kIntLanes, -1)));
   for (RunInt& t : at) t = hn::IfThenElse(there, t, none);
   // From the last texels on quads reach beyond the level.
   const auto n = static_cast<std::int32_t>(input.channels);
-  const RunInt end = hn::Mul(of_face, hn::Set(di, static_cast<std::int32_t>(input.faces())));
-  const RunInt most = hn::Sub(end, hn::Set(di, ((n + 3) / 4 * 4 + n - 1) / n));
+  const RunInt end = hn::Mul(of_face, hn::Set(kIntLanes, static_cast<std::int32_t>(input.faces())));
+  const RunInt most = hn::Sub(end, hn::Set(kIntLanes, ((n + 3) / 4 * 4 + n - 1) / n));
   const RunInt reach = hn::Max(hn::Max(at[0], at[1]), hn::Max(at[2], at[3]));
   const RunInt least = hn::Or(hn::Or(at[0], at[1]), hn::Or(at[2], at[3]));
-  hn::Store(hn::Or(least, hn::Sub(most, reach)), di, out->whole + i);
-  hn::Store(level, di, out->level + i);
-  hn::StoreInterleaved4(at[0], at[1], at[2], at[3], di, out->texel[i]);
+  hn::Store(hn::Or(least, hn::Sub(most, reach)), kIntLanes, out->whole + i);
+  hn::Store(level, kIntLanes, out->level + i);
+  hn::StoreInterleaved4(at[0], at[1], at[2], at[3], kIntLanes, out->texel[i]);
   const RunVec b1 = hn::Mul(share, y.weight), b0 = hn::Sub(share, b1);
   const RunVec w1 = hn::Mul(x.weight, b0), w3 = hn::Mul(x.weight, b1);
-  hn::StoreInterleaved4(hn::Sub(b0, w1), w1, hn::Sub(b1, w3), w3, d, out->weight[i]);
-  hn::Store(x.weight, d, out->a + i);
-  hn::Store(y.weight, d, out->b + i);
-  hn::Store(x.slope, d, out->slope_a + i);
-  hn::Store(y.slope, d, out->slope_b + i);
-  const auto cross = hn::And(there, hn::Lt(least, hn::Zero(di)));
-  if (input.boundary != TextureBoundary::kCube || hn::AllFalse(di, cross)) return;
+  hn::StoreInterleaved4(hn::Sub(b0, w1), w1, hn::Sub(b1, w3), w3, kLanes, out->weight[i]);
+  hn::Store(x.weight, kLanes, out->a + i);
+  hn::Store(y.weight, kLanes, out->b + i);
+  hn::Store(x.slope, kLanes, out->slope_a + i);
+  hn::Store(y.slope, kLanes, out->slope_b + i);
+  const auto cross = hn::And(there, hn::Lt(least, hn::Zero(kIntLanes)));
+  if (input.boundary != TextureBoundary::kCube || hn::AllFalse(kIntLanes, cross)) return;
   CrossEdges(base, x, y, point.face, cross, i, out);
 }
 
 // The lookups of a run.
 HWY_INLINE void LookUp(const TextureInput<float>& input, const RunCoordinates& at, LookupRun* out) {
-  const RunTag d;
   out->mixes = false;
-  for (std::size_t i = 0; i < at.count; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < at.count; i += hn::Lanes(kLanes)) {
     const PointLanes point = FindPoints(input, at, i);
     const LevelLanesOf levels(input, at, i, point);
-    SetTaps(input, point, levels.fine, hn::Sub(hn::Set(d, 1.0f), levels.mix), i, &out->taps[0]);
-    hn::Store(levels.mix, d, out->mix + i);
-    const RunIntTag di;
-    if (hn::AllFalse(d, levels.mixes)) {
-      hn::Store(hn::Set(di, -1), di, out->taps[1].level + i);
+    SetTaps(input, point, levels.fine, hn::Sub(hn::Set(kLanes, 1.0f), levels.mix), i,
+            &out->taps[0]);
+    hn::Store(levels.mix, kLanes, out->mix + i);
+    if (hn::AllFalse(kLanes, levels.mixes)) {
+      hn::Store(hn::Set(kIntLanes, -1), kIntLanes, out->taps[1].level + i);
       continue;
     }
-    const RunInt coarse = hn::IfThenElse(hn::RebindMask(di, levels.mixes),
-                                         hn::Add(levels.fine, hn::Set(di, 1)), hn::Set(di, -1));
+    const RunInt coarse =
+        hn::IfThenElse(hn::RebindMask(kIntLanes, levels.mixes),
+                       hn::Add(levels.fine, hn::Set(kIntLanes, 1)), hn::Set(kIntLanes, -1));
     SetTaps(input, point, coarse, levels.mix, i, &out->taps[1]);
     out->mixes = true;
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -85,41 +85,6 @@ struct Footprint {
   }
 };
 
-}  // namespace
-
-void FindPoint(const TextureCoordinates& at, bool cube, TexturePoint* out) {
-  return cube ? FindCubePoint(at, out) : FindPlainPoint(at, out);
-}
-
-void PointAdjoint(const TextureCoordinates& at, const TexturePoint& point, bool cube,
-                  const PointCotangent& d, TextureCoordinates* out) {
-  *out = {};
-  if (cube) return CubeAdjoint(at, point.face, d, out);
-  std::copy(d.d_st, d.d_st + 2, out->uv);
-  std::copy(d.d_slopes, d.d_slopes + 4, out->uv_da);
-}
-
-double LevelOf(const double (&slopes)[4], const MipSize& size) {
-  const Footprint f(slopes, size);
-  return f.square > 0 ? 0.5 * std::log2(f.square) : -std::numeric_limits<double>::infinity();
-}
-
-void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
-                  double (&d_slopes)[4]) {
-  const Footprint f(slopes, size);
-  // For a round footprint both axes are the longer one; takes the derivative of their mean.
-  const double cosine = f.root > 0 ? f.half / f.root : 0, sine = f.root > 0 ? f.c / f.root : 0;
-  const double d_square = 0.5 * d_level / (f.square * std::numbers::ln2);
-  const double d_a = 0.5 * (1 + cosine) * d_square, d_b = 0.5 * (1 - cosine) * d_square;
-  const double d_c = sine * d_square;
-  for (int i = 0; i < 4; i += 2) {
-    d_slopes[i] = (2 * f.j[i] * d_a + f.j[i + 1] * d_c) * f.scale[i / 2];
-    d_slopes[i + 1] = (2 * f.j[i + 1] * d_b + f.j[i] * d_c) * f.scale[i / 2];
-  }
-}
-
-namespace {
-
 // One axis: texels `low` and `high`, the weight of `high`, and its derivative by the coordinate. In
 // a cube map texels may be -1 or n, on the adjacent face; kOutside gives zeros.
 constexpr int kOutside = -2;
@@ -185,6 +150,37 @@ AxisTaps LinearTaps(double s, int n, TextureBoundary boundary) {
 }
 
 }  // namespace
+
+void FindPoint(const TextureCoordinates& at, bool cube, TexturePoint* out) {
+  return cube ? FindCubePoint(at, out) : FindPlainPoint(at, out);
+}
+
+void PointAdjoint(const TextureCoordinates& at, const TexturePoint& point, bool cube,
+                  const PointCotangent& d, TextureCoordinates* out) {
+  *out = {};
+  if (cube) return CubeAdjoint(at, point.face, d, out);
+  std::copy(d.d_st, d.d_st + 2, out->uv);
+  std::copy(d.d_slopes, d.d_slopes + 4, out->uv_da);
+}
+
+double LevelOf(const double (&slopes)[4], const MipSize& size) {
+  const Footprint f(slopes, size);
+  return f.square > 0 ? 0.5 * std::log2(f.square) : -std::numeric_limits<double>::infinity();
+}
+
+void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
+                  double (&d_slopes)[4]) {
+  const Footprint f(slopes, size);
+  // For a round footprint both axes are the longer one; takes the derivative of their mean.
+  const double cosine = f.root > 0 ? f.half / f.root : 0, sine = f.root > 0 ? f.c / f.root : 0;
+  const double d_square = 0.5 * d_level / (f.square * std::numbers::ln2);
+  const double d_a = 0.5 * (1 + cosine) * d_square, d_b = 0.5 * (1 - cosine) * d_square;
+  const double d_c = sine * d_square;
+  for (int i = 0; i < 4; i += 2) {
+    d_slopes[i] = (2 * f.j[i] * d_a + f.j[i + 1] * d_c) * f.scale[i / 2];
+    d_slopes[i + 1] = (2 * f.j[i + 1] * d_b + f.j[i] * d_c) * f.scale[i / 2];
+  }
+}
 
 std::ptrdiff_t TexelAt(int x, int y, int face, const MipSize& size, TextureBoundary boundary) {
   if (x == kOutside || y == kOutside) return Taps::kNothing;

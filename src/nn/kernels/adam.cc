@@ -44,7 +44,7 @@ std::vector<double> SumsByStretches(std::span<const std::span<const T>> arrays,
     bytes += static_cast<double>(n * sizeof(T));
   }
   workers.NoteTraffic(bytes);
-  workers.For(stretches.size(), [&](std::size_t i, std::size_t) {
+  workers.For(stretches.size(), [&](std::size_t i) {
     stretches[i].sum = range_sum(stretches[i].x.data(), stretches[i].x.size());
   });
   std::vector<double> sums(arrays.size());
@@ -55,15 +55,14 @@ std::vector<double> SumsByStretches(std::span<const std::span<const T>> arrays,
 }  // namespace
 
 void AdamStep(const AdamProblem<float>& problem, const Workers& workers) {
-  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
+  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(AdamRange)(problem, begin, end);
   });
 }
 
 void AdamStep(const AdamProblem<double>& problem, const Workers& workers) {
-  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
-    AdamStepRef(problem, begin, end);
-  });
+  workers.ForRanges(problem.n, kGrain,
+                    [&](std::size_t begin, std::size_t end) { AdamStepRef(problem, begin, end); });
 }
 
 std::vector<double> SumsOfSquares(std::span<const std::span<const float>> arrays,

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of axis_map.h: lanes run over the axes after the mapped one. The last axis, which has
 // none after it, is a loop for each run of columns.
-#if defined(TILEGRAD_NN_AXIS_MAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_AXIS_MAP_INL_H_
-#undef TILEGRAD_NN_AXIS_MAP_INL_H_
-#else
-#define TILEGRAD_NN_AXIS_MAP_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -100,5 +94,3 @@ void ImageMapRange(const ImageMapProblem<float>& p, std::span<const ColumnRun> r
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -34,8 +34,7 @@ template <class T, class Run>
 void ForRows(const AxisMapProblem<T>& p, const Workers& workers, const Run& run) {
   const std::size_t rows = p.outer * p.map.out;
   const auto terms = p.outer * p.inner * static_cast<std::size_t>(p.map.begin[p.map.out]);
-  workers.ForRanges(rows, RowsPerTask(rows, terms, workers),
-                    [&](std::size_t begin, std::size_t end, std::size_t) { run(begin, end); });
+  workers.ForRanges(rows, RowsPerTask(rows, terms, workers), run);
 }
 
 // Fewer copies are not worth a run of their own.
@@ -95,7 +94,7 @@ void MapAxis(const AxisMapProblem<float>& problem, const Workers& workers) {
   const ColumnRuns runs = FindRuns(problem.map);
   workers.ForRanges(problem.outer,
                     RowsPerTask(problem.outer, problem.outer * problem.map.out, workers),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                    [&](std::size_t begin, std::size_t end) {
                       HWY_DYNAMIC_DISPATCH(LastAxisRange)
                       (problem, {runs.data(), runs.size()}, begin, end);
                     });
@@ -108,8 +107,7 @@ void MapAxis(const AxisMapProblem<double>& problem, const Workers& workers) {
 
 void MapImage(const ImageMapProblem<float>& problem, const KernelContext& context) {
   const std::size_t pitch = RoundUp(problem.columns.in, kAlignment);
-  float* const combined =
-      context.scratch.Floats(pitch * static_cast<std::size_t>(context.workers.count()));
+  float* const combined = context.scratch.Floats(pitch * context.workers.size());
   const ColumnRuns runs = FindRuns(problem.columns);
   ForImageRows(problem, context.workers,
                [&](std::size_t first, std::size_t last, std::size_t worker) {
@@ -120,7 +118,7 @@ void MapImage(const ImageMapProblem<float>& problem, const KernelContext& contex
 
 void MapImage(const ImageMapProblem<double>& problem, const KernelContext& context) {
   const std::size_t pitch = problem.columns.in;
-  std::vector<double> combined(pitch * static_cast<std::size_t>(context.workers.count()));
+  std::vector<double> combined(pitch * context.workers.size());
   ForImageRows(problem, context.workers,
                [&](std::size_t first, std::size_t last, std::size_t worker) {
                  for (std::size_t row = first; row < last; ++row)

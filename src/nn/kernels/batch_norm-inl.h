@@ -2,12 +2,6 @@
 // Vector body of batch_norm.h. Two layouts: if channels have several pixels, lanes run along them
 // and a channel is a task (its statistics, then its values, still in the cache); if they have one,
 // each lane is a channel.
-#if defined(TILEGRAD_NN_BATCH_NORM_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_BATCH_NORM_INL_H_
-#undef TILEGRAD_NN_BATCH_NORM_INL_H_
-#else
-#define TILEGRAD_NN_BATCH_NORM_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -214,5 +208,3 @@ void BatchNormBackwardRange(const BatchNormBackwardProblem<float>& p, std::size_
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -23,26 +23,24 @@ std::size_t Grain(const BatchNormShape& shape) { return shape.pixels == 1 ? 64 :
 
 void BatchNormForward(const BatchNormForwardProblem<float>& problem, const Workers& workers) {
   workers.ForRanges(problem.shape.channels, Grain(problem.shape),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                    [&](std::size_t begin, std::size_t end) {
                       HWY_DYNAMIC_DISPATCH(BatchNormForwardRange)(problem, begin, end);
                     });
 }
 
 void BatchNormForward(const BatchNormForwardProblem<double>& problem, const Workers& workers) {
-  workers.For(problem.shape.channels,
-              [&](std::size_t c, std::size_t) { BatchNormForwardRef(problem, c); });
+  workers.For(problem.shape.channels, [&](std::size_t c) { BatchNormForwardRef(problem, c); });
 }
 
 void BatchNormBackward(const BatchNormBackwardProblem<float>& problem, const Workers& workers) {
   workers.ForRanges(problem.shape.channels, Grain(problem.shape),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                    [&](std::size_t begin, std::size_t end) {
                       HWY_DYNAMIC_DISPATCH(BatchNormBackwardRange)(problem, begin, end);
                     });
 }
 
 void BatchNormBackward(const BatchNormBackwardProblem<double>& problem, const Workers& workers) {
-  workers.For(problem.shape.channels,
-              [&](std::size_t c, std::size_t) { BatchNormBackwardRef(problem, c); });
+  workers.For(problem.shape.channels, [&](std::size_t c) { BatchNormBackwardRef(problem, c); });
 }
 
 }  // namespace tilegrad::nn

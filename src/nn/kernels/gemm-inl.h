@@ -14,7 +14,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstddef>
 
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/micro_kernel-inl.h"
@@ -400,7 +399,7 @@ inline std::size_t PackedPanels(const GemmPlan& plan) {
 }
 
 inline void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
-  const auto workers = static_cast<std::size_t>(context.workers.count());
+  const auto workers = context.workers.size();
   const GemmPlan plan(problem, ItemsFor(problem, workers));
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
   float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);

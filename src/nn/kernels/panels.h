@@ -18,7 +18,7 @@ constexpr std::size_t kFewWorkers = 4;
 // Elements to a task of a loop over n: `most`, or down to an eighth of it where many workers would
 // not get two tasks each.
 inline std::size_t GrainFor(std::size_t n, std::size_t most, const Workers& workers) {
-  const auto count = static_cast<std::size_t>(workers.count());
+  const auto count = workers.size();
   return count <= kFewWorkers ? most : std::clamp(n / (2 * count), DivideUp(most, 8), most);
 }
 

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of pointwise.h. Any length and alignment: a tail goes through a buffer of one vector,
 // so an element's bits do not depend on its position.
-#if defined(TILEGRAD_NN_POINTWISE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_POINTWISE_INL_H_
-#undef TILEGRAD_NN_POINTWISE_INL_H_
-#else
-#define TILEGRAD_NN_POINTWISE_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -18,8 +12,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 // Above this, e^x exceeds the largest float.
 constexpr float kExpOverflow = 88.72284f;
@@ -199,5 +191,3 @@ void BinaryRange(const BinaryProblem<float>& problem, const RowRange& range) {
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -29,13 +29,13 @@ void ForRowRanges(const BinaryProblem<T>& problem, const Workers& workers, const
   for (std::size_t i = 0; i + 1 < problem.extents.size(); ++i) rows *= problem.extents[i];
   const std::size_t elements = GrainFor(rows * length, kGrain, workers);
   if (rows == 1) {
-    workers.ForRanges(length, elements, [&](std::size_t begin, std::size_t end, std::size_t) {
+    workers.ForRanges(length, elements, [&](std::size_t begin, std::size_t end) {
       run(RowRange{0, 1, begin, end});
     });
     return;
   }
   const std::size_t grain = std::max<std::size_t>(1, elements / std::max<std::size_t>(1, length));
-  workers.ForRanges(rows, grain, [&](std::size_t first, std::size_t last, std::size_t) {
+  workers.ForRanges(rows, grain, [&](std::size_t first, std::size_t last) {
     run(RowRange{first, last, 0, length});
   });
 }
@@ -45,13 +45,13 @@ void ForRowRanges(const BinaryProblem<T>& problem, const Workers& workers, const
 void Unary(const UnaryProblem<float>& problem, const Workers& workers) {
   workers.NoteTraffic(static_cast<double>(problem.n * 2 * sizeof(float)));
   const std::size_t grain = GrainFor(problem.n, kGrain, workers);
-  workers.ForRanges(problem.n, grain, [&](std::size_t begin, std::size_t end, std::size_t) {
+  workers.ForRanges(problem.n, grain, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(UnaryRange)(problem, begin, end);
   });
 }
 
 void Unary(const UnaryProblem<double>& problem, const Workers& workers) {
-  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
+  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end) {
     UnaryRangeRef(problem, begin, end);
   });
 }

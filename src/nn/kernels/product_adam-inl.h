@@ -2,21 +2,12 @@
 // Vector body of product_adam.h: the loops of gemm-inl.h around groups of rows that stay in cache
 // until Adam has used them.
 
-#if defined(TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
-#undef TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
-#else
-#define TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
-#endif
-
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
 #include <optional>
-#include <span>
 
 #include "nn/kernels/adam-inl.h"
 #include "nn/kernels/gemm-inl.h"
@@ -243,11 +234,11 @@ struct ProductAdamPlans {
 
 inline void ProductAdamsTarget(std::span<const ProductAdamProblem> problems,
                                const KernelContext& context) {
-  const auto workers = static_cast<std::size_t>(context.workers.count());
+  const auto workers = context.workers.size();
   const ProductAdamPlans all(problems, workers);
   const std::size_t a_size = all.packed[all.count];
   float* packed_a = context.scratch.Floats(a_size + all.worker_size * workers);
-  context.workers.For(all.panels[all.count], [&](std::size_t index, std::size_t) {
+  context.workers.For(all.panels[all.count], [&](std::size_t index) {
     all.In(all.panels, index, [&](std::size_t i, std::size_t panel) {
       PackRowPanel(all.plans[i]->gemm, panel, 0, 1, packed_a + all.packed[i]);
     });
@@ -263,5 +254,3 @@ inline void ProductAdamsTarget(std::span<const ProductAdamProblem> problems,
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of reduce.h. If the last axis is reduced, lanes run along it; if it is kept, each
 // lane sums its own output.
-#if defined(TILEGRAD_NN_REDUCE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_REDUCE_INL_H_
-#undef TILEGRAD_NN_REDUCE_INL_H_
-#else
-#define TILEGRAD_NN_REDUCE_INL_H_
-#endif
 
 #include <hwy/highway.h>
 
@@ -52,5 +46,3 @@ void SumColumns(const ReduceLayout& l, const float* x, float* y, std::size_t beg
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -5,6 +5,7 @@
 #define HWY_TARGET_INCLUDE "nn/kernels/reduce.cc"
 #include <hwy/foreach_target.h>
 //
+#include "base/scalar.h"
 #include "nn/kernels/reduce-inl.h"
 
 #if HWY_ONCE
@@ -33,7 +34,7 @@ void SumOne(const float* x, std::size_t n, float* y, const Workers& workers) {
   const std::size_t stretch = std::max(kGrain, (n + kMaxPartials - 1) / kMaxPartials);
   const std::size_t parts = (n + stretch - 1) / stretch;
   std::array<float, kMaxPartials> partial;
-  workers.For(parts, [&](std::size_t i, std::size_t) {
+  workers.For(parts, [&](std::size_t i) {
     ReduceLayout row;
     row.reduced[2] = std::min(stretch, n - i * stretch);
     HWY_DYNAMIC_DISPATCH(SumAlongRows)(row, x + i * stretch, &partial[i], 0, 1);
@@ -62,14 +63,14 @@ void ReduceSum(const ReduceLayout& layout, const float* x, float* y, const Worke
   }
   if (l.reduced[2] != 1 || l.kept[2] == 1) {
     workers.ForRanges(l.outputs(), OutputsPerTask(l, workers),
-                      [&](std::size_t begin, std::size_t end, std::size_t) {
+                      [&](std::size_t begin, std::size_t end) {
                         HWY_DYNAMIC_DISPATCH(SumAlongRows)(l, x, y, begin, end);
                       });
     return;
   }
   const std::size_t columns = l.kept[2], grain = GrainFor(l.outputs(), kColumnBlock, workers);
   const std::size_t blocks = (columns + grain - 1) / grain;
-  workers.For(l.kept[0] * l.kept[1] * blocks, [&](std::size_t task, std::size_t) {
+  workers.For(l.kept[0] * l.kept[1] * blocks, [&](std::size_t task) {
     const std::size_t row = task / blocks * columns, block = task % blocks * grain;
     const std::size_t end = row + std::min(columns, block + grain);
     HWY_DYNAMIC_DISPATCH(SumColumns)(l, x, y, row + block, end);
@@ -77,35 +78,19 @@ void ReduceSum(const ReduceLayout& layout, const float* x, float* y, const Worke
 }
 
 void ReduceSum(const ReduceLayout& l, const double* x, double* y, const Workers& workers) {
-  workers.ForRanges(
-      l.outputs(), OutputsPerTask(l, workers),
-      [&](std::size_t begin, std::size_t end, std::size_t) { ReduceSumRef(l, x, y, begin, end); });
-}
-
-namespace {
-
-template <class T>
-void ForOutputs(const ReduceLayout& l, const T* x, T* y, const ArgExtremum& arg,
-                const Workers& workers) {
   workers.ForRanges(l.outputs(), OutputsPerTask(l, workers),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t o = begin; o < end; ++o) ReduceExtremumRef(l, x, y, arg, o);
-                    });
+                    [&](std::size_t begin, std::size_t end) { ReduceSumRef(l, x, y, begin, end); });
 }
-
-}  // namespace
 
 // Scalar in both types: the position of the first one has to be known, and what is reduced this way
 // (bounding boxes, logits) is small.
-void ReduceExtremum(const ReduceLayout& l, const float* x, float* y, const ArgExtremum& arg,
+template <class T>
+void ReduceExtremum(const ReduceLayout& l, const T* x, T* y, const ArgExtremum& arg,
                     const Workers& workers) {
-  ForOutputs(l, x, y, arg, workers);
+  workers.ForEach(l.outputs(), OutputsPerTask(l, workers),
+                  [&](std::size_t o) { ReduceExtremumRef(l, x, y, arg, o); });
 }
-
-void ReduceExtremum(const ReduceLayout& l, const double* x, double* y, const ArgExtremum& arg,
-                    const Workers& workers) {
-  ForOutputs(l, x, y, arg, workers);
-}
+TILEGRAD_INSTANTIATE(ReduceExtremum);
 
 }  // namespace tilegrad::nn
 #endif  // HWY_ONCE

@@ -31,9 +31,8 @@ struct ArgExtremum {
   int sign = 1;
   std::int32_t* first = nullptr;  // [k0, k1, k2]
 };
-void ReduceExtremum(const ReduceLayout& layout, const float* x, float* y, const ArgExtremum& arg,
-                    const Workers& workers);
-void ReduceExtremum(const ReduceLayout& layout, const double* x, double* y, const ArgExtremum& arg,
+template <class T>  // float or double
+void ReduceExtremum(const ReduceLayout& layout, const T* x, T* y, const ArgExtremum& arg,
                     const Workers& workers);
 
 }  // namespace tilegrad::nn

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of sample_colors.h: lanes are vertices, the numbers of a cell are broadcast.
-#if defined(TILEGRAD_NN_SAMPLE_COLORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
-#undef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
-#else
-#define TILEGRAD_NN_SAMPLE_COLORS_INL_H_
-#endif
 
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
@@ -183,5 +177,3 @@ void SampleBackward(const ColorCells<float>& cells, const ColorSpans<float>& s) 
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

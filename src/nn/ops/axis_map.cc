@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/error.h"
 #include "nn/ops.h"
 
 namespace tilegrad::nn {
@@ -81,8 +80,8 @@ struct AxisPadding {
 };
 
 Var RefusedPadding(const Var& x, const AxisPadding& padding, int axis) {
-  return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", padding.before,
-                                 padding.after, axis, x.shape().ToString()));
+  return Refuse(x, "pad: {} and {} along axis {} of {} in this mode", padding.before, padding.after,
+                axis, x.shape());
 }
 
 void AppendBilinear(const AxisExtents& e, std::int64_t i, AxisTerms& terms) {
@@ -129,8 +128,7 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
   Shape shape = x.shape();
   if (axis < 0 || axis >= shape.rank() || shape[axis] != map.in ||
       map.weight.dtype() != x.dtype()) {
-    return Fail(x, InvalidArgument("map axis: a map from {} along axis {} of {}", map.in, axis,
-                                   shape.ToString()));
+    return Refuse(x, "map axis: a map from {} along axis {} of {}", map.in, axis, shape);
   }
   shape[axis] = map.out;
   Tensor y = x.context().Empty(shape, x.dtype());
@@ -151,8 +149,7 @@ Var MapImage(const Var& x, const AxisMap& rows, const AxisMap& columns) {
   Shape shape = x.shape();
   if (shape.rank() != 4 || shape[2] != rows.in || shape[3] != columns.in ||
       rows.weight.dtype() != x.dtype() || columns.weight.dtype() != x.dtype()) {
-    return Fail(x, InvalidArgument("map image: a map from {} x {} of {}", rows.in, columns.in,
-                                   shape.ToString()));
+    return Refuse(x, "map image: a map from {} x {} of {}", rows.in, columns.in, shape);
   }
   shape[2] = rows.out;
   shape[3] = columns.out;
@@ -184,8 +181,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
 
 Var PadImage(const Var& x, const Padding& padding, const PadModes& modes) {
   if (!Usable("pad image", {&x})) return Invalid({&x});
-  if (x.shape().rank() != 4)
-    return Fail(x, InvalidArgument("pad image: {} is not [n, c, h, w]", x.shape().ToString()));
+  if (x.shape().rank() != 4) return Refuse(x, "pad image: {} is not [n, c, h, w]", x.shape());
   const AxisPadding rows{x.shape()[2], padding.top, padding.bottom, modes.vertical};
   const AxisPadding columns{x.shape()[3], padding.left, padding.right, modes.horizontal};
   if (!rows.IsPossible()) return RefusedPadding(x, rows, 2);
@@ -202,8 +198,7 @@ Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
   const bool fits = size.height >= 1 && size.height <= AxisMap::kMostExtent && size.width >= 1 &&
                     size.width <= AxisMap::kMostExtent;
   if (!image || !fits)
-    return Fail(
-        x, InvalidArgument("resize: {} to {} x {}", x.shape().ToString(), size.height, size.width));
+    return Refuse(x, "resize: {} to {} x {}", x.shape(), size.height, size.width);
   if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width}))
     return Invalid({&x});
   if (x.shape()[2] == size.height && x.shape()[3] == size.width) return x;

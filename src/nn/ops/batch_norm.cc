@@ -76,8 +76,8 @@ Vars ComposedGrad(const Operands& o, const Var& y, const Var& d) {
 Status CheckOperands(const Var& x, const Var& gamma, const Var& beta) {
   const bool known = x.shape().rank() == 2 || x.shape().rank() == 4;
   if (known && gamma.shape() == Shape{x.shape()[1]} && beta.shape() == gamma.shape()) return {};
-  return InvalidArgument("batch norm: input {}, gamma {}, beta {}", x.shape().ToString(),
-                         gamma.shape().ToString(), beta.shape().ToString());
+  return InvalidArgument("batch norm: input {}, gamma {}, beta {}", x.shape(), gamma.shape(),
+                         beta.shape());
 }
 
 }  // namespace
@@ -87,8 +87,7 @@ BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
   if (!Usable("batch norm", {&x, &gamma, &beta})) return {Invalid({&x, &gamma, &beta}), {}, {}};
   Status status = CheckOperands(x, gamma, beta);
   if (status.ok() && ShapeOf(x.shape()).count() < 2)
-    status =
-        InvalidArgument("batch norm: {} has no two elements to a channel", x.shape().ToString());
+    status = InvalidArgument("batch norm: {} has no two elements to a channel", x.shape());
   if (!status.ok()) return {Fail(x, status), {}, {}};
   Context& context = x.context();
   const Operands operands{x, gamma, beta, options};
@@ -117,9 +116,8 @@ Var BatchNormEval(const Var& x, const Var& gamma, const Var& beta,
   if (const Status s = CheckOperands(x, gamma, beta); !s.ok()) return Fail(x, s);
   for (const Tensor* t : {&statistics.mean, &statistics.variance}) {
     if (!t->empty() && t->dtype() == x.dtype() && t->shape() == gamma.shape()) continue;
-    return Fail(x,
-                InvalidArgument("batch norm: input {}, running statistics of {} {}",
-                                x.shape().ToString(), NameOf(t->dtype()), t->shape().ToString()));
+    return Refuse(x, "batch norm: input {}, running statistics of {} {}", x.shape(),
+                  NameOf(t->dtype()), t->shape());
   }
   Context& context = x.context();
   const Var mean = Constant(context, statistics.mean);

@@ -31,14 +31,14 @@ Shape PaddedShape(const Shape& x, std::int64_t padding) {
 Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   const bool images = e.x.rank() == 4 && e.weight.rank() == 4 && e.x[1] == e.weight[1];
   if (!images || options.stride < 1 || options.padding < 0)
-    return InvalidArgument("conv2d: input {} with weight {}, stride {}, padding {}", e.x.ToString(),
-                           e.weight.ToString(), options.stride, options.padding);
+    return InvalidArgument("conv2d: input {} with weight {}, stride {}, padding {}", e.x, e.weight,
+                           options.stride, options.padding);
   // The caller may request an image of any size.
   if (!e.x.IsPossible() || !e.weight.IsPossible() ||
       !PaddedShape(e.x, options.padding).IsPossible()) {
     return InvalidArgument(
-        "conv2d: input {} with weight {}, padding {}: the output is too large for a tensor",
-        e.x.ToString(), e.weight.ToString(), options.padding);
+        "conv2d: input {} with weight {}, padding {}: the output is too large for a tensor", e.x,
+        e.weight, options.padding);
   }
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
   if (options.padding_mode != PadMode::kZero && options.padding > 0)
@@ -59,16 +59,15 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
       std::min<std::int64_t>(options.stride, std::max({padded[2], padded[3], std::int64_t{1}})));
   TILEGRAD_TRY(s.Check());
   if (OutputShape(s).IsPossible()) return s;
-  return InvalidArgument("conv2d: input {} with weight {} would give {}", e.x.ToString(),
-                         e.weight.ToString(), OutputShape(s).ToString());
+  return InvalidArgument("conv2d: input {} with weight {} would give {}", e.x, e.weight,
+                         OutputShape(s));
 }
 
 // That dy is of the output's shape.
 Result<Conv2dShape> MakeShape(const Extents& e, const Shape& dy, const ConvOptions& options) {
   TILEGRAD_ASSIGN(const Conv2dShape s, MakeShape(e, options));
   if (dy == OutputShape(s)) return s;
-  return InvalidArgument("conv2d gradient: dy {} where {} gives {}", dy.ToString(), e.x.ToString(),
-                         OutputShape(s).ToString());
+  return InvalidArgument("conv2d gradient: dy {} where {} gives {}", dy, e.x, OutputShape(s));
 }
 
 ImageSize SizeOf(const Var& image) { return {image.shape()[2], image.shape()[3]}; }
@@ -133,7 +132,7 @@ std::int32_t Largest(const PoolShape& s, const T* x, const Range& rows, const Ra
 // for every window. NaN counts as larger than everything.
 template <class T>
 void MaxPoolIndices(const PoolShape& s, const T* x, std::int32_t* first, const Workers& workers) {
-  workers.For(s.planes * s.out_height, [&](std::size_t row, std::size_t) {
+  workers.For(s.planes * s.out_height, [&](std::size_t row) {
     const T* plane = x + row / s.out_height * s.height * s.width;
     const Range rows = Window(s, row % s.out_height, s.height);
     for (std::size_t j = 0; j < s.out_width; ++j)
@@ -153,8 +152,8 @@ Status Check(const char* op, const Shape& x, const PoolOptions& o) {
       x[3] + padding >= o.kernel && x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
     return {};
   }
-  return InvalidArgument("{}: input {}, kernel {}, stride {}, padding {}", op, x.ToString(),
-                         o.kernel, o.stride, o.padding);
+  return InvalidArgument("{}: input {}, kernel {}, stride {}, padding {}", op, x, o.kernel,
+                         o.stride, o.padding);
 }
 
 AxisMap MeansAlong(const Var& x, int axis, const PoolOptions& o) {
@@ -182,8 +181,7 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
   const auto s = MakeShape({x.shape(), weight.shape()}, options);
   if (!s.ok()) return Fail(x, s.status());
   if (bias.valid() && !(bias.shape() == Shape{weight.shape()[0]}))
-    return Fail(x, InvalidArgument("conv2d: bias {} for weight {}", bias.shape().ToString(),
-                                   weight.shape().ToString()));
+    return Refuse(x, "conv2d: bias {} for weight {}", bias.shape(), weight.shape());
   Tensor y = x.context().Empty(OutputShape(*s), x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     Kernels{*s, x.context().kernels()}.Forward(x.value().data<T>(), weight.value().data<T>(),
@@ -202,8 +200,7 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
 Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options) {
   if (!Usable("conv2d input gradient", {&dy, &weight})) return Invalid({&dy, &weight});
   if (dy.shape().rank() != 4 || weight.shape().rank() != 4)
-    return Fail(dy, InvalidArgument("conv2d input gradient: dy {}, weight {}",
-                                    dy.shape().ToString(), weight.shape().ToString()));
+    return Refuse(dy, "conv2d input gradient: dy {}, weight {}", dy.shape(), weight.shape());
   const Shape shape = {dy.shape()[0], weight.shape()[1], size.height, size.width};
   const auto s = MakeShape({shape, weight.shape()}, dy.shape(), options);
   if (!s.ok()) return Fail(dy, s.status());
@@ -224,8 +221,7 @@ Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const Conv
 Var Conv2dWeightGrad(const Var& x, const Var& dy, ImageSize kernel, const ConvOptions& options) {
   if (!Usable("conv2d weight gradient", {&x, &dy})) return Invalid({&x, &dy});
   if (x.shape().rank() != 4 || dy.shape().rank() != 4)
-    return Fail(x, InvalidArgument("conv2d weight gradient: input {}, dy {}", x.shape().ToString(),
-                                   dy.shape().ToString()));
+    return Refuse(x, "conv2d weight gradient: input {}, dy {}", x.shape(), dy.shape());
   const Shape shape = {dy.shape()[1], x.shape()[1], kernel.height, kernel.width};
   const auto s = MakeShape({x.shape(), shape}, dy.shape(), options);
   if (!s.ok()) return Fail(x, s.status());

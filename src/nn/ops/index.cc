@@ -32,21 +32,17 @@ std::size_t RowsPerTask(std::size_t length) {
 // y[o, i, :] = x[o, indices[i], :]; y is [outer, count, inner].
 template <class T>
 void GatherRows(const IndexedRows& rows, const T* x, T* y, const Workers& workers) {
-  workers.ForRanges(rows.outer * rows.count, RowsPerTask(rows.inner),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t row = begin; row < end; ++row) {
-                        const std::size_t o = row / rows.count;
-                        const auto index = static_cast<std::size_t>(rows.indices[row % rows.count]);
-                        std::copy_n(x + (o * rows.extent + index) * rows.inner, rows.inner,
-                                    y + row * rows.inner);
-                      }
-                    });
+  workers.ForEach(rows.outer * rows.count, RowsPerTask(rows.inner), [&](std::size_t row) {
+    const std::size_t o = row / rows.count;
+    const auto index = static_cast<std::size_t>(rows.indices[row % rows.count]);
+    std::copy_n(x + (o * rows.extent + index) * rows.inner, rows.inner, y + row * rows.inner);
+  });
 }
 
 // y = 0, then y[o, indices[i], :] += x[o, i, :] in the order of i; y is [outer, extent, inner].
 template <class T>
 void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& workers) {
-  workers.For(rows.outer, [&](std::size_t o, std::size_t) {
+  workers.For(rows.outer, [&](std::size_t o) {
     T* to = y + o * rows.extent * rows.inner;
     std::fill_n(to, rows.extent * rows.inner, T(0));
     for (std::size_t i = 0; i < rows.count; ++i) {
@@ -60,28 +56,22 @@ void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& worke
 // y[o, i] = x[o, indices[o, i]]; y is [outer, count].
 template <class T>
 void TakeElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
-  workers.ForRanges(picked.outer, RowsPerTask(picked.count),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t o = begin; o < end; ++o) {
-                        const T* row = x + o * picked.extent;
-                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i)
-                          y[i] = row[picked.indices[i]];
-                      }
-                    });
+  workers.ForEach(picked.outer, RowsPerTask(picked.count), [&](std::size_t o) {
+    const T* row = x + o * picked.extent;
+    for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i)
+      y[i] = row[picked.indices[i]];
+  });
 }
 
 // y = 0, then y[o, indices[o, i]] += x[o, i] in the order of i; y is [outer, extent].
 template <class T>
 void PlaceElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
-  workers.ForRanges(picked.outer, RowsPerTask(picked.extent),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
-                      for (std::size_t o = begin; o < end; ++o) {
-                        T* row = y + o * picked.extent;
-                        std::fill_n(row, picked.extent, T(0));
-                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i)
-                          row[picked.indices[i]] += x[i];
-                      }
-                    });
+  workers.ForEach(picked.outer, RowsPerTask(picked.extent), [&](std::size_t o) {
+    T* row = y + o * picked.extent;
+    std::fill_n(row, picked.extent, T(0));
+    for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i)
+      row[picked.indices[i]] += x[i];
+  });
 }
 
 // Why elements below `extent` cannot be addressed by `indices`, or OK.
@@ -98,7 +88,7 @@ Status CheckIndices(const char* op, const Tensor& indices, std::int64_t extent) 
 Status CheckRows(const char* op, const Shape& shape, int axis, const Tensor& indices,
                  std::int64_t extent) {
   if (axis < 0 || axis >= shape.rank())
-    return InvalidArgument("{}: axis {} of {}", op, axis, shape.ToString());
+    return InvalidArgument("{}: axis {} of {}", op, axis, shape);
   if (indices.shape().rank() != 1) return InvalidArgument("{}: indices must be [n]", op);
   return CheckIndices(op, indices, extent);
 }
@@ -124,7 +114,7 @@ Status CheckPicks(const char* op, const Shape& shape, const Tensor& indices, std
       indices.shape().With(last, 0) == shape.With(last, 0)) {
     return {};
   }
-  return InvalidArgument("{}: indices {} for {}", op, indices.shape().ToString(), shape.ToString());
+  return InvalidArgument("{}: indices {} for {}", op, indices.shape(), shape);
 }
 
 }  // namespace
@@ -151,8 +141,7 @@ Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t exten
   if (const Status s = CheckRows("scatter", x.shape(), axis, indices, extent); !s.ok())
     return Fail(x, s);
   if (indices.shape()[0] != x.shape()[axis])
-    return Fail(x, InvalidArgument("scatter: {} indices for axis {} of {}", indices.shape()[0],
-                                   axis, x.shape().ToString()));
+    return Refuse(x, "scatter: {} indices for axis {} of {}", indices.shape()[0], axis, x.shape());
   const Shape whole = x.shape().With(axis, extent);
   if (!IsPossibleResult("scatter", x, whole)) return Invalid({&x});
   Tensor y = x.context().Empty(whole, x.dtype());
@@ -184,8 +173,7 @@ Var PlaceAlong(const Var& x, const Tensor& indices, std::int64_t extent) {
   if (!Usable("place along", {&x})) return Invalid({&x});
   Status status = CheckPicks("place along", x.shape(), indices, extent);
   if (status.ok() && !(indices.shape() == x.shape()))
-    status = InvalidArgument("place along: {} indices for {}", indices.shape().ToString(),
-                             x.shape().ToString());
+    status = InvalidArgument("place along: {} indices for {}", indices.shape(), x.shape());
   if (!status.ok()) return Fail(x, status);
   const Shape whole = x.shape().With(x.shape().rank() - 1, extent);
   if (!IsPossibleResult("place along", x, whole)) return Invalid({&x});

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "base/error.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"
 #include "nn/ops.h"
@@ -54,9 +53,8 @@ bool AreMatrices(const Var& a, const Var& b, const MatmulOptions& options) {
 Var Matmul(const Var& a, const Var& b, const MatmulOptions& options) {
   if (!Usable("matmul", {&a, &b})) return Invalid({&a, &b});
   if (!AreMatrices(a, b, options))
-    return Fail(a, InvalidArgument("matmul: {}{} by {}{}", a.shape().ToString(),
-                                   options.transpose_a ? "^T" : "", b.shape().ToString(),
-                                   options.transpose_b ? "^T" : ""));
+    return Refuse(a, "matmul: {}{} by {}{}", a.shape(), options.transpose_a ? "^T" : "", b.shape(),
+                  options.transpose_b ? "^T" : "");
   const bool ta = options.transpose_a, tb = options.transpose_b;
   if (!IsPossibleResult("matmul", a, {a.shape()[ta ? 1 : 0], b.shape()[tb ? 0 : 1]}))
     return Invalid({&a});
@@ -77,8 +75,7 @@ Var Linear(const Var& x, const Var& w, const Var& b) {
   if (!usable) return Invalid({&x, &w, &b});
   const MatmulOptions options{false, true};
   if (!AreMatrices(x, w, options) || (b.valid() && !(b.shape() == Shape{w.shape()[0]})))
-    return Fail(x, InvalidArgument("linear: input {}, weight {}, bias {}", x.shape().ToString(),
-                                   w.shape().ToString(), b.shape().ToString()));
+    return Refuse(x, "linear: input {}, weight {}, bias {}", x.shape(), w.shape(), b.shape());
   if (!IsPossibleResult("linear", x, {x.shape()[0], w.shape()[0]})) return Invalid({&x});
   const auto rule = [x, w](const Adjoint& adj) {
     const Var& dy = adj.dy();

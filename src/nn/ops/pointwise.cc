@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "base/error.h"
 #include "nn/ops.h"
 #include "nn/ops/broadcast.h"
 
@@ -62,8 +61,7 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
   if (!Usable(info.name, {&a, &b})) return Invalid({&a, &b});
   Shape shape;
   if (!BroadcastShape(a.shape(), b.shape(), shape))
-    return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
-                                   a.shape().ToString(), b.shape().ToString()));
+    return Refuse(a, "{}: shapes {} and {} do not broadcast", info.name, a.shape(), b.shape());
   if (!IsPossibleResult(info.name, a, shape)) return Invalid({&a});
   Tensor y = a.context().Empty(shape, a.dtype());
   return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
@@ -160,7 +158,7 @@ Var Relu(const Var& x) {
 
 Var LeakyRelu(const Var& x, double slope) {
   if (!Usable("leaky relu", {&x})) return Invalid({&x});
-  if (!(slope >= 0)) return Fail(x, InvalidArgument("leaky relu: slope {} is negative", slope));
+  if (!(slope >= 0)) return Refuse(x, "leaky relu: slope {} is negative", slope);
   return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, slope, [slope](const Adjoint& adj) {
     const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
     return Vars{RectifierGrad(call, adj.y(), adj.TakeDy())};

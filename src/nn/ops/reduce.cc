@@ -44,7 +44,7 @@ Status ParseAxes(const char* op, const Shape& shape, std::initializer_list<int> 
                  AxisSet& set) {
   for (int axis : axes) {
     if (axis < 0 || axis >= shape.rank())
-      return InvalidArgument("{}: axis {} of shape {}", op, axis, shape.ToString());
+      return InvalidArgument("{}: axis {} of shape {}", op, axis, shape);
     set[static_cast<std::size_t>(axis)] = true;
   }
   return {};
@@ -70,7 +70,7 @@ Var SumOver(const Var& x, const AxisSet& axes, Keep keep) {
 
 Var MeanOf(const Var& x, const Var& sum, std::size_t count) {
   if (count > 0) return Scale(sum, 1.0 / static_cast<double>(count));
-  return Fail(x, InvalidArgument("mean: shape {} has nothing to average", x.shape().ToString()));
+  return Refuse(x, "mean: shape {} has nothing to average", x.shape());
 }
 
 struct ExtremumCall {
@@ -83,8 +83,7 @@ Var Extremum(const ExtremumCall& call, const Var& x, const AxisSet& axes, Keep k
   const Reduction plan = Plan(x.shape(), axes);
   if (plan.layout.inputs_each() == 0 ||
       x.shape().elements() > std::numeric_limits<std::int32_t>::max()) {
-    return Fail(
-        x, InvalidArgument("{}: shape {} is empty or too large", call.name, x.shape().ToString()));
+    return Refuse(x, "{}: shape {} is empty or too large", call.name, x.shape());
   }
   Context& context = x.context();
   Tensor y = context.Empty(keep == Keep::kYes ? plan.kept_as_one : plan.dropped, x.dtype());
@@ -159,8 +158,7 @@ Var SumTo(const Var& x, const Shape& shape) {
   if (x.shape() == shape) return x;
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == x.shape()))
-    return Fail(x, InvalidArgument("sum to: {} was not broadcast from {}", x.shape().ToString(),
-                                   shape.ToString()));
+    return Refuse(x, "sum to: {} was not broadcast from {}", x.shape(), shape);
   AxisSet axes{};
   const int missing = x.shape().rank() - shape.rank();
   for (int axis = 0; axis < x.shape().rank(); ++axis)
@@ -183,8 +181,7 @@ Var CrossEntropy(const Var& logits, const Tensor& labels) {
   if (!Usable("cross-entropy", {&logits})) return Invalid({&logits});
   const std::int64_t rows = labels.empty() ? 0 : labels.shape().elements();
   if (!AreLogits(logits, rows))
-    return Fail(logits, InvalidArgument("cross-entropy: logits {} with {} labels",
-                                        logits.shape().ToString(), rows));
+    return Refuse(logits, "cross-entropy: logits {} with {} labels", logits.shape(), rows);
   return Neg(Mean(TakeAlong(LogSoftmax(logits, 1), labels.Reshaped({rows, 1}))));
 }
 

@@ -111,7 +111,7 @@ class Sampling {
     const auto size = static_cast<std::size_t>(images.shape()[3]);
     const std::span<const T> all = images.span<T>();
     const std::size_t bytes = all.size() / batch_;
-    workers.For(batch_, [&](std::size_t b, std::size_t) {
+    workers.For(batch_, [&](std::size_t b) {
       FillCells<T>(all.subspan(b * bytes, bytes), size, &cells_[b]);
     });
   }
@@ -121,7 +121,7 @@ class Sampling {
   // colors: [B][V][3].
   void Forward(const Workers& workers, T* colors) {
     const T* flow = flow_.span<T>().data();
-    workers.For(batch_, [&](std::size_t b, std::size_t) {
+    workers.For(batch_, [&](std::size_t b) {
       const std::size_t v = b * vertices();
       SampleColors(cells_[b], {vertices(), flow + 4 * v, colors + 3 * v, nullptr, nullptr});
     });
@@ -129,7 +129,7 @@ class Sampling {
   // by_color: [B][V][3]; by_flow: [B][V][4].
   void Backward(const Workers& workers, const T* by_color, T* by_flow) {
     const T* flow = flow_.span<T>().data();
-    workers.For(batch_, [&](std::size_t b, std::size_t) {
+    workers.For(batch_, [&](std::size_t b) {
       const std::size_t v = b * vertices();
       SampleColorsBackward(cells_[b],
                            {vertices(), flow + 4 * v, nullptr, by_color + 3 * v, by_flow + 4 * v});
@@ -164,21 +164,19 @@ Var SamplePictures(const Tensor& pictures, const Var& flow) {
   const Shape &p = pictures.shape(), &f = flow.shape();
   if (p.rank() != 4 || f.rank() != 4 || f[1] != 2 || p[0] != f[0] ||
       pictures.dtype() != flow.dtype())
-    return Fail(flow,
-                InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
+    return Fail(flow, InternalError("pictures {} cannot be looked up at {}", p, f));
   Context& context = flow.context();
   const PictureSampling at{pictures, flow.value()};
   const auto batch = static_cast<std::size_t>(p[0]);
   Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
   WithFloatType(flow.dtype(), [&]<class T>(T) {
-    context.workers().For(batch, [&](std::size_t b, std::size_t) { at.Forward(b, out.data<T>()); });
+    context.workers().For(batch, [&](std::size_t b) { at.Forward(b, out.data<T>()); });
   });
   auto backward = [at, batch, &context](std::span<const Tensor> d) {
     Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
     WithFloatType(at.flow.dtype(), [&]<class T>(T) {
-      context.workers().For(batch, [&](std::size_t b, std::size_t) {
-        at.Backward(b, d[0].span<T>().data(), d_flow.data<T>());
-      });
+      context.workers().For(
+          batch, [&](std::size_t b) { at.Backward(b, d[0].span<T>().data(), d_flow.data<T>()); });
     });
     return std::vector<Tensor>{d_flow};
   };

@@ -3,7 +3,6 @@
 #include <array>
 #include <utility>
 
-#include "base/error.h"
 #include "base/parallel.h"
 #include "nn/kernels/panels.h"
 #include "nn/ops.h"
@@ -85,7 +84,7 @@ void MoveStrided(const StridedBox& box, const T* from, T* to, const Workers& wor
   const std::size_t grain = GrainFor(rows * length, 16384, workers);  // elements
   const std::size_t pieces = (length + grain - 1) / grain;
   workers.ForRanges(rows * pieces, std::max<std::size_t>(1, grain / length),
-                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                    [&](std::size_t begin, std::size_t end) {
                       RowStart row(box, begin / pieces);
                       std::size_t piece = begin % pieces;
                       for (std::size_t i = begin; i < end; ++i) {
@@ -191,7 +190,7 @@ Var Reshape(const Var& x, Shape shape) {
     shape[open] = x.shape().elements() / rest;
   }
   if (!shape.IsPossible() || shape.elements() != x.shape().elements())
-    return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
+    return Refuse(x, "reshape: {} to {}", x.shape(), asked);
   return Record(
       {"reshape"}, x.value().Reshaped(shape), {x},
       [before = x.shape()](const Adjoint& adj) { return Vars{Reshape(adj.dy(), before)}; });
@@ -203,7 +202,7 @@ Var BroadcastTo(const Var& x, const Shape& shape) {
   if (!IsPossibleResult("broadcast", x, shape)) return Invalid({&x});
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape))
-    return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
+    return Refuse(x, "broadcast: {} to {}", x.shape(), shape);
   const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
   Tensor y = x.context().Empty(shape, x.dtype());
   Move({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
@@ -222,8 +221,7 @@ Var Permute(const Var& x, std::span<const int> axes) {
   }
   const auto known = std::count_if(inverse.begin(), inverse.end(), [](int i) { return i >= 0; });
   if (static_cast<int>(axes.size()) != rank || known != rank)
-    return Fail(
-        x, InvalidArgument("permute: shape {} needs each of its axes once", x.shape().ToString()));
+    return Refuse(x, "permute: shape {} needs each of its axes once", x.shape());
   Shape shape;
   for (int axis : axes) shape.Append(x.shape()[axis]);
   StridedBox box{ExtentsOf(shape), {}, StridesOf(shape)};
@@ -248,8 +246,7 @@ Var Transpose(const Var& x) { return Permute(x, {1, 0}); }
 Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
   if (!Usable("slice", {&x})) return Invalid({&x});
   if (!HasAxis(x.shape(), axis) || begin < 0 || begin > end || end > x.shape()[axis])
-    return Fail(x, InvalidArgument("slice: [{}, {}) of axis {} of {}", begin, end, axis,
-                                   x.shape().ToString()));
+    return Refuse(x, "slice: [{}, {}) of axis {} of {}", begin, end, axis, x.shape());
   Tensor y = x.context().Empty(x.shape().With(axis, end - begin), x.dtype());
   const auto first = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
   MoveRows({axis, first, 0, count}, x, y);
@@ -270,8 +267,7 @@ Var Accumulated(Var sum, const AdjointPart& part) {
 Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
   if (!Usable("pad", {&x})) return Invalid({&x});
   if (!HasAxis(x.shape(), axis) || !IsPadding(before) || !IsPadding(after))
-    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {}", before, after, axis,
-                                   x.shape().ToString()));
+    return Refuse(x, "pad: {} and {} along axis {} of {}", before, after, axis, x.shape());
   const std::int64_t extent = x.shape()[axis];
   const Shape padded = x.shape().With(axis, before + extent + after);
   if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
@@ -290,8 +286,7 @@ Var Concat(std::span<const Var> parts, int axis) {
     if (!Usable("concat", {&parts[0], &part})) return Invalid({&parts[0], &part});
     if (!HasAxis(first, axis) || part.shape().rank() != first.rank() ||
         !(part.shape().With(axis, 0) == first.With(axis, 0))) {
-      return Fail(part, InvalidArgument("concat: {} and {} along axis {}", first.ToString(),
-                                        part.shape().ToString(), axis));
+      return Refuse(part, "concat: {} and {} along axis {}", first, part.shape(), axis);
     }
     extent += part.shape()[axis];
   }

@@ -106,17 +106,8 @@ Result<Finding> NumbersThatAreNone(const CheckContext& context) {
   return Finding{"errors that name array and index"};
 }
 
-}  // namespace
-
-std::vector<Check> ExtremeChecks() {
-  return {OnEveryTarget({"degenerate, huge and hidden faces", DegenerateFaces}),
-          OnEveryTarget({"NaN and infinity in a scene", NumbersThatAreNone})};
-}
-
 // |alpha - equation 6 over all faces| is at most the reported error, which is at most the allowed
 // one; in any order of faces.
-
-namespace {
 
 // Rounding comes on top. By docs/numerics.md, "Rounding", it makes alpha err by at most 75 u +
 // 0.69 (34 z + (40 r + 31 l) d) u, u = 2^-24, d^2 = z = log2(1280), where 1,280 faces count for
@@ -209,6 +200,11 @@ Result<Finding> AlphaIsWithinItsBound(const CheckContext& context) {
 }
 
 }  // namespace
+
+std::vector<Check> ExtremeChecks() {
+  return {OnEveryTarget({"degenerate, huge and hidden faces", DegenerateFaces}),
+          OnEveryTarget({"NaN and infinity in a scene", NumbersThatAreNone})};
+}
 
 std::vector<Check> AlphaBoundChecks() {
   return {OnEveryTarget({"alpha of all faces within its bound", AlphaIsWithinItsBound})};

@@ -148,19 +148,7 @@ Result<Finding> WinogradConvolutions(const CheckContext& context) {
   return gauge.Found();
 }
 
-}  // namespace
-
-std::vector<Check> KernelChecks() {
-  return {
-      OnEveryTarget({"networks: products of matrices", Products}),
-      OnEveryTarget({"networks: convolutions and their gradients", DirectConvolutions}),
-      OnEveryTarget({"networks: the same by Winograd's algorithm", WinogradConvolutions}),
-  };
-}
-
 // Scores of meshes with known scores.
-
-namespace {
 
 constexpr int kVoxels = 32;
 
@@ -203,6 +191,14 @@ Result<Finding> Surfaces(const CheckContext& context) {
 }
 
 }  // namespace
+
+std::vector<Check> KernelChecks() {
+  return {
+      OnEveryTarget({"networks: products of matrices", Products}),
+      OnEveryTarget({"networks: convolutions and their gradients", DirectConvolutions}),
+      OnEveryTarget({"networks: the same by Winograd's algorithm", WinogradConvolutions}),
+  };
+}
 
 std::vector<Check> MetricChecks() {
   return {{"metrics: 3D IoU", Iou}, {"metrics: F-score and Chamfer distance", Surfaces}};

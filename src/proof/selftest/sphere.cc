@@ -141,15 +141,6 @@ Result<Finding> ReferenceIsTheComplexStep(const CheckContext& context) {
   return gauge.Found();
 }
 
-}  // namespace
-
-std::vector<Check> SphereChecks() {
-  return {OnEveryTarget({"images and gradients of a sphere, beside float64", EngineIsTheReference}),
-          {"gradients of float64, beside complex steps", ReferenceIsTheComplexStep}};
-}
-
-namespace {
-
 float Random(Rng* rng, double low, double high) {
   return static_cast<float>(rng->Uniform(low, high));
 }
@@ -225,6 +216,11 @@ void AddLight(const SphereShape& shape, Rng* rng, OwnedScene<float>* scene) {
 }
 
 }  // namespace
+
+std::vector<Check> SphereChecks() {
+  return {OnEveryTarget({"images and gradients of a sphere, beside float64", EngineIsTheReference}),
+          {"gradients of float64, beside complex steps", ReferenceIsTheComplexStep}};
+}
 
 OwnedScene<float> MakeSphere(const SphereShape& shape) {
   Rng rng(shape.seed, 20);

@@ -2,7 +2,6 @@
 #include "render/picture/composite.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "base/error.h"
 

@@ -3,7 +3,6 @@
 // centres. Not differentiable.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "render/picture/layers.h"

@@ -59,16 +59,8 @@ class AllFacesAlpha final : public AlphaStage {
   std::vector<raster::SoftMaskScratch> scratch_;  // of workers
 };
 
-}  // namespace
-
-std::unique_ptr<AlphaStage> MakeAllFacesAlpha(std::size_t workers) {
-  return std::make_unique<AllFacesAlpha>(workers);
-}
-
 // Alpha by the truncated rule of the paper's implementations (AlphaRule::kPaper,
 // raster/soft_mask/paper_ref.h): for comparisons, so scalar code. Alpha is 1 in the foreground.
-
-namespace {
 
 // dL/d(vertices of the screen), pixels.
 struct VertexSums {
@@ -169,6 +161,10 @@ class PaperAlpha final : public AlphaStage {
 };
 
 }  // namespace
+
+std::unique_ptr<AlphaStage> MakeAllFacesAlpha(std::size_t workers) {
+  return std::make_unique<AllFacesAlpha>(workers);
+}
 
 std::unique_ptr<AlphaStage> MakePaperAlpha() { return std::make_unique<PaperAlpha>(); }
 

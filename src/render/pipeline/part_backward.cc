@@ -147,61 +147,6 @@ void SumBandFaces(const BackwardInput& input, const ImageScratch& image,
   raster::FinishBand(interpolate, *sums, request, out->values);
 }
 
-}  // namespace
-
-bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
-                        const raster::BackwardRequest& request, WorkerScratch* worker,
-                        BandGradients* out) {
-  const BandPlace place(BandGrid(input.options.width, input.options.height), task);
-  const auto channels = static_cast<std::size_t>(image.attributes.channels);
-  const bool staged = input.stage != nullptr, wanted = request.geometry || request.attributes;
-  out->faces.clear();
-  if (!IsSoundBand(input, channels, place)) return false;
-  if (!staged && (input.d_frame.attributes.empty() || !wanted)) return true;
-  ++worker->stats.interpolated;
-  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
-  if (image.mesh.was_clipped()) {
-    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
-    ids = out->pieces;
-  }
-  raster::PlanarView<const float> d_out{nullptr, static_cast<std::ptrdiff_t>(place.plane),
-                                        input.options.width};
-  if (staged) {
-    if (!BandCotangents(input, image, task, place, ids, worker)) return false;
-    if (channels == 0 || !wanted) return true;
-    d_out.data = worker->d_varyings.data();
-    d_out.plane = static_cast<std::ptrdiff_t>(place.count);
-  } else {
-    d_out.data = place.Of(input.d_frame.attributes, channels, 0).data();
-  }
-  StageClock clock;
-  SumBandFaces(input, image,
-               {{ids.data(), input.options.width, 0, place.row_begin, place.row_end}, d_out},
-               request, &worker->band, out);
-  clock.Lap(&worker->times.gradients);
-  return true;
-}
-
-void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
-                       WorkerScratch* worker, BinGradients* out) {
-  const raster::SquareGrid bins = raster::BinGrid(input.options.width, input.options.height);
-  const std::size_t pixels =
-      static_cast<std::size_t>(bins.width) * static_cast<std::size_t>(bins.height);
-  const auto part = [&](auto batch) {
-    return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
-  };
-  out->clear();
-  ++worker->stats.alpha_parts;
-  input.alpha->Backward(
-      {image, bin, worker->index},
-      {part(std::span<const std::int32_t>(input.frame.face_ids)),
-       part(std::span<const float>(input.frame.alpha)),
-       part(std::span<const float>(input.frame.transmittance)), part(input.d_frame.alpha)},
-      out);
-}
-
-namespace {
-
 // Loads everything before storing anything, so that compilers see one vector.
 void AddQuad(const float* from, float* to) {
   float sum[4];
@@ -307,6 +252,57 @@ bool IsFiniteCamera(const Camera& camera) {
 }
 
 }  // namespace
+
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
+                        BandGradients* out) {
+  const BandPlace place(BandGrid(input.options.width, input.options.height), task);
+  const auto channels = static_cast<std::size_t>(image.attributes.channels);
+  const bool staged = input.stage != nullptr, wanted = request.geometry || request.attributes;
+  out->faces.clear();
+  if (!IsSoundBand(input, channels, place)) return false;
+  if (!staged && (input.d_frame.attributes.empty() || !wanted)) return true;
+  ++worker->stats.interpolated;
+  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
+  if (image.mesh.was_clipped()) {
+    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
+    ids = out->pieces;
+  }
+  raster::PlanarView<const float> d_out{nullptr, static_cast<std::ptrdiff_t>(place.plane),
+                                        input.options.width};
+  if (staged) {
+    if (!BandCotangents(input, image, task, place, ids, worker)) return false;
+    if (channels == 0 || !wanted) return true;
+    d_out.data = worker->d_varyings.data();
+    d_out.plane = static_cast<std::ptrdiff_t>(place.count);
+  } else {
+    d_out.data = place.Of(input.d_frame.attributes, channels, 0).data();
+  }
+  StageClock clock;
+  SumBandFaces(input, image,
+               {{ids.data(), input.options.width, 0, place.row_begin, place.row_end}, d_out},
+               request, &worker->band, out);
+  clock.Lap(&worker->times.gradients);
+  return true;
+}
+
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
+                       WorkerScratch* worker, BinGradients* out) {
+  const raster::SquareGrid bins = raster::BinGrid(input.options.width, input.options.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(bins.width) * static_cast<std::size_t>(bins.height);
+  const auto part = [&](auto batch) {
+    return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
+  };
+  out->clear();
+  ++worker->stats.alpha_parts;
+  input.alpha->Backward(
+      {image, bin, worker->index},
+      {part(std::span<const std::int32_t>(input.frame.face_ids)),
+       part(std::span<const float>(input.frame.alpha)),
+       part(std::span<const float>(input.frame.transmittance)), part(input.d_frame.alpha)},
+      out);
+}
 
 void SumGeometry(const ImageScratch& image, const ImageGradients& gradients,
                  AlignedVector<float>* d_vertices) {

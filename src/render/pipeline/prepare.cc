@@ -70,6 +70,22 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
   if (request.alpha != nullptr) request.alpha->Prepare(in.n, *image);
 }
 
+std::size_t VerticesOf(const PipelineScene& scene) { return scene.mesh->positions.size() / 3; }
+
+// Whether both use the same array: its numbers need no comparison.
+bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
+  return a.mesh->faces.data() == b.mesh->faces.data() &&
+         a.mesh->faces.size() == b.mesh->faces.size() && VerticesOf(a) == VerticesOf(b);
+}
+
+bool HasFacesOf(const FaceTopology& topology, const PipelineScene& scene) {
+  const std::span<const std::int32_t> faces = scene.mesh->faces;
+  return topology.id.version != 0 && topology.vertices == VerticesOf(scene) &&
+         topology.faces.size() == faces.size() &&
+         (faces.empty() ||
+          std::memcmp(topology.faces.data(), faces.data(), faces.size_bytes()) == 0);
+}
+
 }  // namespace
 
 void PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
@@ -95,26 +111,6 @@ void PrepareRecomputed(const PipelineScene& scene, ImageScratch* image) {
       InMeshLayout(scene, image->mesh, scene.recomputed, &image->clipped_recomputed);
 }
 
-namespace {
-
-std::size_t VerticesOf(const PipelineScene& scene) { return scene.mesh->positions.size() / 3; }
-
-// Whether both use the same array: its numbers need no comparison.
-bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
-  return a.mesh->faces.data() == b.mesh->faces.data() &&
-         a.mesh->faces.size() == b.mesh->faces.size() && VerticesOf(a) == VerticesOf(b);
-}
-
-bool HasFacesOf(const FaceTopology& topology, const PipelineScene& scene) {
-  const std::span<const std::int32_t> faces = scene.mesh->faces;
-  return topology.id.version != 0 && topology.vertices == VerticesOf(scene) &&
-         topology.faces.size() == faces.size() &&
-         (faces.empty() ||
-          std::memcmp(topology.faces.data(), faces.data(), faces.size_bytes()) == 0);
-}
-
-}  // namespace
-
 // Compares only adjacent scenes, so that a batch of all different meshes costs no more.
 void Topologies::Group(std::span<const PipelineScene> scenes) {
   of_scene_.resize(scenes.size());
@@ -129,7 +125,7 @@ void Topologies::Group(std::span<const PipelineScene> scenes) {
 void Topologies::Update(std::span<const PipelineScene> scenes, const Workers& workers) {
   Group(scenes);
   ++updates_;
-  workers.For(first_scene_.size(), [&](std::size_t i, std::size_t) {
+  workers.For(first_scene_.size(), [&](std::size_t i) {
     const PipelineScene& scene = scenes[first_scene_[i]];
     FaceTopology& topology = topologies_[i];
     if (HasFacesOf(topology, scene)) return;

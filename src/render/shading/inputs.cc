@@ -61,118 +61,6 @@ bool SameTexture(const shade::TextureView& a, const shade::TextureView& b) {
          a.wrap == b.wrap && a.filter == b.filter;
 }
 
-}  // namespace
-
-void ShadeInputs::PrepareTextures(std::span<const Scene> scenes) {
-  pyramid_views_.clear();
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    for (const Texture& texture : scenes[n].textures) {
-      const shade::TextureView view = shade::ViewOf(texture);
-      std::size_t i = 0;
-      while (i < pyramid_views_.size() && !SameTexture(pyramid_views_[i], view)) ++i;
-      if (i == pyramid_views_.size()) pyramid_views_.push_back(view);
-      if (i == pyramids_.size()) pyramids_.push_back(std::make_unique<shade::TexturePyramid>());
-      stage_scenes_[n].textures.push_back(pyramids_[i].get());
-    }
-  }
-  StageClock clock;
-  workers_->For(pyramid_views_.size(),
-                [&](std::size_t i, std::size_t) { pyramids_[i]->Build(pyramid_views_[i]); });
-  clock.Lap(&work_.textures_ms);
-  for (std::size_t i = 0; i < pyramid_views_.size(); ++i) {
-    const shade::LevelSize& last = pyramids_[i]->sizes().back();
-    work_.texels += static_cast<std::int64_t>(last.first + last.texels());
-  }
-}
-
-void ShadeInputs::Begin(std::span<const Scene> scenes, bool textures) {
-  work_ = {};
-  stage_scenes_.resize(scenes.size());
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    StageScene& out = stage_scenes_[n];
-    out.scene = &scenes[n];
-    SetSurfaces(scenes[n], &out);
-    SetLights(scenes[n], &out);
-    out.eye = EyeOf(scenes[n].camera);
-    out.textures.clear();
-  }
-  if (textures) PrepareTextures(scenes);
-}
-
-void ShadeInputs::FindPacks(std::span<const Scene> scenes) {
-  first_of_pack_.clear();
-  pack_of_scene_.clear();
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack_.push_back(n);
-    pack_of_scene_.push_back(first_of_pack_.size() - 1);
-  }
-  if (packs_.size() < first_of_pack_.size()) packs_.resize(first_of_pack_.size());
-}
-
-void ShadeInputs::DerivePackNormals(std::span<const Scene> scenes) {
-  StageClock clock;
-  workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
-    DeriveNormals(scenes[first_of_pack_[i]], &packs_[i].normals);
-  });
-  for (const std::size_t n : first_of_pack_) {
-    work_.normals += static_cast<std::int64_t>(scenes[n].faces.size() / 3);
-  }
-  clock.Lap(&work_.normals_ms);
-}
-
-bool ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& sets) {
-  StageClock clock;
-  std::atomic<bool> finite = true;
-  workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
-    ScenePack& pack = packs_[i];
-    const Scene& scene = scenes[first_of_pack_[i]];
-    PackVaryings(scene, sets.varyings, pack.normals, &pack.varyings);
-    if (!AllFinite(pack.varyings)) finite = false;
-    if (sets.recomputed == nullptr) return;
-    PackVaryings(scene, *sets.recomputed, pack.normals, &pack.recomputed);
-    if (!AllFinite(pack.recomputed)) finite = false;
-  });
-  for (std::size_t i = 0; i < first_of_pack_.size(); ++i) {
-    work_.packed += static_cast<std::int64_t>(packs_[i].varyings.size());
-    if (sets.recomputed == nullptr) continue;
-    work_.packed += static_cast<std::int64_t>(packs_[i].recomputed.size());
-  }
-  clock.Lap(&work_.pack_ms);
-  return finite;
-}
-
-Status ShadeInputs::Pack(std::span<const Scene> scenes, const StreamSets& sets) {
-  FindPacks(scenes);
-  if (sets.normals && scenes[0].shading.normals != Normals::kGiven) DerivePackNormals(scenes);
-  if (!PackStreams(scenes, sets)) {
-    return InvalidArgument("normals from positions overflow: the product of two edges is no float");
-  }
-  views_.clear();
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const ScenePack& pack = packs_[pack_of_scene_[n]];
-    const VaryingSet& set = sets.varyings;
-    PipelineScene view{&scenes[n], {pack.varyings, set.channels(), set.rate}};
-    view.recomputed = view.attributes;
-    if (sets.recomputed != nullptr) {
-      view.recomputed = {pack.recomputed, sets.recomputed->channels(), sets.recomputed->rate};
-    }
-    views_.push_back(view);
-  }
-  return {};
-}
-
-void ShadeInputs::UsePlain(std::span<const Scene> scenes, bool colors, bool user) {
-  views_.clear();
-  for (const Scene& s : scenes) {
-    PipelineScene view{&s, {}};
-    if (colors) view.attributes = {s.colors.values, 3, s.colors.rate};
-    if (user) view.attributes = {s.attributes.values, s.channels, s.attributes.rate};
-    views_.push_back(view);
-  }
-}
-
-namespace {
-
 enum class Rows { kVertex, kCorner, kFace };
 
 Rows RowsOf(Rate rate) { return rate == Rate::kVertex ? Rows::kVertex : Rows::kCorner; }
@@ -218,61 +106,6 @@ void ForEachRow(const Scene& scene, Rate packed, Rows rows, const Visit& visit) 
                                      : i / 3);
   }
 }
-
-}  // namespace
-
-void DeriveNormals(const Scene& scene, SceneNormals* normals) {
-  const shade::TriangleMesh mesh{scene.positions, scene.faces};
-  if (scene.shading.normals == Normals::kSmooth) shade::SmoothNormals(mesh, normals);
-  if (scene.shading.normals == Normals::kFlat) shade::FlatNormals(mesh, normals);
-}
-
-void PackVaryings(const Scene& scene, const VaryingSet& set, const SceneNormals& normals,
-                  AlignedVector<float>* out) {
-  const auto channels = static_cast<std::size_t>(set.channels());
-  out->resize(PackedRows(scene, set) * channels);
-  if (out->empty()) return;
-  for (std::size_t i = 0; i < kVaryings; ++i) {
-    const auto what = static_cast<Varying>(i);
-    if (!set[what]) continue;
-    const Source source = SourceOf(scene, normals, what);
-    const auto width = static_cast<std::size_t>(set.width(what));
-    const float scale = StreamScale(scene, what);
-    float* const to = out->data() + set.first(what);
-    ForEachRow(scene, set.rate, source.rows, [&](std::size_t row, std::size_t from) {
-      for (std::size_t c = 0; c < width; ++c) {
-        to[row * channels + c] = scale * source.values[from * source.stride + c];
-      }
-    });
-  }
-}
-
-void AddStream(const Scene& scene, const VaryingSet& set, Varying what,
-               std::span<const float> packed, std::span<float> stream) {
-  if (packed.empty()) return;
-  const auto channels = static_cast<std::size_t>(set.channels());
-  const auto width = static_cast<std::size_t>(set.width(what));
-  const float scale = StreamScale(scene, what);
-  const float* const from = packed.data() + set.first(what);
-  const Rows rows = RowsOfStream(scene, StreamOf(scene, what));
-  ForEachRow(scene, set.rate, rows, [&](std::size_t row, std::size_t to) {
-    for (std::size_t c = 0; c < width; ++c) {
-      stream[to * width + c] += scale * from[row * channels + c];
-    }
-  });
-}
-
-void AddNormalsAdjoint(const Scene& scene, const SceneNormals& normals,
-                       std::span<shade::Vec3<float>> d_units, std::span<float> d_positions) {
-  const shade::TriangleMesh mesh{scene.positions, scene.faces};
-  if (scene.shading.normals == Normals::kSmooth) {
-    shade::SmoothNormalsAdjoint(mesh, normals, d_units, d_positions);
-  } else if (scene.shading.normals == Normals::kFlat) {
-    shade::FlatNormalsAdjoint(mesh, normals, d_units, d_positions);
-  }
-}
-
-namespace {
 
 template <std::size_t kSize>
 void AddAll(const std::array<double, kSize>& from, std::array<float, kSize>& to) {
@@ -361,6 +194,165 @@ void AddSh(const StageScene& scene, const SceneSums& sums, std::span<float> d_sh
 
 }  // namespace
 
+void ShadeInputs::PrepareTextures(std::span<const Scene> scenes) {
+  pyramid_views_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    for (const Texture& texture : scenes[n].textures) {
+      const shade::TextureView view = shade::ViewOf(texture);
+      std::size_t i = 0;
+      while (i < pyramid_views_.size() && !SameTexture(pyramid_views_[i], view)) ++i;
+      if (i == pyramid_views_.size()) pyramid_views_.push_back(view);
+      if (i == pyramids_.size()) pyramids_.push_back(std::make_unique<shade::TexturePyramid>());
+      stage_scenes_[n].textures.push_back(pyramids_[i].get());
+    }
+  }
+  StageClock clock;
+  workers_->For(pyramid_views_.size(),
+                [&](std::size_t i) { pyramids_[i]->Build(pyramid_views_[i]); });
+  clock.Lap(&work_.textures_ms);
+  for (std::size_t i = 0; i < pyramid_views_.size(); ++i) {
+    const shade::LevelSize& last = pyramids_[i]->sizes().back();
+    work_.texels += static_cast<std::int64_t>(last.first + last.texels());
+  }
+}
+
+void ShadeInputs::Begin(std::span<const Scene> scenes, bool textures) {
+  work_ = {};
+  stage_scenes_.resize(scenes.size());
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    StageScene& out = stage_scenes_[n];
+    out.scene = &scenes[n];
+    SetSurfaces(scenes[n], &out);
+    SetLights(scenes[n], &out);
+    out.eye = EyeOf(scenes[n].camera);
+    out.textures.clear();
+  }
+  if (textures) PrepareTextures(scenes);
+}
+
+void ShadeInputs::FindPacks(std::span<const Scene> scenes) {
+  first_of_pack_.clear();
+  pack_of_scene_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack_.push_back(n);
+    pack_of_scene_.push_back(first_of_pack_.size() - 1);
+  }
+  if (packs_.size() < first_of_pack_.size()) packs_.resize(first_of_pack_.size());
+}
+
+void ShadeInputs::DerivePackNormals(std::span<const Scene> scenes) {
+  StageClock clock;
+  workers_->For(first_of_pack_.size(), [&](std::size_t i) {
+    DeriveNormals(scenes[first_of_pack_[i]], &packs_[i].normals);
+  });
+  for (const std::size_t n : first_of_pack_) {
+    work_.normals += static_cast<std::int64_t>(scenes[n].faces.size() / 3);
+  }
+  clock.Lap(&work_.normals_ms);
+}
+
+bool ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& sets) {
+  StageClock clock;
+  std::atomic<bool> finite = true;
+  workers_->For(first_of_pack_.size(), [&](std::size_t i) {
+    ScenePack& pack = packs_[i];
+    const Scene& scene = scenes[first_of_pack_[i]];
+    PackVaryings(scene, sets.varyings, pack.normals, &pack.varyings);
+    if (!AllFinite(pack.varyings)) finite = false;
+    if (sets.recomputed == nullptr) return;
+    PackVaryings(scene, *sets.recomputed, pack.normals, &pack.recomputed);
+    if (!AllFinite(pack.recomputed)) finite = false;
+  });
+  for (std::size_t i = 0; i < first_of_pack_.size(); ++i) {
+    work_.packed += static_cast<std::int64_t>(packs_[i].varyings.size());
+    if (sets.recomputed == nullptr) continue;
+    work_.packed += static_cast<std::int64_t>(packs_[i].recomputed.size());
+  }
+  clock.Lap(&work_.pack_ms);
+  return finite;
+}
+
+Status ShadeInputs::Pack(std::span<const Scene> scenes, const StreamSets& sets) {
+  FindPacks(scenes);
+  if (sets.normals && scenes[0].shading.normals != Normals::kGiven) DerivePackNormals(scenes);
+  if (!PackStreams(scenes, sets)) {
+    return InvalidArgument("normals from positions overflow: the product of two edges is no float");
+  }
+  views_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    const ScenePack& pack = packs_[pack_of_scene_[n]];
+    const VaryingSet& set = sets.varyings;
+    PipelineScene view{&scenes[n], {pack.varyings, set.channels(), set.rate}};
+    view.recomputed = view.attributes;
+    if (sets.recomputed != nullptr) {
+      view.recomputed = {pack.recomputed, sets.recomputed->channels(), sets.recomputed->rate};
+    }
+    views_.push_back(view);
+  }
+  return {};
+}
+
+void ShadeInputs::UsePlain(std::span<const Scene> scenes, bool colors, bool user) {
+  views_.clear();
+  for (const Scene& s : scenes) {
+    PipelineScene view{&s, {}};
+    if (colors) view.attributes = {s.colors.values, 3, s.colors.rate};
+    if (user) view.attributes = {s.attributes.values, s.channels, s.attributes.rate};
+    views_.push_back(view);
+  }
+}
+
+void DeriveNormals(const Scene& scene, SceneNormals* normals) {
+  const shade::TriangleMesh mesh{scene.positions, scene.faces};
+  if (scene.shading.normals == Normals::kSmooth) shade::SmoothNormals(mesh, normals);
+  if (scene.shading.normals == Normals::kFlat) shade::FlatNormals(mesh, normals);
+}
+
+void PackVaryings(const Scene& scene, const VaryingSet& set, const SceneNormals& normals,
+                  AlignedVector<float>* out) {
+  const auto channels = static_cast<std::size_t>(set.channels());
+  out->resize(PackedRows(scene, set) * channels);
+  if (out->empty()) return;
+  for (std::size_t i = 0; i < kVaryings; ++i) {
+    const auto what = static_cast<Varying>(i);
+    if (!set[what]) continue;
+    const Source source = SourceOf(scene, normals, what);
+    const auto width = static_cast<std::size_t>(set.width(what));
+    const float scale = StreamScale(scene, what);
+    float* const to = out->data() + set.first(what);
+    ForEachRow(scene, set.rate, source.rows, [&](std::size_t row, std::size_t from) {
+      for (std::size_t c = 0; c < width; ++c) {
+        to[row * channels + c] = scale * source.values[from * source.stride + c];
+      }
+    });
+  }
+}
+
+void AddStream(const Scene& scene, const VaryingSet& set, Varying what,
+               std::span<const float> packed, std::span<float> stream) {
+  if (packed.empty()) return;
+  const auto channels = static_cast<std::size_t>(set.channels());
+  const auto width = static_cast<std::size_t>(set.width(what));
+  const float scale = StreamScale(scene, what);
+  const float* const from = packed.data() + set.first(what);
+  const Rows rows = RowsOfStream(scene, StreamOf(scene, what));
+  ForEachRow(scene, set.rate, rows, [&](std::size_t row, std::size_t to) {
+    for (std::size_t c = 0; c < width; ++c) {
+      stream[to * width + c] += scale * from[row * channels + c];
+    }
+  });
+}
+
+void AddNormalsAdjoint(const Scene& scene, const SceneNormals& normals,
+                       std::span<shade::Vec3<float>> d_units, std::span<float> d_positions) {
+  const shade::TriangleMesh mesh{scene.positions, scene.faces};
+  if (scene.shading.normals == Normals::kSmooth) {
+    shade::SmoothNormalsAdjoint(mesh, normals, d_units, d_positions);
+  } else if (scene.shading.normals == Normals::kFlat) {
+    shade::FlatNormalsAdjoint(mesh, normals, d_units, d_positions);
+  }
+}
+
 std::span<PipelineGradients> GradientMerge::Begin(const BackwardPlan& plan,
                                                   std::span<const PipelineScene> views,
                                                   const Targets& targets) {
@@ -384,10 +376,10 @@ void GradientMerge::Run(const Batch& batch) {
     if (d.camera != nullptr) *d.camera = d_views_[n].d_camera;
   }
   if (batch.plan.staged()) {
-    workers_->For(count, [&](std::size_t n, std::size_t) { AddToPositions(batch, n); });
+    workers_->For(count, [&](std::size_t n) { AddToPositions(batch, n); });
   }
   const auto arrays = batch.targets.arrays();
-  workers_->For(arrays.size(), [&](std::size_t i, std::size_t) { FillArray(batch, arrays[i]); });
+  workers_->For(arrays.size(), [&](std::size_t i) { FillArray(batch, arrays[i]); });
   if (batch.stage == nullptr) return;
   MergeUniforms(batch);
   if (batch.plan.to_texture) MergeTextures(batch);
@@ -467,11 +459,10 @@ void GradientMerge::FindTextures(const Batch& batch) {
 // Sums each texel in the order of scenes, bands and pixels, whatever the number of parts.
 void GradientMerge::MergeTextures(const Batch& batch) {
   FindTextures(batch);
-  workers_->For(textures_.size(), [&](std::size_t i, std::size_t) {
-    texture_gradients_[i]->Clear(*textures_[i].pyramid);
-  });
-  const std::size_t parts = textures_.size() >= static_cast<std::size_t>(workers_->count()) ? 1 : 4;
-  workers_->For(textures_.size() * parts, [&](std::size_t task, std::size_t) {
+  workers_->For(textures_.size(),
+                [&](std::size_t i) { texture_gradients_[i]->Clear(*textures_[i].pyramid); });
+  const std::size_t parts = textures_.size() >= workers_->size() ? 1 : 4;
+  workers_->For(textures_.size() * parts, [&](std::size_t task) {
     const shade::RowShare rows{static_cast<int>(task % parts), static_cast<int>(parts)};
     for (const Targets::Target& target : textures_[task / parts].array) {
       for (const StageBand& band : batch.stage->bands(target.scene)) {
@@ -479,7 +470,7 @@ void GradientMerge::MergeTextures(const Batch& batch) {
       }
     }
   });
-  workers_->For(textures_.size(), [&](std::size_t i, std::size_t) {
+  workers_->For(textures_.size(), [&](std::size_t i) {
     texture_gradients_[i]->Finish(textures_[i].array.front().out);
   });
 }

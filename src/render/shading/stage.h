@@ -4,7 +4,6 @@
 // the interpolated values, and sums per band.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>

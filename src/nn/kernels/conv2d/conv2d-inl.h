@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward convolution and its input gradient, each expressed as a ConvProduct.
 
-#if defined(TILEGRAD_NN_KERNELS_CONV2D_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_KERNELS_CONV2D_INL_H_
-#undef TILEGRAD_NN_KERNELS_CONV2D_INL_H_
-#else
-#define TILEGRAD_NN_KERNELS_CONV2D_INL_H_
-#endif
-
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstddef>
 
 #include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/conv2d/product-inl.h"
@@ -115,11 +107,11 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
                            std::size_t* offsets) {
   ConvWork work(p);
   const std::size_t weight_size = RoundUp(p.rows * p.channels * p.tap_count(), kAlignment);
-  work.packed_weight = context.scratch.Floats(
-      weight_size + work.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  work.packed_weight =
+      context.scratch.Floats(weight_size + work.worker_size() * context.workers.size());
   work.offsets = offsets;
   FillConvOffsets(p, work);
-  context.workers.For(work.panels.count(), [&](std::size_t panel, std::size_t) {
+  context.workers.For(work.panels.count(), [&](std::size_t panel) {
     for (std::size_t block = 0; block < work.blocks.count(); ++block) {
       for (std::size_t phase = 0; phase < p.taps.phases; ++phase) {
         PackConvWeights(p, work, panel, block, phase,
@@ -137,7 +129,7 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
 // several workers about four items each, for load balance, unless those would be so small that
 // overhead dominates.
 inline std::size_t PiecePixels(std::size_t pixels, std::size_t most, const KernelContext& context) {
-  const auto workers = static_cast<std::size_t>(context.workers.count());
+  const auto workers = context.workers.size();
   if (workers == 1) return most;
   const std::size_t least = kConvPixels / (workers > kFewWorkers ? 16 : 4);
   return std::clamp(pixels / (4 * workers), least, most);
@@ -376,18 +368,14 @@ void Conv2dWeightGradTarget(const Conv2dShape& s, const float* x, const float* d
   FillWeightGradOffsets(plan, offsets);
   plan.offsets = offsets;
   const std::size_t sums_size = RoundUp(plan.item_count() * plan.sums_size(), kAlignment);
-  float* sums = context.scratch.Floats(
-      sums_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  float* sums = context.scratch.Floats(sums_size + plan.worker_size() * context.workers.size());
   context.workers.For(plan.item_count(), [&](std::size_t item, std::size_t worker) {
     RunWeightGradItem(plan, item, sums + item * plan.sums_size(),
                       sums + sums_size + worker * plan.worker_size());
   });
-  context.workers.For(plan.blocks_count(), [&](std::size_t index, std::size_t) {
-    FinishWeightGrad(plan, index, sums, d_weight);
-  });
+  context.workers.For(plan.blocks_count(),
+                      [&](std::size_t index) { FinishWeightGrad(plan, index, sums, d_weight); });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

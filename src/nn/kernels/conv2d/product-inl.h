@@ -6,13 +6,6 @@
 // With stride s the pixels of the input gradient fall into s x s phases, each with its own taps;
 // the forward pass has one phase of all taps.
 
-#if defined(TILEGRAD_NN_KERNELS_CONV2D_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_KERNELS_CONV2D_PRODUCT_INL_H_
-#undef TILEGRAD_NN_KERNELS_CONV2D_PRODUCT_INL_H_
-#else
-#define TILEGRAD_NN_KERNELS_CONV2D_PRODUCT_INL_H_
-#endif
-
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -420,5 +413,3 @@ inline void RunConvPiece(const ConvProduct& p, const ConvWork& work, const Batch
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

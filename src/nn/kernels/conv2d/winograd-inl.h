@@ -2,13 +2,6 @@
 // The three passes of winograd.h. Each processes some rows of tiles at a time: transform, one
 // product per slot, inverse transform.
 
-#if defined(TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_
-#undef TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_
-#else
-#define TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_
-#endif
-
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -68,7 +61,7 @@ inline PortionCut OwnPortions(const WinogradPlan& plan, std::size_t unit, std::s
 // since starting loops together then costs more than waiting for the last. Shared portions grow
 // with the number of workers, as do their caches.
 inline PortionCut PortionsFor(const WinogradPlan& plan, std::size_t unit, const Workers& workers) {
-  const auto count = static_cast<std::size_t>(workers.count());
+  const auto count = workers.size();
   const std::size_t most = MostOwnPortions(plan, unit);
   const std::size_t least = count > 1 && count <= kFewWorkers ? 2 * count : count;
   if (most >= least) return OwnPortions(plan, unit, RoundUp(most, count));
@@ -123,7 +116,7 @@ struct WinogradMemory {
                                 portions.input.plan.slots() * kTileColumns * portions.largest.pitch,
                             kAlignment)),
         places_size(PlacesOfWorker(portions)) {
-    const auto count = static_cast<std::size_t>(context.workers.count());
+    const auto count = context.workers.size();
     const std::size_t first = RoundUp(weights_size, kAlignment);
     const std::size_t all_values = (portions.cut.own ? count : 1) * values_size;
     weights = context.scratch.Floats(first + all_values + count * places_size);
@@ -149,7 +142,7 @@ struct WinogradMemory {
 struct SharedLoops {
   const Workers& workers;
   static constexpr std::size_t owner = 0;
-  std::size_t workers_sharing() const { return static_cast<std::size_t>(workers.count()); }
+  std::size_t workers_sharing() const { return workers.size(); }
   template <class Task>
   void For(std::size_t n, const Task& task, LoopSite site = LoopSite::Here()) const {
     workers.For(n, task, site);
@@ -307,16 +300,13 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
   });
   const Panels channels(s.in_channels, kFinishedChannels);
   if (own) {
-    context.workers.ForRanges(
-        sums_size, kMergedValues,
-        [&](std::size_t begin, std::size_t end, std::size_t) { sums.Merge(begin, end); });
+    context.workers.ForRanges(sums_size, kMergedValues,
+                              [&](std::size_t begin, std::size_t end) { sums.Merge(begin, end); });
   }
-  context.workers.For(sums.panels * channels.count(), [&](std::size_t index, std::size_t) {
+  context.workers.For(sums.panels * channels.count(), [&](std::size_t index) {
     FinishWeightGrad(sums, index % sums.panels, channels.range(index / sums.panels), d_weight);
   });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The products of winograd.h, one per slot, and the inverse transform of the weight gradient.
 
-#if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
-#undef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
-#else
-#define TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
-#endif
-
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -112,7 +105,7 @@ struct PackedWinogradWeights {
 
   void Fill(const float* weight, float* packed, const Workers& workers) const {
     const Panels strips(depth.channels(), kStepsAtATime);
-    workers.For(panels.count() * strips.count(), [&](std::size_t index, std::size_t) {
+    workers.For(panels.count() * strips.count(), [&](std::size_t index) {
       FillStrip(weight, index / strips.count(), strips.range(index % strips.count()), packed);
     });
   }
@@ -278,7 +271,7 @@ void MultiplySlots(const SlotProduct& p, const Loops& loops) {
   const SlotItems items(p, loops.workers_sharing());
   const Panels columns = items.columns();
   const std::size_t most = items.most_blocks();
-  loops.For(items.count(), [&](std::size_t index, std::size_t) {
+  loops.For(items.count(), [&](std::size_t index) {
     const std::size_t slot = index / (most * columns.count());
     const std::size_t block = index / columns.count() % most, column = index % columns.count();
     const Panels blocks = items.blocks(slot);
@@ -351,7 +344,7 @@ struct WinogradCorrelation {
     for (std::size_t slot = 0; slot < input.plan.slots(); ++slot) {
       most = std::max(most, DivideUp(input.size(slot), item_rows));
     }
-    loops.For(input.plan.slots() * most * groups, [&](std::size_t index, std::size_t) {
+    loops.For(input.plan.slots() * most * groups, [&](std::size_t index) {
       const std::size_t slot = index / groups / most, block = index / groups % most;
       const std::size_t panel = index % groups * item_panels;
       const Panels blocks(input.size(slot), item_rows);
@@ -482,5 +475,3 @@ inline void FinishWeightGrad(const WeightSumGroups& groups, std::size_t panel, P
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per-target include guard

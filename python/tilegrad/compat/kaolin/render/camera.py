@@ -410,17 +410,17 @@ class Camera:
     @classmethod
     def cat(cls, cameras: Sequence[Camera]) -> Camera:
         """All of them, in images as those of the first."""
-        lens = cameras[0].intrinsics
-        params = torch.cat([camera.params for camera in cameras])
-        return cls(CameraExtrinsics(torch.cat([camera.view_matrix() for camera in cameras])),
-                   PinholeIntrinsics(lens.width, lens.height, params, lens.near, lens.far))
+        return cameras[0]._with(torch.cat([camera.view_matrix() for camera in cameras]),
+                                torch.cat([camera.params for camera in cameras]))
 
     def to(self, *args: Any, **kwargs: Any) -> Camera:
         """A camera of another dtype or device, as by torch.Tensor.to."""
+        return self._with(self.view_matrix().to(*args, **kwargs), self.params.to(*args, **kwargs))
+
+    def _with(self, view: torch.Tensor, params: torch.Tensor) -> Camera:
         lens = self.intrinsics
-        return Camera(CameraExtrinsics(self.view_matrix().to(*args, **kwargs)),
-                      PinholeIntrinsics(lens.width, lens.height,
-                                        lens.params.to(*args, **kwargs), lens.near, lens.far))
+        return Camera(CameraExtrinsics(view),
+                      PinholeIntrinsics(lens.width, lens.height, params, lens.near, lens.far))
 
     def float(self) -> Camera:
         """The camera in float32."""
@@ -450,10 +450,7 @@ class Camera:
             if not -len(self) <= item < len(self):
                 raise IndexError(f"Camera: item {item} of {len(self)}")
             item = slice(item, item + 1 or None)
-        lens = self.intrinsics
-        return Camera(CameraExtrinsics(self.view_matrix()[item]),
-                      PinholeIntrinsics(lens.width, lens.height, lens.params[item], lens.near,
-                                        lens.far))
+        return self._with(self.view_matrix()[item], self.params[item])
 
     def __len__(self) -> int:
         return len(self.extrinsics)
