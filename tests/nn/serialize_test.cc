@@ -30,21 +30,14 @@ class Safetensors : public ::testing::Test {
   Context context_{workers_};
 };
 
-// {"b":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}} padded to 56 bytes, then 1.0f and -2.5f:
-// written out by hand from the format's description.
-const std::uint8_t kByHand[] = {
-    0x38, 0,    0,    0,    0,    0,    0,    0,                             // header: 56 bytes
-    0x7b, 0x22, 0x62, 0x22, 0x3a, 0x7b, 0x22, 0x64, 0x74, 0x79, 0x70, 0x65,  // {"b":{"dtype
-    0x22, 0x3a, 0x22, 0x46, 0x33, 0x32, 0x22, 0x2c, 0x22, 0x73, 0x68, 0x61,  // ":"F32","sha
-    0x70, 0x65, 0x22, 0x3a, 0x5b, 0x32, 0x5d, 0x2c, 0x22, 0x64, 0x61, 0x74,  // pe":[2],"dat
-    0x61, 0x5f, 0x6f, 0x66, 0x66, 0x73, 0x65, 0x74, 0x73, 0x22, 0x3a, 0x5b,  // a_offsets":[
-    0x30, 0x2c, 0x38, 0x5d, 0x7d, 0x7d, 0x20, 0x20,  // 0,8]}} and two spaces
-    0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x20, 0xc0};
+// Written out by hand from the format's description; spaces to a multiple of 8 bytes.
+const char* kByHand = R"({"b":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}}  )";
 
 TEST_F(Safetensors, WritesTheBytesOfAFileWrittenByHand) {
   const std::vector<float> values = {1.0f, -2.5f};
-  const auto bytes = EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}});
-  EXPECT_EQ(bytes.value(), Bytes(std::begin(kByHand), std::end(kByHand)));
+  Bytes by_hand = File(kByHand, 8);
+  std::memcpy(&by_hand[64], values.data(), 8);
+  EXPECT_EQ(EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}}).value(), by_hand);
 }
 
 // What the format's own implementation writes and reads (huggingface/safetensors): the bytes that
@@ -156,7 +149,7 @@ TEST_F(Safetensors, NumbersBeyondHalvesAreRefused) {
 }
 
 TEST_F(Safetensors, EveryCutIsNoticed) {
-  const Bytes whole(std::begin(kByHand), std::end(kByHand));
+  const Bytes whole = File(kByHand, 8);
   for (std::size_t n = 0; n < whole.size(); ++n) {
     EXPECT_EQ(Decode(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n))).code(),
               StatusCode::kDataLoss)
@@ -257,12 +250,6 @@ TEST_F(Safetensors, HeadersThatNoReaderTakesAreNotWritten) {
   const auto bytes = EncodeSafetensors(file);
   ASSERT_FALSE(bytes.ok());
   ExpectIn(bytes.status().message(), "at most");
-}
-
-TEST_F(Safetensors, TensorsWithoutElements) {
-  const Bytes bytes = EncodeSafetensors({{{"a", context_.Zeros({0, 300})}}, {}}).value();
-  const auto back = Ok(DecodeSafetensors(context_, bytes));
-  EXPECT_EQ(back->tensors[0].value.shape(), (Shape{0, 300}));
 }
 
 // Time must grow linearly with the number of tensors: quadratic time took minutes here, and a

@@ -91,13 +91,6 @@ class Conventions(unittest.TestCase):
         nearest = dr.texture(tex, uv.reshape(1, 1, 4, 2), filter_mode="nearest")
         self.assertEqual(nearest.flatten().tolist()[:3], [1, 2, 3])
 
-    def test_cube_maps(self):
-        tex = torch.arange(6.0).reshape(1, 6, 1, 1, 1)
-        uv = torch.tensor([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1],
-                           [0, 0, 0]], dtype=torch.float32)
-        out = dr.texture(tex, uv.reshape(1, 1, 7, 3), filter_mode="nearest", boundary_mode="cube")
-        self.assertEqual(out.flatten().tolist(), [0, 1, 2, 3, 4, 5, 0])
-
 
 class Modes(unittest.TestCase):
     def setUp(self):

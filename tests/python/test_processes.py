@@ -127,11 +127,6 @@ class Forks(unittest.TestCase):
             self.assertTrue(in_child(same))
             self.assertTrue(same())
 
-    def test_children_of_children(self):
-        renderer = Renderer(threads=2)
-        expected = step(renderer)
-        self.assertTrue(in_child(lambda: in_child(lambda: step(renderer) == expected)))
-
     def test_children_that_leave_as_programs_do(self):
         """By the end of the script, with everything that Python and the libraries do then."""
         code = """
@@ -172,19 +167,6 @@ if child:
         with multiprocessing.get_context("fork").Pool(2) as pool:
             got = pool.map_async(rendered_by_pool, range(8), chunksize=1).get(timeout=120)
         self.assertEqual(got, expected)
-
-    def test_deleting_the_parents_renderer(self):
-        renderer = Renderer(threads=2)
-        step(renderer)
-        frames = [renderer.render(patch(), **IMAGE)]
-
-        def delete():
-            nonlocal renderer
-            frames.clear()
-            renderer = None
-            return True
-
-        self.assertTrue(in_child(delete))
 
 
 class FewThreads(unittest.TestCase):
@@ -361,13 +343,6 @@ class Memory(unittest.TestCase):
         for name, (view, copy) in kept.items():
             self.assertTrue(np.array_equal(view, copy), name)
         self.assertTrue(np.array_equal(shared, kept["color"][1]))
-
-    def test_frames_are_independent(self):
-        renderer = Renderer()
-        frames = [renderer.render(patch(seed=seed), **IMAGE) for seed in range(5)]
-        for seed, frame in enumerate(frames):
-            self.assertTrue(np.array_equal(frame.color,
-                                           Renderer().render(patch(seed=seed), **IMAGE).color))
 
     def test_a_frame_keeps_its_scene(self):
         """backward reads the scene's arrays, long after anybody else has forgotten them."""

@@ -168,11 +168,6 @@ def extension(name):
     return importlib.import_module(f"tilegrad.{name}")
 
 
-class Types(unittest.TestCase):
-    def test_the_package_is_typed(self):
-        self.assertTrue((PACKAGE / "py.typed").exists())
-
-
 class Docstrings(unittest.TestCase):
     def documented(self, value, name):
         self.assertTrue(inspect.getdoc(value), f"{name} has no docstring")

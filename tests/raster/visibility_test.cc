@@ -151,18 +151,22 @@ TEST_P(VisibilityOnEveryTarget, EveryPixelOfATriangulatedRectangleIsCoveredExact
   }
 }
 
+// With corners of up to `size` away from its middle, at any depth.
+void AddTriangle(double x, double y, double size, Rng* rng, Flat* flat) {
+  std::int32_t v[3];
+  for (auto& index : v) {
+    index = flat->Vertex(x + rng->Uniform(-size, size), y + rng->Uniform(-size, size),
+                         rng->Uniform(1, 3));
+  }
+  flat->AddFace(v[0], v[1], v[2]);
+}
+
 // Triangles of every size, some far off-screen, many overlapping.
 Flat RandomTriangles(int count, double spread, Rng* rng, int width = 45, int height = 39) {
   Flat flat(width, height);
   for (int f = 0; f < count; ++f) {
     const double cx = rng->Uniform(-5, width + 5), cy = rng->Uniform(-5, height + 6);
-    const double size = spread * std::pow(10, rng->Uniform(-2, 0));
-    std::int32_t v[3];
-    for (auto& index : v) {
-      index = flat.Vertex(cx + rng->Uniform(-size, size), cy + rng->Uniform(-size, size),
-                          rng->Uniform(1, 3));
-    }
-    flat.AddFace(v[0], v[1], v[2]);
+    AddTriangle(cx, cy, spread * std::pow(10, rng->Uniform(-2, 0)), rng, &flat);
   }
   return flat;
 }
@@ -188,13 +192,7 @@ TEST_P(VisibilityOnEveryTarget, SmallFacesEqualTheReferenceAcrossBins) {
     const int count = 40 + width * height / 15;
     for (int f = 0; f < count; ++f) {
       const double cx = rng.Uniform(-2, width + 2), cy = rng.Uniform(-2, height + 2);
-      const double size = rng.Uniform(0.1, 3.5);
-      std::int32_t v[3];
-      for (auto& index : v) {
-        index = flat.Vertex(cx + rng.Uniform(-size, size), cy + rng.Uniform(-size, size),
-                            rng.Uniform(1, 3));
-      }
-      flat.AddFace(v[0], v[1], v[2]);
+      AddTriangle(cx, cy, rng.Uniform(0.1, 3.5), &rng, &flat);
     }
     const ScreenMesh mesh = flat.Finish();
     EXPECT_EQ(Visible(mesh), VisibleRef(mesh)) << width << " x " << height;
@@ -279,18 +277,6 @@ TEST_P(VisibilityOnEveryTarget, CoincidingFacesShowTheLowerId) {
     covered += id >= 0;
   }
   EXPECT_GT(covered, 1000u);
-}
-
-TEST_P(VisibilityOnEveryTarget, NearestWinsWhateverTheOrder) {
-  for (const bool near_first : {true, false}) {
-    Flat flat(40, 40);
-    for (const double depth : {near_first ? 1.0 : 2.0, near_first ? 2.0 : 1.0}) {
-      const auto a = flat.Vertex(-100, -100, depth), b = flat.Vertex(200, -100, depth),
-                 c = flat.Vertex(-100, 200, depth);
-      flat.AddFace(a, b, c);
-    }
-    for (const std::int32_t id : Visible(flat.Finish())) EXPECT_EQ(id, near_first ? 0 : 1);
-  }
 }
 
 TEST_P(VisibilityOnEveryTarget, CentreOnTheDiagonalBelongsToTheFaceWhoseLeftEdgeItIs) {

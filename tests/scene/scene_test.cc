@@ -201,16 +201,6 @@ TEST(Camera, RotationsAreOrthonormalAndLookAtTheOrigin) {
   }
 }
 
-TEST(Camera, LookAtEqualsOrbit) {
-  const Camera orbit = OrbitCamera(Lens{}, 30, 20, 2);
-  float eye[3] = {};
-  for (int k = 0; k < 3; ++k) eye[k] = 2 * orbit.rotation[6 + k];
-  const float target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
-  const Camera look = LookAtCamera(Lens{}, eye, target, up);
-  for (int i = 0; i < 9; ++i) EXPECT_NEAR(look.rotation[i], orbit.rotation[i], 1e-6);
-  EXPECT_NEAR(orbit.fx, 32 * 2.1875, 1e-4);  // f = 35/16
-}
-
 // However short the way to the target and `up` are, they have directions.
 TEST(Camera, LooksFromAnyDistance) {
   for (const double scale : {1e-300, 1e-170, 1.0, 1e170, 1e300}) {

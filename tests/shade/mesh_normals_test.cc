@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Normals and light that are known without a formula. Adjoints: render/renderer_gradients_test.cc.
+// Normals that are known without a formula. Adjoints: render/renderer_gradients_test.cc.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <vector>
 
 #include "base/rng.h"
-#include "shade/lambert_ref.h"
 #include "shade/mesh_normals_ref.h"
 
 namespace tilegrad::shade::mesh_normals_test {
@@ -89,22 +87,3 @@ TEST(MeshNormals, BothSidesOfASheetHaveNoSmoothNormal) {
 }
 
 }  // namespace tilegrad::shade::mesh_normals_test
-
-namespace tilegrad::shade::lambert_test {
-
-constexpr std::array<LightT<double>, 2> kLights = {{{{0, 1, 0}, 0.5}, {{0.6, 0, 0.8}, 0.25}}};
-
-TEST(Lambert, FacingLightAddsItsIntensityAndAvertedOneNothing) {
-  const LambertLightT<double> light{0.3, kLights};
-  EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0, 1, 0}), 0.8);
-  EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0, -1, 0}), 0.3);
-  EXPECT_DOUBLE_EQ(LambertRef<double>(light, {0.6, 0, 0.8}), 0.55);
-}
-
-TEST(Lambert, AvertedLightPullsNothing) {
-  std::array<double, 3> d_n = {};
-  LambertAdjointRef<double>({0.3, kLights}, {-0.6, -0.8, 0}, 1.0, d_n, {});
-  for (double d : d_n) EXPECT_EQ(d, 0.0);
-}
-
-}  // namespace tilegrad::shade::lambert_test

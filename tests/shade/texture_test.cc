@@ -34,21 +34,6 @@ std::vector<T> Sample(const TextureViewT<T>& texture, T u, T v) {
   return color;
 }
 
-TEST(Texture, CentreOfATexelIsTheTexel) {
-  const auto texels = RandomTexels();
-  for (int i = 0; i < kHeight; ++i) {
-    for (int j = 0; j < kWidth; ++j) {
-      const auto color =
-          Sample(View(texels, Wrap::kRepeat), (j + 0.5) / kWidth, 1.0 - (i + 0.5) / kHeight);
-      // u * W is within two roundings of j + 0.5, times the largest difference of texels (1).
-      for (int c = 0; c < kChannels; ++c) {
-        EXPECT_NEAR(color[static_cast<std::size_t>(c)],
-                    texels[static_cast<std::size_t>((i * kWidth + j) * kChannels + c)], 4e-15);
-      }
-    }
-  }
-}
-
 constexpr Wrap kWays[] = {Wrap::kRepeat, Wrap::kClamp, Wrap::kMirror};
 
 // Nine ways, each along its own axis: what it makes of u is what it makes of u alone.

@@ -58,29 +58,6 @@ void ExpectNear(const Vector& got, const Json& expected, const std::string& what
   }
 }
 
-// The expected numbers are whole or quarters by construction.
-TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
-  TILEGRAD_VECTORS_OR_SKIP(json, "05_texture_mapping.json");
-  const Json& textures = json.at("kaolin_test_texture");
-  for (const Filter filter : {Filter::kNearest, Filter::kBilinear}) {
-    const std::string name = filter == Filter::kNearest ? "nearest" : "bilinear";
-    for (std::size_t b = 0; b < textures.size(); ++b) {
-      const OwnedTexture texture(Json::array({textures[b]}), Wrap::kClamp, filter);
-      const auto check = [&](const Json& uvs, const Json& expected, const char* what) {
-        for (std::size_t i = 0; i < uvs.size(); ++i) {
-          EXPECT_NEAR(Sample(texture, uvs[i])[0], expected[i].get<double>(), 1e-10)
-              << what << " " << name << " " << b << " " << i;
-        }
-      };
-      check(json.at("kaolin_test_sparse_uv")[b], json.at("kaolin_test_sparse_" + name)[b],
-            "sparse");
-      for (const Json& row : json.at("kaolin_test_dense_uv")[b]) {
-        check(row, json.at("kaolin_test_dense_" + name + "_both_rows")[b], "dense");
-      }
-    }
-  }
-}
-
 TEST(VectorsTexture, ClampedWithCentresInside) {
   TILEGRAD_VECTORS_OR_SKIP(json, "05_texture_mapping.json");
   const Json &expected = json.at("clamp_align_false_border"), &uvs = json.at("random_uv");
@@ -156,19 +133,6 @@ TEST(VectorsHarmonics, GradientsOfIrradiance) {
              kPrinted);
 }
 
-// Light from one direction: its coefficients are the basis there.
-TEST(VectorsHarmonics, DiffuseFromADirection) {
-  TILEGRAD_VECTORS_OR_SKIP(json, "06_spherical_harmonics.json");
-  const Vector w = BasisAt(Vec(json.at("direction")));
-  for (std::size_t i = 0; i < json.at("normals").size(); ++i) {
-    const double light = IrradianceAt(w, Vec(json.at("normals")[i]));
-    for (std::size_t c = 0; c < 3; ++c) {
-      EXPECT_NEAR(json.at("albedo")[i][c].get<double>() * light,
-                  json.at("kaolin_sh9_diffuse_from_direction")[i][c].get<double>(), kPrinted);
-    }
-  }
-}
-
 // The pixels of 07, under one light.
 struct PhongVectorsFile {
   ColorFactorsT<double> factors;
@@ -223,17 +187,6 @@ TEST(VectorsPhong, ColoursAndGradients) {
   ExpectNear({d_factors.diffuse.begin(), d_factors.diffuse.end()}, d_material[1], "d_diffuse");
   ExpectNear({d_factors.specular.begin(), d_factors.specular.end()}, d_material[2], "d_specular");
   EXPECT_NEAR(d_shininess, json.at("grad_shininess").get<double>(), kTolerance);
-}
-
-TEST(VectorsPhong, Lambert) {
-  TILEGRAD_VECTORS_OR_SKIP(json, "07_phong_lambert.json");
-  const PhongVectorsFile file(json);
-  for (std::size_t i = 0; i < json.at("normal").size(); ++i) {
-    const LightT<double> one{file.light, 1};
-    const double light = LambertRef<double>({0, {&one, 1}}, Vec(json.at("normal")[i]));
-    ExpectNear({light * file.texture[0], light * file.texture[1], light * file.texture[2]},
-               json.at("lambert")[i], "lambert");
-  }
 }
 
 }  // namespace tilegrad::shade::vectors_test
