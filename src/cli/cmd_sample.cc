@@ -36,9 +36,16 @@ struct InterpolationSteps {
   double mean = 0, largest = 0;
 };
 
-constexpr int kTurning = 8, kTurningColumns = 4, kTurningSize = 112, kTurningFrames = 30;
-constexpr int kStripSize = 96, kAnimationSize = 192, kAnimated = 6, kSampleFrameMilliseconds = 100,
-              kSampleQuality = 70, kMostSamples = 999;
+constexpr int kMostSamples = 999;  // their files have numbers of three digits
+constexpr int kTurning = 8;        // samples of the turntable
+constexpr int kTurningColumns = 4;
+constexpr int kTurningSize = 112;  // pixels
+constexpr int kTurningFrames = 30;
+constexpr int kStripSize = 96;  // pixels, of one step between two codes
+constexpr int kAnimated = 6;    // rows of the animation
+constexpr int kAnimationSize = 192;
+constexpr int kSampleFrameMilliseconds = 100;
+constexpr int kSampleQuality = 70;  // of WebP, 0 to 100
 
 double Difference(const ImageU8& a, const ImageU8& b) {
   double sum = 0;

@@ -151,7 +151,8 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   hn::StoreMaskBits(d, steep, bits);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
-    // Flat, since thin or too large to decide in float: stays so where Q would be 0.
+    // Flat, since thin or too large to decide in float: stays so where Q, in which the far corner
+    // counts least / largest, would be 0 or lose its digits to underflow (1e-38).
     const auto [least, largest] = std::minmax({z[0][i], z[1][i], z[2][i]});
     const bool is_flat = lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0;
     if (is_flat && least < largest * 1e-30f) continue;

@@ -38,7 +38,7 @@ def check_floats(function: str, argument: str, value: Any, shape: Sequence[Axis]
 
 
 def check_finite(function: str, argument: str, value: Any, shape: Sequence[Axis],
-                    sizes: Optional[Sizes] = None, like: Optional[torch.Tensor] = None) -> None:
+                 sizes: Optional[Sizes] = None, like: Optional[torch.Tensor] = None) -> None:
     """As check_floats, and ValueError unless all of `value` is finite."""
     check_floats(function, argument, value, shape, sizes, like)
     if not torch.isfinite(value).all():

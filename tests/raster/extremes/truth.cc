@@ -269,11 +269,12 @@ void Truth::CheckForeground(const Images& frame, std::size_t pixel, Comparison* 
   const Bounded z =
       plane.base + (plane.gx * (column + 0.5 - plane.x0) + plane.gy * (row + 0.5 - plane.y0));
   const double kept = std::clamp(z.value, plane.low.value, plane.high.value);
-  // Kernels start in the image or at the leftmost corner of a small face, 30 pixels away at most:
-  // the plane is as large there as it is away.
+  // Kernels start in the image or at the leftmost corner of a small face: the plane is as large
+  // there as it is away.
+  constexpr double kAway = raster::kSmallExtent / static_cast<double>(raster::kSubpixels);
   const double steps = 4 * kBits *
-                       (std::abs(plane.gx.value) * (e_.options.width + 30) +
-                        std::abs(plane.gy.value) * (e_.options.height + 30));
+                       (std::abs(plane.gx.value) * (e_.options.width + kAway) +
+                        std::abs(plane.gy.value) * (e_.options.height + kAway));
   const auto d = static_cast<double>(frame.depth[pixel]);
   comparison->Require(d > 0 && std::isfinite(d), fmt::format("depth[{}] is {}", pixel, d));
   check("inverse depth", pixel, static_cast<float>(1 / d),
