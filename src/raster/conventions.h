@@ -63,7 +63,9 @@
 //
 // 8. Slivers. Interpolation divides by a face's height on the screen. A face thinner than 1/64
 //    pixel is interpolated flat: the mean of its corners, and no gradient of positions through
-//    attributes, since that gradient grows with 1/height without bound.
+//    attributes, since that gradient grows with 1/height without bound. So is a face with an edge of
+//    2^39 pixels or more: clamping its corners turns the edges of its coverage, so that pixels inside
+//    have weights far outside of [0, 1], whose ratio (equation 1) is any number.
 //
 // 9. Parts of an image, from large to small. The same words everywhere in src/:
 //
@@ -89,6 +91,7 @@ namespace tilegrad::raster {
 
 inline constexpr int kSubpixelBits = 10;  // coverage: 1/1024 pixel
 inline constexpr std::int64_t kSubpixels = std::int64_t{1} << kSubpixelBits;
+inline constexpr double kSnapError = 0.5 / kSubpixels;  // pixels, on each axis
 inline constexpr int kTileBits = 4;
 inline constexpr int kTileSize = 1 << kTileBits;  // pixels
 inline constexpr int kBinBits = 6;
@@ -100,6 +103,8 @@ inline constexpr float kGuardBand = 16384.0f;  // pixels
 // Coordinates beyond are clamped, for coverage only: the exact edge functions need 128 bits.
 inline constexpr double kMaxSnap = 0x1p40;       // pixels
 inline constexpr double kFlatHeight = 1.0 / 64;  // pixels, rule 8
+// Pixels, rule 8: a face that is clamped and reaches the image has a longer edge.
+inline constexpr double kFlatLength = kMaxSnap / 2;
 
 inline constexpr std::int32_t kNoFace = -1;  // a background pixel
 

@@ -88,8 +88,9 @@ HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, const CornerIndices& 
   return out;
 }
 
-// Barycentric weights as planes (equation 2): MakeFacePlane of face_plane.h.
-HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y, Plane out[3]) {
+// Barycentric weights as planes (equation 2): MakeFacePlane of face_plane.h. Returns the squares of
+// the longest edges.
+HWY_INLINE Lane WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y, Plane out[3]) {
   const LaneTag d;
   const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
   const auto x2 = hn::Sub(c.x[2], c.x[0]), y2 = hn::Sub(c.y[2], c.y[0]);
@@ -99,7 +100,9 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
       hn::Max(hn::Max(hn::MulAdd(x1, x1, hn::Mul(y1, y1)), hn::MulAdd(x2, x2, hn::Mul(y2, y2))),
               hn::MulAdd(x3, x3, hn::Mul(y3, y3)));
   constexpr auto kThin = static_cast<float>(kFlatHeight * kFlatHeight);
-  const auto solid = hn::Gt(hn::Mul(area, area), hn::Mul(hn::Set(d, kThin), longest));
+  constexpr auto kLong = static_cast<float>(kFlatLength * kFlatLength);
+  const auto solid = hn::And(hn::Gt(hn::Mul(area, area), hn::Mul(hn::Set(d, kThin), longest)),
+                             hn::Lt(longest, hn::Set(d, kLong)));
   const auto inverse = hn::IfThenElseZero(solid, hn::Div(hn::Set(d, 1.0f), area));
   const auto x = hn::Sub(origin_x, c.x[0]), y = hn::Sub(origin_y, c.y[0]);
   const auto third = hn::IfThenZeroElse(solid, hn::Set(d, 1.0f / 3.0f));
@@ -113,26 +116,31 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].value = hn::Sub(hn::Set(d, 1.0f), hn::Add(out[1].value, out[2].value));
   out[0].dx = hn::Neg(hn::Add(out[1].dx, out[2].dx));
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
+  return longest;
 }
 
-// Such faces are set up in double: perspective attributes of their far end are the quotient of two
-// small differences of large terms, which float rounding at the near end would swamp. In either
-// mode the near corners have small weights there but move far on the screen with their vertices, so
-// the gradient needs the digits of small weights.
-HWY_INLINE hn::Mask<LaneTag> IsSteep(const Lane (&inverse_depth)[3]) {
+// Faces that are set up in double. Steep ones: perspective attributes of their far end are the
+// quotient of two small differences of large terms, which float rounding at the near end would
+// swamp. In either mode the near corners have small weights there but move far on the screen with
+// their vertices, so the gradient needs the digits of small weights. Long ones: a
+// plane starts at a corner, and the farther that lies outside of the image, the more digits float
+// loses.
+HWY_INLINE hn::Mask<LaneTag> NeedDouble(const Lane (&inverse_depth)[3], Lane longest_squared) {
+  const LaneTag d;
   const auto& z = inverse_depth;
   const auto least = hn::Min(hn::Min(z[0], z[1]), z[2]);
   const auto largest = hn::Max(hn::Max(z[0], z[1]), z[2]);
-  return hn::Lt(hn::Mul(least, hn::Set(LaneTag(), kSteepDepth)), largest);
+  const auto steep = hn::Lt(hn::Mul(least, hn::Set(d, kSteepDepth)), largest);
+  return hn::Or(steep, hn::Gt(longest_squared, hn::Set(d, kGuardBand * kGuardBand)));
 }
 
 struct WeightLanes {
   float value[kMostFaceLanes], dx[kMostFaceLanes], dy[kMostFaceLanes];
 };
 
-// Recomputes WeightPlanes for the lanes in `steep`.
-inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, Lane origin_y,
-                                         hn::Mask<LaneTag> steep, Plane out[3]) {
+// Recomputes WeightPlanes for the lanes in `which`.
+inline HWY_NOINLINE void SetWeightsInDouble(const CornerLanes& c, Lane origin_x, Lane origin_y,
+                                            hn::Mask<LaneTag> which, Plane out[3]) {
   const LaneTag d;
   HWY_ALIGN float x[3][kMostFaceLanes], y[3][kMostFaceLanes], z[3][kMostFaceLanes];
   HWY_ALIGN float origin[2][kMostFaceLanes];
@@ -148,7 +156,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
     hn::Store(out[k].dy, d, lanes[k].dy);
   }
   std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(d, steep, bits);
+  hn::StoreMaskBits(d, which, bits);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
     // Flat, since thin or too large to decide in float: stays so where Q, in which the far corner
@@ -189,11 +197,19 @@ struct CornerPlanes {
   Plane weight[3], q;
   Lane m[3];   // 1/depth times `scale`, or 1
   Lane scale;  // normalises the largest m to 1: N and Q stay in range whatever the unit of depth
+  Lane least_q;
   CornerIndices attributes;
 };
 
+// LeastQ of face_plane.h.
 HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
-  return hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
+  const auto least = hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
+  auto change = hn::Zero(LaneTag());
+  for (int k = 0; k < 3; ++k) {
+    const Plane& w = corners.weight[k];
+    change = hn::MulAdd(corners.m[k], hn::Add(hn::Abs(w.dx), hn::Abs(w.dy)), change);
+  }
+  return hn::Max(least, hn::Mul(change, hn::Set(LaneTag(), static_cast<float>(kSnapError))));
 }
 
 // Planes in terms of the position relative to an origin.
@@ -207,16 +223,17 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   CornerPlanes out;
   out.attributes = AttributesAt(input, faces, vertices);
   out.q = ZeroPlane();
-  WeightPlanes(corners, origin_x, origin_y, out.weight);
+  const auto longest_squared = WeightPlanes(corners, origin_x, origin_y, out.weight);
   const auto one = hn::Set(d, 1.0f);
   const auto& z = corners.inverse_depth;
   const bool perspective = input.mode == Interpolation::kPerspective;
   out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
   for (int k = 0; k < 3; ++k) out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
-  const auto steep = IsSteep(z);
-  if (HWY_UNLIKELY(!hn::AllFalse(d, steep))) {
-    SetSteepWeights(corners, origin_x, origin_y, steep, out.weight);
+  const auto in_double = NeedDouble(z, longest_squared);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, in_double))) {
+    SetWeightsInDouble(corners, origin_x, origin_y, in_double, out.weight);
   }
+  out.least_q = LeastQ(out);
   for (int k = 0; k < 3; ++k) AddScaled(out.m[k], out.weight[k], &out.q);
   return out;
 }

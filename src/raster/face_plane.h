@@ -37,14 +37,18 @@ struct FacePlane {
   }
 };
 
-// (x1, y1), (x2, y2): corners 1 and 2 relative to corner 0; area: their cross product.
+// The square of the longest edge; (x1, y1), (x2, y2): corners 1 and 2 relative to corner 0.
+template <class T>
+T LongestSquared(T x1, T y1, T x2, T y2) {
+  const T x3 = x2 - x1, y3 = y2 - y1;
+  const T first = x1 * x1 + y1 * y1, second = x2 * x2 + y2 * y2, third = x3 * x3 + y3 * y3;
+  return std::max({first, second, third});
+}
+
+// area: the cross product of corners 1 and 2.
 template <class T>
 bool IsSliver(T x1, T y1, T x2, T y2, T area) {
-  const T x3 = x2 - x1, y3 = y2 - y1;
-  T longest = x1 * x1 + y1 * y1;
-  const T second = x2 * x2 + y2 * y2, third = x3 * x3 + y3 * y3;
-  longest = longest < second ? second : longest;
-  longest = longest < third ? third : longest;
+  const T longest = LongestSquared(x1, y1, x2, y2);
   return !(area * area > T(kFlatHeight * kFlatHeight) * longest);  // height = |area| / longest edge
 }
 
@@ -90,18 +94,25 @@ int FarCorner(const ScreenCorners<T>& c) {
   return RealPart(c.z[least] * T(kSteepDepth)) < RealPart(c.z[largest]) ? least : 0;
 }
 
+// Constant weights.
+template <class T>
+FacePlane<T> FlatPlane(const ScreenCorners<T>& c) {
+  const T third = T(1) / T(3);
+  return {c.x[0], c.y[0], {third, third, third}, {}, {}};
+}
+
+// Flat if the face is thin.
 template <class T>
 FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c, int k0) {
   const int k1 = (k0 + 1) % 3, k2 = (k0 + 2) % 3;
   const T x1 = c.x[k1] - c.x[k0], y1 = c.y[k1] - c.y[k0];
   const T x2 = c.x[k2] - c.x[k0], y2 = c.y[k2] - c.y[k0];
   const T area = x1 * y2 - x2 * y1;
+  if (IsSliver(RealPart(x1), RealPart(y1), RealPart(x2), RealPart(y2), RealPart(area))) {
+    return FlatPlane(c);
+  }
   FacePlane<T> plane{c.x[k0], c.y[k0], {T(0), T(0), T(0)}, {}, {}};
   plane.base[k0] = T(1);
-  if (IsSliver(RealPart(x1), RealPart(y1), RealPart(x2), RealPart(y2), RealPart(area))) {
-    for (T& weight : plane.base) weight = T(1) / T(3);
-    return plane;
-  }
   const T inverse = T(1) / area;
   plane.gx[k1] = y2 * inverse;
   plane.gy[k1] = -x2 * inverse;
@@ -112,14 +123,33 @@ FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c, int k0) {
   return plane;
 }
 
+// What interpolation takes: flat if the face is thin or its edges reach too far (rule 8).
 template <class T>
 FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
-  return MakeFacePlane(c, FarCorner(c));
+  constexpr double kMost = kFlatLength * kFlatLength;
+  const auto edge = [](const T& a, const T& b) { return RealPart(b) - RealPart(a); };
+  const auto longest = LongestSquared(edge(c.x[0], c.x[1]), edge(c.y[0], c.y[1]),
+                                      edge(c.x[0], c.x[2]), edge(c.y[0], c.y[2]));
+  return longest < kMost ? MakeFacePlane(c, FarCorner(c)) : FlatPlane(c);
 }
 
 template <class T>
 FacePlane<T> MakeFacePlane(const ScreenMeshT<T>& mesh, std::size_t face) {
   return MakeFacePlane(CornersOf(mesh, face));
+}
+
+// Lower bound of Q, the sum of m_k b_k (equation 1): the least m_k, or what Q changes by within
+// 1/2048 pixel, by which coverage lets a pixel centre lie outside of its face. There the Q of a
+// steep face can be anything; with the bound, the negative m_k b_k sum to no more than Q, and no
+// attribute exceeds three times the largest of the corners. Of faces that are not steep, rule 8
+// keeps the change below the least m_k.
+template <class T>
+T LeastQ(const FacePlane<T>& plane, const T (&m)[3]) {
+  const auto less = [](const T& a, const T& b) { return RealPart(a) < RealPart(b); };
+  const auto size = [&](const T& a) { return less(a, T(0)) ? -a : a; };
+  T change = T(0);
+  for (int k = 0; k < 3; ++k) change += m[k] * (size(plane.gx[k]) + size(plane.gy[k]));
+  return std::max(std::min({m[0], m[1], m[2]}, less), change * T(kSnapError), less);
 }
 
 // 1/depth over a face; linear on the screen, clamped to the range of the corners, which rounding of

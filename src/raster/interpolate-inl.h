@@ -66,7 +66,7 @@ HWY_INLINE void SetUpQuads(const InterpolateInput& input, const SeenFaces& seen,
     const CornerPlanes corners = MakeCornerPlanes(
         input, hn::Load(LaneIntTag(), seen.face.data() + s), hn::Load(d, seen.origin_x.data() + s),
         hn::Load(d, seen.origin_y.data() + s));
-    hn::StoreInterleaved4(lowest, lowest, lowest, LeastQ(corners), d, quads->least() + 4 * s);
+    hn::StoreInterleaved4(lowest, lowest, lowest, corners.least_q, d, quads->least() + 4 * s);
     for (int g = 0; g < quads->groups(); ++g) {
       Plane planes[4];
       planes[3] = corners.q;

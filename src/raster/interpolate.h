@@ -5,8 +5,8 @@
 //
 //     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k     (1: screen-linear)
 //
-// (Q is clamped to at least the smallest m_k: rounding in coverage lets a pixel centre lie slightly
-// outside of its face, where a steep plane may cross zero)
+// (Q is clamped to at least LeastQ of face_plane.h: rounding in coverage lets a pixel centre lie
+// slightly outside of its face, where a steep plane may cross zero)
 //
 // where N_c and Q are planes: three numbers per face and channel. (m is scaled so that its largest
 // is 1, which changes neither I nor its gradient.) With h_c = dL/dI_c / Q and s = sum_c h_c I_c,

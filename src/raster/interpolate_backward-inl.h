@@ -63,7 +63,7 @@ void SetUpBand(const InterpolateInput& input, BandSums* sums) {
   const std::size_t stride = sums->stride();
   for (std::size_t s = 0; s < stride; s += hn::Lanes(d)) {
     const CornerPlanes corners = LoadCornerPlanes(input, *sums, s);
-    hn::Store(LeastQ(corners), d, sums->least_q.data() + s);
+    hn::Store(corners.least_q, d, sums->least_q.data() + s);
     for (std::size_t g = 0; g < ChannelGroups(input.attributes.channels); ++g) {
       const GroupPlanes p = MakeGroupPlanes(input, corners, g);
       float* to = sums->planes.data() + 4 * (3 * g * stride + s);

@@ -26,13 +26,12 @@ PixelWeights<T> PixelWeightsRef(const ScreenMeshT<T>& mesh, const FacePlane<T>& 
   PixelWeights<T> out;
   const auto b = plane.Weights(px, py);
   const ScreenCorners<T> corners = CornersOf(mesh, face);
-  T least = corners.z[0];
+  const T least = LeastQ(plane, corners.z);
   out.q = T(0);
   for (int k = 0; k < 3; ++k) {
     out.b[k] = b[static_cast<std::size_t>(k)];
     out.w[k] = mode == Interpolation::kPerspective ? out.b[k] * corners.z[k] : out.b[k];
     out.q += out.w[k];
-    if (RealPart(corners.z[k]) < RealPart(least)) least = corners.z[k];
   }
   if (RealPart(out.q) < RealPart(least)) out.q = least;  // see interpolate.h
   if (mode == Interpolation::kScreenLinear) out.q = T(1);

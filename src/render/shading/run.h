@@ -152,7 +152,7 @@ UvPlanes UvPlanesOf(const raster::ScreenMeshT<T>& mesh,
   out.x0 = plane.x0;
   out.y0 = plane.y0;
   out.q = plane.base[0] * m[0] + plane.base[1] * m[1] + plane.base[2] * m[2];
-  out.least_q = std::min({m[0], m[1], m[2]});
+  out.least_q = raster::LeastQ(plane, m);
   return out;
 }
 

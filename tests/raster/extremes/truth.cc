@@ -207,7 +207,7 @@ PixelTruth Truth::At(std::size_t pixel, std::int32_t id) const {
   out.plane = raster::MakeFacePlane(corners);
   const auto b = out.plane.Weights(column + 0.5, row + 0.5);
   const bool perspective = e_.options.interpolation == Interpolation::kPerspective;
-  Bounded q = 0.0, least = corners.z[0];
+  Bounded q = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
     // Kernels step through a tile from its corner: weights are as large there as it is away.
     const Bounded &gx = out.plane.gx[k], &gy = out.plane.gy[k];
@@ -217,11 +217,11 @@ PixelTruth Truth::At(std::size_t pixel, std::int32_t id) const {
     out.weights.b[k] = {b[k].value, b[k].error + steps};
     out.weights.w[k] = perspective ? out.weights.b[k] * corners.z[k] : out.weights.b[k];
     q += out.weights.w[k];
-    if (corners.z[k] < least) least = corners.z[k];
   }
-  // Both values are kept at or above `least`, which does not enlarge their difference.
-  out.weights.q = perspective ? Bounded(std::max(q.value, least.value), q.error) : Bounded(1.0);
-  const double low = std::max(out.weights.q.value - out.weights.q.error, least.value);
+  const Bounded least = raster::LeastQ(out.plane, corners.z);
+  const double q_error = std::max(q.error, least.error);
+  out.weights.q = perspective ? Bounded(std::max(q.value, least.value), q_error) : Bounded(1.0);
+  const double low = std::max(out.weights.q.value - q_error, least.value - least.error);
   for (Bounded& w : out.weights.w) {
     if (!perspective) continue;
     const double value = w.value / out.weights.q.value;
@@ -291,6 +291,11 @@ void Truth::CheckForward(const Images& frame, Comparison* comparison) {
       fmt::format("alpha_error_bound is {}, allowed {}", spent, e));
   for (const auto* image : {&frame.attributes, &frame.alpha, &frame.barycentrics}) {
     for (const float v : *image) comparison->Require(std::isfinite(v), "an image is not finite");
+  }
+  float largest = 0;
+  for (const float a : e_.scene.attributes) largest = std::max(largest, std::abs(a));
+  for (const float v : frame.attributes) {
+    comparison->Require(std::abs(v) <= 3 * largest, "an attribute beyond the corners': LeastQ");
   }
   for (const std::size_t i : pixels_) {
     const bool background = frame.face_ids[i] < 0;
