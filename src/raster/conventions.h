@@ -63,9 +63,9 @@
 //
 // 8. Slivers. Interpolation divides by a face's height on the screen. A face thinner than 1/64
 //    pixel is interpolated flat: the mean of its corners, and no gradient of positions through
-//    attributes, since that gradient grows with 1/height without bound. So is a face with an edge of
-//    2^39 pixels or more: clamping its corners turns the edges of its coverage, so that pixels inside
-//    have weights far outside of [0, 1], whose ratio (equation 1) is any number.
+//    attributes, since that gradient grows with 1/height without bound. So is a face with an edge
+//    of 2^39 pixels or more: clamping its corners turns the edges of its coverage, so that pixels
+//    inside have weights far outside of [0, 1], whose ratio (equation 1) is any number.
 //
 // 9. Parts of an image, from large to small. The same words everywhere in src/:
 //
