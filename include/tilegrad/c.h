@@ -171,7 +171,8 @@ TILEGRAD_C_API tilegrad_status tilegrad_render(tilegrad_renderer* renderer,
 TILEGRAD_C_API tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame,
                                                      tilegrad_images* images);
 
-/* `count` gradients, one per scene of the frame. add: 0 overwrites the arrays, 1 adds to them. */
+/* `count` gradients, one per scene of the frame. add: 0 overwrites the arrays, 1 adds to them; an
+ * error then leaves them unchanged, unless a sum in a camera, surface or light overflows. */
 TILEGRAD_C_API tilegrad_status tilegrad_backward(tilegrad_renderer* renderer,
                                                  const tilegrad_frame* frame,
                                                  const tilegrad_frame_gradients* d_frame,

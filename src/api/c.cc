@@ -133,8 +133,9 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
   for (std::size_t n = 0; n < count && !add; ++n) {
     api::CGradients::Clear(r->wanted[n], frame->views[n]);
   }
-  for (std::size_t n = 0; n < count; ++n) r->gradients[n].AddTo(r->wanted[n]);
-  return {};
+  bool finite = true;
+  for (std::size_t n = 0; n < count; ++n) finite &= r->gradients[n].AddTo(r->wanted[n]);
+  return finite ? Status() : InvalidArgument("a sum of gradients overflows");
 }
 
 }  // namespace

@@ -204,14 +204,17 @@ void CGradients::Clear(const tilegrad_scene_gradients& to, const Scene& scene) {
   }
 }
 
-void CGradients::AddTo(const tilegrad_scene_gradients& to) const {
-  if (to.camera != nullptr) ForEachCameraPart(kAddPart, camera, *to.camera);
+bool CGradients::AddTo(const tilegrad_scene_gradients& to) const {
+  bool finite = true;
+  const auto add = AddPartInto(&finite);
+  if (to.camera != nullptr) ForEachCameraPart(add, camera, *to.camera);
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    ForEachSurfacePart(kAddPart, surfaces[i], to.surfaces[i]);
+    ForEachSurfacePart(add, surfaces[i], to.surfaces[i]);
   }
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    ForEachLightPart(kAddPart, lights[i], to.lights[i]);
+    ForEachLightPart(add, lights[i], to.lights[i]);
   }
+  return finite;
 }
 
 RenderOptions OptionsOf(const tilegrad_options& from) {

@@ -82,7 +82,8 @@ struct CGradients {
   void Set(const tilegrad_scene_gradients& from, const Scene& scene);
   // Zeroes what is not a plain array.
   static void Clear(const tilegrad_scene_gradients& to, const Scene& scene);
-  void AddTo(const tilegrad_scene_gradients& to) const;
+  // False if a sum is not finite.
+  bool AddTo(const tilegrad_scene_gradients& to) const;
 };
 
 RenderOptions OptionsOf(const tilegrad_options& from);

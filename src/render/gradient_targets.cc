@@ -118,52 +118,66 @@ void GradientTargets<T>::JoinArrays() const {
   }
 }
 
+// Calls visit(numbers) for the caller's arrays, then for the parts of the caller's records.
 template <class T>
-void GradientTargets<T>::JoinRecords(bool add) const {
-  for (std::size_t n = 0; n < wanted_.size() && !add; ++n) ClearRecords(wanted_[n]);
-  for (std::size_t n = 0; n < wanted_.size(); ++n) {
-    const SceneGradientsT<T>& to = wanted_[n];
-    const Records& own = records_[n];
-    if (to.camera != nullptr) ForEachCameraPart(kAddPart, own.camera, *to.camera);
-    for (std::size_t i = 0; i < to.lights.size(); ++i)
-      ForEachLightPart(kAddPart, own.lights[i], to.lights[i]);
-    for (std::size_t i = 0; i < to.surfaces.size(); ++i)
-      ForEachSurfacePart(kAddPart, own.surfaces[i], to.surfaces[i]);
+template <class Visit>
+void GradientTargets<T>::ForEachDestination(const Visit& visit) const {
+  for (const auto& array : arrays_) visit(array.front().out);
+  for (const SceneGradientsT<T>& d : wanted_) {
+    ForEachRecordPart(d, [&](const char*, const char*, std::span<T> part) { visit(part); });
   }
 }
 
 template <class T>
 void GradientTargets<T>::Save() {
   saved_.clear();
-  for (const auto& array : arrays_) {
-    const std::span<T> out = array.front().out;
-    saved_.insert(saved_.end(), out.begin(), out.end());
-  }
+  ForEachDestination(
+      [&](std::span<T> out) { saved_.insert(saved_.end(), out.begin(), out.end()); });
 }
 
 template <class T>
 void GradientTargets<T>::Restore() const {
   const T* from = saved_.data();
-  for (const auto& array : arrays_) {
-    const std::span<T> out = array.front().out;
+  ForEachDestination([&](std::span<T> out) {
     std::copy_n(from, out.size(), out.begin());
     from += out.size();
-  }
+  });
 }
 
 template <class T>
 bool GradientTargets<T>::AddSaved() const {
   const T* from = saved_.data();
-  T not_finite = T(0);
+  bool finite = true;
   for (const auto& array : arrays_) {
-    for (T& x : array.front().out) {
-      x += *from++;
-      not_finite += x - x;
-    }
+    const std::span<T> out = array.front().out;
+    for (T& x : out) x += *from++;
+    finite = finite && AllFinite(out);
   }
-  if (not_finite == T(0)) return true;
-  Restore();
-  return false;
+  return finite;
+}
+
+template <class T>
+bool GradientTargets<T>::JoinRecords() const {
+  bool finite = true;
+  const auto add = AddPartInto(&finite);
+  for (std::size_t n = 0; n < wanted_.size(); ++n) {
+    const SceneGradientsT<T>& to = wanted_[n];
+    const Records& own = records_[n];
+    if (to.camera != nullptr) ForEachCameraPart(add, own.camera, *to.camera);
+    for (std::size_t i = 0; i < to.lights.size(); ++i)
+      ForEachLightPart(add, own.lights[i], to.lights[i]);
+    for (std::size_t i = 0; i < to.surfaces.size(); ++i)
+      ForEachSurfacePart(add, own.surfaces[i], to.surfaces[i]);
+  }
+  return finite;
+}
+
+template <class T>
+Status GradientTargets<T>::Join(bool add) const {
+  const bool arrays_finite = !add || AddSaved();
+  for (std::size_t n = 0; n < wanted_.size() && !add; ++n) ClearRecords(wanted_[n]);
+  if (JoinRecords() && arrays_finite) return {};
+  return InvalidArgument("a sum of gradients overflows");
 }
 
 template <class T>

@@ -45,14 +45,14 @@ class GradientTargets {
   // sums them into the caller's.
   void SplitArrays();
   void JoinArrays() const;
-  // Adds the per-scene records to the caller's, which it clears first unless `add`.
-  void JoinRecords(bool add) const;
 
-  // GradientMode::kAdd on top of a renderer that overwrites: Save copies the arrays; Restore copies
-  // them back; AddSaved adds the copy. False, after restoring, if a sum is not finite.
+  // GradientMode::kAdd on top of a renderer that overwrites: Save copies the caller's arrays and
+  // records; Restore copies them back.
   void Save();
   void Restore() const;
-  bool AddSaved() const;
+  // Adds the per-scene records to the caller's. With `add` also what Save copied to the arrays;
+  // else clears the caller's records first. An error if a sum is not finite.
+  Status Join(bool add) const;
 
   // An error if a gradient overflows, rather than an Inf that spreads.
   Status CheckSums() const;
@@ -68,6 +68,10 @@ class GradientTargets {
 
   void List(const SceneT<T>& scene, const SceneGradientsT<T>& wanted, std::size_t n);
   void TakeRecords(const SceneGradientsT<T>& wanted, std::size_t n);
+  template <class Visit>
+  void ForEachDestination(const Visit& visit) const;
+  bool AddSaved() const;
+  bool JoinRecords() const;
 
   std::span<const SceneGradientsT<T>> wanted_;
   std::vector<Target> targets_;  // sorted by address
@@ -75,7 +79,7 @@ class GradientTargets {
   std::vector<Records> records_;
   std::vector<SceneGradientsT<T>> scenes_;
   AlignedVector<T> values_;  // of SplitArrays
-  AlignedVector<T> saved_;   // the arrays, concatenated
+  AlignedVector<T> saved_;   // the caller's arrays and records, concatenated
 };
 
 }  // namespace tilegrad

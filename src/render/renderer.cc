@@ -73,14 +73,12 @@ struct RendererT<T>::Impl {
     const bool add = mode == GradientMode::kAdd;
     TILEGRAD_TRY(targets.Begin(frame.scenes, d_scenes));
     if (add) targets.Save();
-    Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, &targets);
-    if (!status.ok()) {
-      if (add) targets.Restore();
-      return status;
-    }
-    if (add && !targets.AddSaved()) return InvalidArgument("a sum of gradients overflows");
-    targets.JoinRecords(add);
-    return {};
+    Status status = Guarded([&] {
+      return engine.Backward(frame.scenes, frame.options, frame.images, d_frame, &targets);
+    });
+    if (status.ok()) status = targets.Join(add);
+    if (!status.ok() && add) targets.Restore();
+    return status;
   }
 
   std::optional<Workers> own_workers;

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <span>
 
+#include "base/array_checks.h"
 #include "tilegrad/renderer.h"
 #include "tilegrad/scene.h"
 
@@ -123,6 +124,14 @@ void ForEachLightPart(const Visit& visit, Lights&... light) {
 inline constexpr auto kAddPart = [](const char*, auto from, auto to) {
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += from[i];
 };
+
+// The same; sets *finite to false if a sum is not finite.
+inline auto AddPartInto(bool* finite) {
+  return [finite](const char*, auto from, auto to) {
+    kAddPart("", from, to);
+    *finite = *finite && AllFinite(to);
+  };
+}
 
 // Calls visit(parts of a record as above) for all records of the gradients.
 template <class T, class Visit>

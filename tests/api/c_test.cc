@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <limits>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -283,6 +284,22 @@ TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
             "scene 0: d_scene.textures is requested, but the scene has none");
   EXPECT_EQ(ErrorOfRequest(&tilegrad_scene_gradients::lights, &d_light),
             "scene 0: d_scene.lights is requested, but the scene has none");
+}
+
+TEST_F(CApi, SumsOfRecordsThatOverflowAreErrors) {
+  ASSERT_EQ(Render(), TILEGRAD_OK);
+  std::vector<float> d_color(3 * 34 * 29, 1.0f);
+  tilegrad_frame_gradients d_frame;
+  tilegrad_frame_gradients_init(&d_frame);
+  d_frame.color = d_color.data();
+  tilegrad_surface d_surface = {};
+  tilegrad_scene_gradients d_scene;
+  tilegrad_scene_gradients_init(&d_scene);
+  d_scene.surfaces = &d_surface;
+  d_surface.base_color[1] = std::numeric_limits<float>::max();
+  d_color.assign(d_color.size(), 1e33f);
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 1)),
+            "a sum of gradients overflows");
 }
 
 TEST_F(CApi, StructsOfAnArrayHaveOneSize) {

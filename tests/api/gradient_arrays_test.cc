@@ -205,6 +205,31 @@ TEST(ApiGradientArrays, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
   EXPECT_EQ(g.positions, before);
 }
 
+// Each scene's gradient is finite; the sum in the record that they share, or that the caller's
+// numbers are in already, is not.
+TEST(ApiGradientArrays, SumsOfRecordsThatOverflowAreErrors) {
+  const TestScene<float> s(Lighting::kNone);
+  const std::vector<Scene> scenes(2, s.scene);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  std::vector<float> d_color(frame.images().color.size(), 1.0f);
+  std::vector<Surface> unit(1), apart(1), shared(1);
+  const auto message = [&](std::span<Surface> first, std::span<Surface> second, GradientMode mode) {
+    const std::vector<SceneGradients> d = {{.surfaces = first}, {.surfaces = second}};
+    return renderer.Backward(frame, {.color = d_color}, d, mode).message();
+  };
+  ASSERT_EQ(message(unit, apart, GradientMode::kOverwrite), "");
+  const float steepest = *std::max_element(unit[0].base_color.begin(), unit[0].base_color.end());
+  d_color.assign(d_color.size(), 0.6f * std::numeric_limits<float>::max() / steepest);
+  ASSERT_EQ(message(unit, apart, GradientMode::kOverwrite), "");
+  const std::string overflows = "a sum of gradients overflows";
+  EXPECT_EQ(message(shared, shared, GradientMode::kOverwrite), overflows);
+  const auto before = unit[0].base_color;
+  EXPECT_EQ(message(apart, unit, GradientMode::kAdd), overflows);
+  EXPECT_EQ(unit[0].base_color, before);
+}
+
 template <class T>
 void ExpectDepthOfBackgroundIsNotRead() {
   const TestScene<T> s(Lighting::kNone);

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include "api/test_scene.h"
 #include "base/sanitizers.h"
@@ -103,6 +104,23 @@ TEST(ApiMemory, NoMemoryIsAnErrorLikeOthers) {
     ASSERT_TRUE(step.Run(&renderer, &frame).ok()) << at;
   }
   EXPECT_GT(refused, 50);
+}
+
+TEST(ApiMemory, GradientsStayAsTheyWereWhereMemoryEndsWhenAdding) {
+  const TestScene<float> s(Lighting::kPhong);
+  Renderer renderer{{.threads = 1}};
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> g(s, 2.0f);
+  const std::vector<float> before = g.positions;
+  for (long at = 0; g.positions == before; ++at) {
+    Renderer fresh{{.threads = 1}};
+    g_refused = g_allocations + at;
+    const Status status = fresh.Backward(frame, cotangents.d, {&g.d, 1}, GradientMode::kAdd);
+    g_refused = std::numeric_limits<long>::max();
+    ASSERT_EQ(status.ok(), g.positions != before) << at;
+  }
 }
 
 }  // namespace tilegrad::memory_test
