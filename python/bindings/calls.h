@@ -13,6 +13,7 @@
 #include "base/default_floats.h"
 #include "base/parallel.h"
 #include "bindings/arrays.h"
+#include "bindings/gil.h"
 
 namespace tilegrad::python {
 
@@ -92,7 +93,7 @@ template <class Work>
 void Run(const char* function, const Work& work) {
   Status status;
   {
-    const py::gil_scoped_release released;
+    const GilReleased released;
     const DefaultFloats floats;
     if constexpr (std::is_void_v<decltype(work())>) {
       work();

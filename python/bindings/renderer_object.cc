@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <type_traits>
 
+#include "bindings/gil.h"
+
 namespace tilegrad::python {
 namespace {
 
@@ -217,7 +219,7 @@ std::shared_ptr<FramePool<T>>& RendererObject::pool() {
 template <class T, class Call>
 Status RendererObject::Run(const Call& call) {
   Session& mine = session();
-  const py::gil_scoped_release released;  // first: who waits for the lock must not hold the GIL
+  const GilReleased released;  // first: who waits for the lock must not hold the GIL
   const std::lock_guard lock(mine.mutex);
   return call(EngineOf<T>(mine));
 }

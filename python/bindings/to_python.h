@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands results of C++ to Python; runs long work without the GIL.
+// Hands results of C++ to Python.
 #pragma once
 
 #include <memory>
@@ -11,6 +11,7 @@
 #include "base/read_budget.h"
 #include "base/text.h"
 #include "bindings/arrays.h"
+#include "bindings/gil.h"
 
 namespace tilegrad::python {
 
@@ -23,13 +24,6 @@ py::array OwnedArray(Vector values, std::vector<py::ssize_t> shape) {
   const py::capsule base(owner.get(), [](void* p) { delete static_cast<Vector*>(p); });
   owner.release();  // the capsule's from here on
   return py::array(py::dtype::of<T>(), std::move(shape), data, base);
-}
-
-// The result of `work`, which must not touch Python objects; other Python threads run meanwhile.
-template <class Work>
-auto WithoutGil(const Work& work) {
-  const py::gil_scoped_release release;
-  return work();
 }
 
 // The result of `load`, run without the GIL. max_bytes: of ReadBudget; 0: the usual limit.

@@ -37,7 +37,8 @@ def __getattr__(name: str) -> _Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_MODULES, *(_HAS_TOOLS * (*_TOOL_MODULES, *_FUNCTIONS))})
+    names = {*globals(), *_MODULES, *(_HAS_TOOLS * (*_TOOL_MODULES, *_FUNCTIONS))}
+    return sorted(names if _find_spec("torch") else names - {"torch"})  # help() imports them all
 
 
 __all__ = ["Camera", "Frame", "Gradients", "Light", "Renderer", "Scene", "Surface", "Texture",

@@ -56,7 +56,7 @@ class Material:
                 "double_sided": bool(self.double_sided), "unlit": bool(self.unlit)}
 
 
-@dataclasses.dataclass(repr=False)
+@dataclasses.dataclass(eq=False, repr=False)
 class MeshTexture:
     """An image on a mesh: (height, width, 3 or 4) uint8, row 0 on top is v = 1."""
 
@@ -67,7 +67,7 @@ class MeshTexture:
         return f"<tilegrad MeshTexture {self.name!r}: {' x '.join(map(str, self.image.shape))}>"
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(eq=False)
 class MeshCamera:
     """A perspective camera that a glTF file holds: node_to_world (4, 4) float64, OpenGL's axes;
     yfov: radians, the full vertical field of view; aspect_ratio: of the field of view, 0: that of

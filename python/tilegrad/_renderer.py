@@ -303,6 +303,8 @@ class Renderer:
                                 f"{type(gradient).__name__}")
             if wrt is not None and set(names) != set(gradient):
                 raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is {names!r}")
+            if any(gradient is other for other in gradients[:i]):
+                raise ValueError(f"backward: out[{i}] is there twice; each scene has its own")
         return gradients
 
 

@@ -198,6 +198,11 @@ void PlaceNearOrigin(LoadedMesh& loaded) {
   loaded.exact = {};
 }
 
+// An error of the file itself names it already, one of a part or a side file does not.
+Status WithinOnce(const Status& status, const std::string& place) {
+  return status.message().starts_with(place + ":") ? status : status.Within(place);
+}
+
 }  // namespace
 
 std::string ShortList(const std::set<std::string, std::less<>>& names) {
@@ -345,7 +350,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   auto loaded = format->read(source, name);
   if (GuardedMustStop()) return Cancelled("{}: stopped while it was read", place);
   TILEGRAD_TRY(watch.Check(place));
-  TILEGRAD_TRY(budget.status().Within(place));  // even if a texture was dropped
+  TILEGRAD_TRY(WithinOnce(budget.status(), place));  // even if a texture was dropped
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   loaded->texture_of_file.clear();

@@ -2,10 +2,12 @@
 """The Python of README.md and of the pages in docs/ runs as it stands there."""
 
 import os
+import pydoc
 import re
 
 import numpy as np
 
+import tilegrad
 from file_samples import FolderTest, dataset, run, run_program, textured_mesh
 from support import SOURCE, needs_torch
 from tilegrad import files
@@ -30,6 +32,10 @@ class Docs(FolderTest):
 
     def test_readme(self) -> None:
         self.assertTrue((self.run_page("README.md")["gradients"].positions != 0).any())
+
+    def test_help(self) -> None:
+        """Whether or not torch is there."""
+        self.assertIn("icosphere", pydoc.plaintext.document(tilegrad))
 
     def test_python(self) -> None:
         names = self.run_page("docs/python.md")

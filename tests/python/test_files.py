@@ -22,6 +22,7 @@ class Meshes(FolderTest):
         self.assertEqual(got.materials, mesh.materials)
         np.testing.assert_array_equal(got.textures[0].image, mesh.textures[0].image)
         self.assertEqual(got.textures[0].name, "texels")
+        self.assertNotEqual(got.textures, mesh.textures)  # not an error of NumPy
         self.assertEqual(got.warnings, [])
         self.assertEqual(got.positions.dtype, np.float32)
         self.assertEqual(got.faces.dtype, np.int32)

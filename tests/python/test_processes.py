@@ -106,6 +106,22 @@ class Threads(unittest.TestCase):
             sys.setswitchinterval(switch)
             counter.join()
 
+    def test_daemons_do_not_disturb_the_end(self):
+        """Of the interpreter, which comes while they render."""
+        code = """
+import threading, time
+from test_processes import Renderer, step
+def work():
+    renderer = Renderer(threads=1)
+    while True:
+        step(renderer)
+for _ in range(3):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.3)
+"""
+        done = run_python(code)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
 
 class Forks(unittest.TestCase):
     """After the parent has rendered, so that its threads exist and are gone in the child."""

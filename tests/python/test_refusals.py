@@ -166,6 +166,9 @@ class Memory(FolderTest):
             refused = f"{name}.*max_bytes.*LIMIT"
             with self.assertRaisesRegex((OSError, ValueError, MemoryError), refused):
                 load(self.folder / name, max_bytes=1 << 20)
+            with self.assertRaises(MemoryError) as not_even_read:
+                load(self.folder / name, max_bytes=1)
+            self.assertEqual(str(not_even_read.exception).count(name), 1)
             with self.assertRaisesRegex(ValueError, "max_bytes is 0"):
                 load(self.folder / name, max_bytes=0)
             with self.assertRaisesRegex(TypeError, "max_bytes must be int or None"):

@@ -25,9 +25,15 @@ struct Lengths {
 
   explicit Lengths(const py::array& xy)
       : images(xy.ndim() == 4 ? xy.shape(0) : 0), faces(xy.ndim() == 4 ? xy.shape(1) : 0) {}
-  std::size_t n() const { return static_cast<std::size_t>(images); }
-  std::size_t f() const { return static_cast<std::size_t>(faces); }
 };
+
+// The corners of the faces, all that the functions have in common.
+template <class T>
+compat::ProjectedBatchT<T> BatchOf(const char* function, const py::array& xy, const Lengths& of) {
+  const auto images = static_cast<std::size_t>(of.images);
+  const auto faces = static_cast<std::size_t>(of.faces);
+  return {images, faces, SpanOf<T>(xy, function, kFaces, {of.images, of.faces, 3, 2}), {}, {}};
+}
 
 py::tuple RasterizeFaces(const py::array& xy, const py::array& z, const py::array& features,
                          const std::optional<py::array>& valid, int height, int width, double eps,
@@ -35,8 +41,7 @@ py::tuple RasterizeFaces(const py::array& xy, const py::array& z, const py::arra
   constexpr char kName[] = "rasterize";
   return Dispatch(xy, kName, kFaces, [&]<class T>(T) {
     const Lengths of(xy);
-    compat::ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
-    batch.xy = SpanOf<T>(xy, kName, kFaces, {of.images, of.faces, 3, 2});
+    auto batch = BatchOf<T>(kName, xy, of);
     batch.z = SpanOf<T>(z, kName, "face_vertices_z", {of.images, of.faces, 3});
     batch.valid = OptionalSpanOf<std::uint8_t>(valid, kName, "valid_faces", {of.images, of.faces});
     const auto values = SpanOf<T>(features, kName, "face_features", {of.images, of.faces, 3, kAny});
@@ -60,8 +65,7 @@ py::tuple RasterizeFacesBackward(const py::array& xy, const py::array& features,
   constexpr char kName[] = "rasterize's backward pass";
   return Dispatch(xy, kName, kFaces, [&]<class T>(T) {
     const Lengths of(xy);
-    compat::ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
-    batch.xy = SpanOf<T>(xy, kName, kFaces, {of.images, of.faces, 3, 2});
+    const auto batch = BatchOf<T>(kName, xy, of);
     const auto values = SpanOf<T>(features, kName, "face_features", {of.images, of.faces, 3, kAny});
     const ssize_t channels = features.shape(3);
     kaolin::ProjectedRasterAdjoint<T> adjoint;
@@ -93,8 +97,7 @@ struct MaskInput {
 
   MaskInput(const char* name, const py::array& xy, const py::array& face_ids,
             const kaolin::ProjectedMaskOptions& rule)
-      : of(xy), batch{of.n(), of.f(), {}, {}, {}}, options(rule) {
-    batch.xy = SpanOf<T>(xy, name, kFaces, {of.images, of.faces, 3, 2});
+      : of(xy), batch(BatchOf<T>(name, xy, of)), options(rule) {
     ids = SpanOf<std::int32_t>(face_ids, name, "selected_face_idx", {of.images, kAny, kAny});
     height = face_ids.shape(1);
     width = face_ids.shape(2);
