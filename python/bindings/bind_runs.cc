@@ -162,6 +162,7 @@ py::dict Fit(const py::dict& views, const py::dict& request, const py::object& l
   listening.Settle(input.status());
   if (!input.ok()) return py::dict(py::arg("finished") = false);
   job.input = std::move(input).value();
+  job.warn = [&job](const std::string& text) { job.input.warnings.push_back(text); };
   const Workers workers(request["threads"].cast<int>());
   const train::CameraSearch search = {views["find_cameras"].cast<bool>(),
                                       request["resume"].cast<bool>()};
@@ -193,9 +194,12 @@ py::dict Train(const py::dict& request, const py::object& listener) {
   job.existing = ExistingOf(request);
   job.extends = request["resume"].cast<bool>();
   job.max_minutes = request["max_minutes"].cast<double>();
+  Words warnings;
+  job.warn = [&warnings](const std::string& text) { warnings.push_back(text); };
   Listener listening(listener);
   const Workers workers(request["threads"].cast<int>());
   auto outcome = listening.Run([&] { return train::Train(job, workers, listening.watch()); });
+  for (const std::string& warning : warnings) WarnUser("train: " + warning);
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
   return py::dict(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,

@@ -98,7 +98,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
         reading, preparation and other stages. None: a progress line on a terminal and in a
         notebook.
     options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
-    Warns about doubtful masks and cameras.
+    Warns about doubtful masks and cameras, and about damaged checkpoints that `resume` skips.
     ValueError, OSError: name the faulty argument or file. KeyboardInterrupt: Ctrl-C; all is
         saved.
     """
@@ -126,6 +126,7 @@ def train(config: Path = "quick", *, data: Path, out: Path,
     config: a name (`config_names`) or a TOML file. data: a dataset's folder. out: the run's.
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
     resume, callback, threads, errors: as in `fit`; more steps: set={"schedule.steps": ...}.
+    Warns about damaged checkpoints and what the configuration warns of.
     """
     minutes = _arrays.as_number("train", "max_minutes", max_minutes, float)
     if not minutes >= 0:

@@ -209,6 +209,16 @@ std::string EscapeCsv(std::string_view text) {
   return out + '"';
 }
 
+std::string ShellWord(std::string_view text) {
+  constexpr std::string_view kSafe =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
+  if (!text.empty() && text.find_first_not_of(kSafe) == std::string_view::npos)
+    return std::string(text);
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
 std::string EscapeHtml(std::string_view text) {
   std::string out;
   for (const char c : EscapeControls(text)) {

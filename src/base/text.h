@@ -82,6 +82,10 @@ std::string EscapeMarkdown(std::string_view text);
 // A field of a CSV file (RFC 4180), quoted where necessary.
 std::string EscapeCsv(std::string_view text);
 
+// A word of a command for a shell (POSIX), quoted where necessary: messages suggest commands that
+// hold the user's paths.
+std::string ShellWord(std::string_view text);
+
 // Text for HTML or XML, between tags or in a quoted attribute. Also escapes what EscapeControls
 // escapes: a mark of writing direction would also reorder the text beside it.
 std::string EscapeHtml(std::string_view text);

@@ -6,20 +6,13 @@
 #include <span>
 #include <string>
 
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"
 
 namespace tilegrad::cli {
 namespace {
-
-// Quotes for bash, zsh and fish: single quotes make all literal but the quote itself (and, in fish,
-// the backslash, which help texts do not use).
-std::string Quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
 
 std::string CommandNames(std::span<const CommandNode> tree) {
   std::string out;
@@ -45,7 +38,7 @@ std::string BashValues(const CommandNode& command) {
     const std::string names = fmt::format("{}", fmt::join(option.names, " | "));
     const std::string list = fmt::format("{}", fmt::join(option.choices, " "));
     const bool files = option.path || option.names.back() == "--config";
-    out += fmt::format("        {}) words={} files={} ;;\n", names, Quoted(list), files ? 1 : 0);
+    out += fmt::format("        {}) words={} files={} ;;\n", names, ShellWord(list), files ? 1 : 0);
   }
   return out;
 }
@@ -74,14 +67,14 @@ std::string ZshOption(const OptionNode& option) {
   if (option.positional) {
     const std::string action =
         option.choices.empty() ? "_files" : fmt::format("({})", fmt::join(option.choices, " "));
-    return fmt::format("        {}\n", Quoted(fmt::format("{}:{}:{}", option.many ? "*" : "",
-                                                          ZshEscaped(option.names[0]), action)));
+    return fmt::format("        {}\n", ShellWord(fmt::format("{}:{}:{}", option.many ? "*" : "",
+                                                             ZshEscaped(option.names[0]), action)));
   }
   std::string out;
   for (const std::string& name : option.names) {
-    out +=
-        fmt::format("        {}\n", Quoted(fmt::format("{}{}[{}]{}", option.many ? "*" : "", name,
-                                                       ZshEscaped(option.help), ZshValue(option))));
+    out += fmt::format("        {}\n",
+                       ShellWord(fmt::format("{}{}[{}]{}", option.many ? "*" : "", name,
+                                             ZshEscaped(option.help), ZshValue(option))));
   }
   return out;
 }
@@ -99,17 +92,17 @@ std::string FishOption(const std::string& command, const OptionNode& option) {
   if (!option.value.empty() && !option.positional) out += option.path ? " -r -F" : " -x";
   if (!option.choices.empty()) {
     if (option.positional) out += " -f";
-    out += fmt::format(" -a {}", Quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+    out += fmt::format(" -a {}", ShellWord(fmt::format("{}", fmt::join(option.choices, " "))));
     if (option.names.back() == "--config") out += " -F";
   }
-  return out + fmt::format(" -d {}\n", Quoted(option.help));
+  return out + fmt::format(" -d {}\n", ShellWord(option.help));
 }
 
 std::string BashCompletion(std::span<const CommandNode> tree) {
   std::string cases;
   for (const CommandNode& command : tree.subspan(1)) {
     cases += fmt::format("    {})\n      options={}\n      case $prev in\n{}      esac ;;\n",
-                         command.name, Quoted(OptionNames(command)), BashValues(command));
+                         command.name, ShellWord(OptionNames(command)), BashValues(command));
   }
   return fmt::format(R"(# bash completion for tilegrad
 _tilegrad() {{
@@ -132,13 +125,13 @@ _tilegrad() {{
 }}
 complete -o filenames -F _tilegrad tilegrad
 )",
-                     Quoted(CommandNames(tree)), OptionNames(tree[0]), cases);
+                     ShellWord(CommandNames(tree)), OptionNames(tree[0]), cases);
 }
 
 std::string ZshCompletion(std::span<const CommandNode> tree) {
   std::string names, cases;
   for (const CommandNode& command : tree.subspan(1)) {
-    names += fmt::format("    {}\n", Quoted(command.name + ":" + ZshEscaped(command.help)));
+    names += fmt::format("    {}\n", ShellWord(command.name + ":" + ZshEscaped(command.help)));
     cases += fmt::format("    {})\n      _arguments -s \\\n", command.name);
     std::string options;
     for (const OptionNode& option : command.options) options += ZshOption(option);
@@ -172,12 +165,12 @@ std::string FishCompletion(std::span<const CommandNode> tree) {
   std::string out = "# fish completion for tilegrad\n";
   for (const CommandNode& command : tree.subspan(1)) {
     out += fmt::format("complete -c tilegrad -n __fish_use_subcommand -f -a {} -d {}\n",
-                       command.name, Quoted(command.help));
+                       command.name, ShellWord(command.help));
   }
   out += fmt::format(
       "complete -c tilegrad -n __fish_use_subcommand -f -a help -d 'Show the options of a "
       "command'\ncomplete -c tilegrad -n '__fish_seen_subcommand_from help' -f -a {}\n",
-      Quoted(CommandNames(tree)));
+      ShellWord(CommandNames(tree)));
   for (const CommandNode& command : tree.subspan(1)) {
     for (const OptionNode& option : command.options) {
       if (!option.positional || !option.choices.empty()) out += FishOption(command.name, option);

@@ -69,7 +69,7 @@ void PrintOutcome(const train::FitOutcome& o, const train::FitInput& input, cons
           *o.camera_error_after);
   }
   Print("mesh {}\nreport {}, live view: tilegrad live {}\n", (out / "mesh.glb").string(),
-        (out / "report.html").string(), out.string());
+        (out / "report.html").string(), ShellWord(out.string()));
 }
 
 nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {
@@ -362,7 +362,7 @@ Status RunFitting(const FitOptions& options) {
   job.existing = train::ExistingRun::kContinue;
   job.warn = line.Warnings();
   return WithCommand(RunShown(options, &job, workers, watch.progress),
-                     "tilegrad fit --resume --out " + options.out);
+                     "tilegrad fit --resume --out " + ShellWord(options.out));
 }
 
 // ---- Resuming with the options of an earlier call.

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
 
@@ -58,6 +59,13 @@ std::vector<Command> CommandsFor(const Path& work, const Path& images) {
       {kProgram, "exhaustive_matcher", "--database_path", database, "--SiftMatching.use_gpu", "0"},
       {kProgram, "mapper", "--database_path", database, "--image_path", images.string(),
        "--output_path", (work / "sparse").string()}};
+}
+
+// As a shell reads it.
+std::string TextOf(const Command& command) {
+  std::string out;
+  for (const std::string& word : command) out += (out.empty() ? "" : " ") + ShellWord(word);
+  return out;
 }
 
 // Null-terminated pointers to the strings.
@@ -143,7 +151,7 @@ Result<ColmapOutcome> RunColmap(const Path& folder, const WarningSink& tell, con
                                fmt::format("{}\n", fmt::join(pictures.names, "\n"))));
   const std::vector<Command> commands = CommandsFor(work, pictures.folder);
   for (std::size_t i = 0; i < commands.size(); ++i) {
-    if (tell) tell(fmt::format("{}", fmt::join(commands[i], " ")));
+    if (tell) tell(TextOf(commands[i]));
     TILEGRAD_ASSIGN(const pid_t child, Start(commands[i], work / "log.txt"));
     const Progress now = {"finding cameras by COLMAP", i, commands.size(), commands[i][1]};
     TILEGRAD_ASSIGN(const int status, WaitFor(child, now, watch));

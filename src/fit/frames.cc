@@ -145,6 +145,7 @@ std::string WriteTransforms(const std::vector<OutputFrame>& views, ImageSize siz
                                     {"fl_y", pose.fl_y},       {"cx", pose.cx},
                                     {"cy", pose.cy},           {"transform_matrix", matrix}};
     if (view.gain != 1) frame["exposure_gain"] = view.gain;
+    if (view.size) frame.update({{"w", view.size->width}, {"h", view.size->height}});
     frames.push_back(std::move(frame));
   }
   nlohmann::ordered_json file = {{"w", size.width}, {"h", size.height}, {"frames", frames}};

@@ -2,6 +2,7 @@
 // Images and their cameras, as the folders that a fit reads name them (io/camera_file.h).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/file.h"
@@ -27,11 +28,12 @@ Result<std::vector<InputFrame>> ReadTransforms(const Path& file);
 // nothing can be fitted with it.
 Result<Camera> CameraOfFrame(const InputFrame& frame, ImageSize image);
 
-// One camera an image, all of one size; `images` are relative to the folder of the file.
+// One camera an image; `images` are relative to the folder of the file.
 struct OutputFrame {
   std::string image;
   Camera camera;
   double gain = 1;  // of exposure; written as "exposure_gain" where it is not 1
+  std::optional<ImageSize> size = std::nullopt;  // where it is not that of the file
 };
 
 std::string WriteTransforms(const std::vector<OutputFrame>& views, ImageSize size);

@@ -13,6 +13,7 @@
 #include "fit/frames.h"
 #include "fit/masks/floor.h"
 #include "fit/masks/start_masks.h"
+#include "fit/quarter_turn.h"
 #include "fit/undistort.h"
 #include "io/camera_file.h"
 #include "train/data/dataset.h"
@@ -116,7 +117,8 @@ class InputReader {
     TILEGRAD_TRY(CheckSize(frame, view));
     const auto camera = CameraOfFrame(frame, view.size);
     if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
-    const Camera straight = Undistort(frame.camera.lens, *camera, &view);
+    Camera straight = Undistort(frame.camera.lens, *camera, &view);
+    if (LiesAcross(view.size)) Turn(&straight, &view);
     const ReducedView reduced = ReduceView(factor_, straight, view);
     const TargetImages& image = reduced.image;
     input_.cameras.push_back(reduced.camera);
@@ -139,21 +141,37 @@ class InputReader {
 
   Status CheckSize(const InputFrame& frame, const ViewPixels& view) {
     TargetImages& all = input_.images;
-    if (input_.names.empty()) SetSize(view.size);
-    if (view.size.width != size_.width || view.size.height != size_.height) {
+    if (input_.names.empty()) SetSize(frame.image, view.size);
+    const bool same = view.size.width == size_.width && view.size.height == size_.height;
+    if (!same && !LiesAcross(view.size)) {
       return DataLoss(
-          "{}: has {} x {} pixels, the images before it {} x {}; a fit takes images of one size: "
-          "turn or crop it, or leave it out",
-          frame.image.string(), view.size.width, view.size.height, size_.width, size_.height);
+          "{}: has {} x {} pixels, {} has {} x {}; a fit takes images of one size, upright or "
+          "lying: crop or resize one of them, or leave it out",
+          frame.image.string(), view.size.width, view.size.height, first_.string(), size_.width,
+          size_.height);
     }
     if ((input_.names.size() + 1) * all.pixels() <= kMostPixels) return {};
     return ResourceExhausted("{}: all images together have more than {} pixels",
                              frame.image.string(), kMostPixels);
   }
 
+  bool LiesAcross(ImageSize size) const {
+    return size.width != size.height && size.width == size_.height && size.height == size_.width;
+  }
+
+  // The view that is added next.
+  void Turn(Camera* camera, ViewPixels* view) {
+    *camera = TurnedCamera(*camera, view->size.height);
+    view->color = TurnedPlanes(view->color, view->size);
+    view->alpha = TurnedPlanes(view->alpha, view->size);
+    view->size = size_;
+    input_.turned.push_back(static_cast<int>(input_.names.size()));
+  }
+
   // Of all images.
-  void SetSize(ImageSize size) {
+  void SetSize(const Path& first, ImageSize size) {
     const auto [shorter, longer] = std::minmax(size.width, size.height);
+    first_ = first;
     size_ = size;
     factor_ = most_side_ > 0 ? std::min(shorter, (longer - 1) / most_side_ + 1) : 1;
     input_.images.width = size.width / factor_;
@@ -162,6 +180,7 @@ class InputReader {
 
   const int most_side_;
   FitInput& input_;
+  Path first_;      // has `size_`
   ImageSize size_;  // of the images, of which the fit takes 1 / factor_ a side
   int factor_ = 1;
   std::vector<Source> masked_, bare_;
@@ -388,9 +407,10 @@ std::optional<UpAxis> GuessUp(std::span<const Camera> cameras) {
 }
 
 void TurnInputUpright(std::optional<UpAxis> up, FitInput* input) {
-  if (!up && input->own_world) return TurnLevel(UpOf(input->cameras), input->cameras);
+  const std::vector<Camera> held = HeldCameras(*input, input->cameras);
+  if (!up && input->own_world) return TurnLevel(UpOf(held), input->cameras);
   if (!up) {
-    up = GuessUp(input->cameras);
+    up = GuessUp(held);
     if (up) {
       input->warnings.push_back(
           fmt::format("all cameras are upright if {0} points up, so the mesh is turned from {0} up "

@@ -24,7 +24,8 @@ struct FitInput {
   std::vector<Camera> cameras;
   TargetImages images;                  // straight colours (not multiplied by alpha)
   std::vector<int> training, held_out;  // indices of views; every view is in one of them
-  bool masked = false;                  // some image says where the object is
+  std::vector<int> turned;  // those whose image and camera lie a quarter turn clockwise, rising
+  bool masked = false;      // some image says where the object is
   // No image says where the object is, but cameras are known: masks are to be found (masks/).
   bool seeks_masks = false;
   bool masks_found = false;  // masks were found in the images, which had none
@@ -78,8 +79,8 @@ struct InputOptions {
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
 // none). Or a folder of pictures alone, which come without cameras (frames.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
-// images must have one size. Lenses that bend rays are straightened (undistort.h), and large images
-// reduced. Errors name the file.
+// images must have one size, upright or lying (quarter_turn.h). Lenses that bend rays are
+// straightened (undistort.h), and large images reduced. Errors name the file.
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
 inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});
@@ -119,7 +120,7 @@ TargetImages Reduce(const TargetImages& images, int factor);
 std::optional<UpAxis> GuessUp(std::span<const Camera> cameras);
 
 // Turns the world y up, as in glTF, from `up` or, if that is not given, from GuessUp, with a
-// warning. In COLMAP's own world, up is the mean up of the cameras (UpOf).
+// warning. In COLMAP's own world, up is the mean up of the cameras as they were held (UpOf).
 void TurnInputUpright(std::optional<UpAxis> up, FitInput* input);
 
 }  // namespace tilegrad::train

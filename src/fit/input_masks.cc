@@ -105,6 +105,7 @@ Status DropEmptyViews(FitInput* input) {
   KeepPlanes(kept, 1, &input->cameras);
   Renumber(kept, &input->training);
   Renumber(kept, &input->held_out);
+  Renumber(kept, &input->turned);
   return {};
 }
 

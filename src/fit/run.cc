@@ -18,6 +18,7 @@
 #include "fit/hull/mask_distance.h"
 #include "fit/image_loss.h"
 #include "fit/material.h"
+#include "fit/quarter_turn.h"
 #include "fit/texture_fill.h"
 #include "io/image_file.h"
 #include "nn/context.h"
@@ -315,13 +316,15 @@ Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
 
 Status FitResult::WriteCameras() const {
   std::vector<OutputFrame> views;
-  for (std::size_t i = 0; i < job_.input.names.size(); ++i) {
+  const FitInput& input = job_.input;
+  const std::vector<Camera> held = HeldCameras(input, scene_.cameras);
+  for (std::size_t i = 0; i < input.names.size(); ++i) {
     const double gain = scene_.gains.empty() ? 1.0 : static_cast<double>(scene_.gains[i]);
-    views.push_back({job_.input.names[i], scene_.cameras[i], gain});
+    views.push_back({input.names[i], held[i], gain});
   }
-  return WriteTextAtomic(
-      job_.out / "transforms_fitted.json",
-      WriteTransforms(views, {job_.input.images.width, job_.input.images.height}));
+  const ImageSize size = SizeOf(input), across = {size.height, size.width};
+  for (const int i : input.turned) views[static_cast<std::size_t>(i)].size = across;
+  return WriteTextAtomic(job_.out / "transforms_fitted.json", WriteTransforms(views, size));
 }
 
 Status FitResult::Score(FitOutcome* outcome) const {

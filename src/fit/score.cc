@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "fit/cutout.h"
+#include "fit/quarter_turn.h"
 #include "render/picture/composite.h"
 
 namespace tilegrad::train {
@@ -19,6 +20,7 @@ namespace {
 
 constexpr int kSamples = 3;  // a side of a pixel
 constexpr double kBestPsnr = 99;
+constexpr float kCovered = 0.5f;
 constexpr double kLowIou = 0.75;    // mean of all views, below which they do not fit together
 constexpr double kFarBelow = 0.25;  // of one view below the mean, which is then its own fault
 
@@ -54,11 +56,13 @@ double Psnr(const std::vector<float>& a, const std::vector<float>& b) {
   return mean > 0 ? std::min(kBestPsnr, -10 * std::log10(mean)) : kBestPsnr;
 }
 
+// Of pixels that are covered by a half or more: products of soft edges would say less than 1 of
+// equal masks.
 double MaskIou(std::span<const float> a, std::span<const float> b) {
   double both = 0, either = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    both += static_cast<double>(a[i] * b[i]);
-    either += static_cast<double>(a[i] + b[i] - a[i] * b[i]);
+    both += a[i] >= kCovered && b[i] >= kCovered;
+    either += a[i] >= kCovered || b[i] >= kCovered;
   }
   return either > 0 ? both / either : 1;
 }
@@ -128,8 +132,11 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
     score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
     score.iou = MaskIou(rendered.alpha, truth.alpha);
-    score.truth = OverGrey(truth, kWhite);
-    score.rendered = OverGrey(rendered, kWhite);
+    const auto held = [&](const Picture& picture) {
+      return HeldImage(input, static_cast<std::size_t>(score.view), OverGrey(picture, kWhite));
+    };
+    score.truth = held(truth);
+    score.rendered = held(rendered);
     scores.push_back(std::move(score));
   }
   if (!views.empty()) TILEGRAD_TRY(watch.At({"scoring views", views.size(), views.size(), ""}));

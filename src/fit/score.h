@@ -16,7 +16,7 @@ namespace tilegrad::train {
 struct ViewScore {
   int view = 0;
   double psnr = 0;  // dB over the whole image, both over white; 3 x 3 samples a pixel
-  double iou = 0;   // of the silhouettes
+  double iou = 0;   // of the silhouettes: pixels that mask and render cover by a half or more
   ImageU8 truth, rendered;
 };
 

@@ -150,4 +150,11 @@ TEST(EscapeCsv, QuotesWhereItMust) {
   EXPECT_EQ(EscapeCsv("a\"b\nc"), "\"a\"\"b\nc\"");
 }
 
+TEST(ShellWord, QuotesWhereItMust) {
+  EXPECT_EQ(ShellWord("runs/mine-2.0"), "runs/mine-2.0");
+  EXPECT_EQ(ShellWord("my runs/a"), "'my runs/a'");
+  EXPECT_EQ(ShellWord("Bob's $HOME"), "'Bob'\\''s $HOME'");
+  EXPECT_EQ(ShellWord(""), "''");
+}
+
 }  // namespace tilegrad::text_test

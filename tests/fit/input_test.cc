@@ -8,6 +8,8 @@
 
 #include "base/text.h"
 #include "fit/frames.h"
+#include "fit/masks/start_masks.h"
+#include "fit/quarter_turn.h"
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 
@@ -319,10 +321,44 @@ TEST_F(Input, FramesOfTheTestFileAreNotFitted) {
 
 TEST_F(Input, ImagesOfSeveralSizesAreRefused) {
   for (int i = 0; i < 10; ++i) Image("z/images/" + std::to_string(i) + ".png", 51);
-  Ok(io::SavePng(folder_ / "z/images/4.png", ImageU8(6, 8, 3, 51)));
+  Ok(io::SavePng(folder_ / "z/images/4.png", ImageU8(6, 7, 3, 51)));
   Write("z/transforms.json", TenFrames(-1, ""));
-  ExpectMessage(ReadFitFolder(folder_ / "z", 0).status(), "4.png: has 6 x 8 pixels", "8 x 6",
-                "turn or crop it");
+  ExpectMessage(ReadFitFolder(folder_ / "z", 0).status(), "4.png: has 6 x 7 pixels",
+                "0.png has 8 x 6", "crop or resize");
+}
+
+TEST_F(Input, ImagesThatLieAcrossAreTurnedWithTheirCameras) {
+  for (int i = 0; i < 10; ++i)
+    Ok(io::SavePng(folder_ / "a/images" / (std::to_string(i) + ".png"), CutOut(4)));
+  ImageU8 across(6, 8, 4, 255);
+  for (std::size_t p = 24; p < 48; ++p)
+    across.pixels[4 * p + 3] = 0;  // the upper half is the object
+  across.at(1, 2)[0] = 0;
+  Ok(io::SavePng(folder_ / "a/images/4.png", across));
+  Write("a/transforms.json", TenFrames(4, R"("fl_x":10,"fl_y":11,"cx":2,"cy":3,)"));
+  auto input = Ok(ReadFitFolder(folder_ / "a", 0));
+  EXPECT_EQ(input->turned, std::vector<int>{4});
+  const float* const red = &input->images.color[3 * 4 * 48];
+  EXPECT_EQ(std::find(red, red + 48, 0.0f) - red, 8 + 5);
+  EXPECT_EQ(input->images.alpha[4 * 48 + 3], 0);
+  EXPECT_EQ(input->images.alpha[4 * 48 + 4], 1);
+  const Camera& camera = input->cameras[4];
+  EXPECT_EQ(camera.fx, 11);
+  EXPECT_EQ(camera.cx, 5);
+  EXPECT_EQ(camera.cy, 2);
+  EXPECT_EQ(camera.rotation[1], 1);  // what was up is to the right
+  const Camera held = HeldCameras(*input, input->cameras)[4];
+  EXPECT_EQ(held.fx, 10);
+  EXPECT_EQ(held.cx, 2);
+  EXPECT_EQ(held.cy, 3);
+  EXPECT_EQ(held.rotation[0], 1);
+  // Masks are written as images are, and read back.
+  const auto alpha = input->images.alpha;
+  Ok(WriteMasks(folder_ / "masks", *input));
+  EXPECT_EQ(Ok(io::LoadImage(folder_ / "masks/4.png.png"))->height, 8);
+  std::ranges::fill(input->images.alpha, 0.5f);
+  Ok(ReadMasks(folder_ / "masks", &*input));
+  EXPECT_EQ(input->images.alpha, alpha);
 }
 
 TEST_F(Input, CamerasOfImagesOfAnotherShapeAreRefused) {

@@ -238,7 +238,7 @@ TEST(FitMasks, AFloorStandsOutWhereThereIsOne) {
   for (const Place place : {Place::kTable, Place::kRoom, Place::kPaper}) {
     const FitInput input = Capture(place).input();
     const Workers workers(1);
-    const Floor floor(input.images, input.cameras, {{0, 0, 0}, 0.9f}, workers);
+    const Floor floor(input.images, input.cameras, {{0, 0, 0}, 0.9f, UpOf(input.cameras)}, workers);
     EXPECT_EQ(floor.found(), place != Place::kPaper);
     if (floor.found()) {
       EXPECT_NEAR(floor.height(), kFloor, 0.02f);

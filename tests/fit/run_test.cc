@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 
 #include "fit/frames.h"
+#include "fit/quarter_turn.h"
 #include "fit/views_fixture.h"
 #include "io/image_file.h"
 #include "nn/context.h"
@@ -377,14 +379,42 @@ TEST_F(Fit, PerturbedCamerasStillSeeTheObject) {
 TEST_F(Fit, TransformsRoundTrip) {
   const Camera camera = OrbitCamera({50, 40, 30}, 20, 30, 2);
   const Path file = folder_ / "cameras.json";
-  ASSERT_TRUE(WriteTextAtomic(file, WriteTransforms({{"a.png", camera}}, {40, 30})).ok());
+  ASSERT_TRUE(WriteTextAtomic(
+                  file, WriteTransforms(
+                            {{"a.png", camera}, {"b.png", camera, 1, ImageSize{30, 40}}}, {40, 30}))
+                  .ok());
   const auto frames = Ok(ReadTransforms(file));
+  EXPECT_EQ(frames->at(1).camera.size->height, 40);
   // Half the size: everything in pixels halves.
   const auto half = Ok(CameraOfFrame(frames->at(0), {20, 15}));
   EXPECT_NEAR(half->fx, camera.fx / 2, 1e-4);
   EXPECT_NEAR(half->cy, camera.cy / 2, 1e-4);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(half->rotation[i], camera.rotation[i], 1e-5);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(half->translation[i], camera.translation[i], 1e-5);
+}
+
+// Edges of masks are soft.
+TEST_F(Fit, ScoresTheTruthHighlyAndTurnedViewsAlike) {
+  FitInput input = Input();
+  const FitScene truth = Ok(SceneOfMesh(Truth())).value();
+  const auto scores = [&] {
+    const std::span cameras(input.cameras);
+    return Ok(ScoreViews(truth, input, std::array{0, 1}, cameras.first(2), Workers(1))).value();
+  };
+  const std::vector<ViewScore> upright = scores();
+  EXPECT_GT(MeanIou(upright), 0.98);
+  const ImageSize size{64, 64};
+  const auto turn = [&](std::span<float> planes) {
+    std::ranges::copy(TurnedPlanes(planes, size), planes.begin());
+  };
+  turn(std::span(input.images.color).subspan(3 * 4096, 3 * 4096));
+  turn(std::span(input.images.alpha).subspan(4096, 4096));
+  input.cameras[1] = TurnedCamera(input.cameras[1], size.height);
+  input.turned = {1};
+  const std::vector<ViewScore> turned = scores();
+  EXPECT_NEAR(turned[1].psnr, upright[1].psnr, 0.05);
+  EXPECT_NEAR(turned[1].iou, upright[1].iou, 0.005);
+  EXPECT_EQ(turned[1].truth.pixels, upright[1].truth.pixels);
 }
 
 TEST(FitScore, SaysWhichMaskOrCameraIsInDoubt) {

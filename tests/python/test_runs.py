@@ -70,6 +70,14 @@ class Fit(FolderTest):
         np.testing.assert_array_equal(rest.mesh.positions, whole.mesh.positions)
         self.assertTrue((rest.folder / "report.html").exists())
 
+    def test_a_damaged_checkpoint_is_skipped_with_a_warning(self):
+        options = {**SMALL, "checkpoint_every": 20}
+        whole = tilegrad.fit(IMAGES, CAMERAS, out=self.out, **options)
+        sorted((self.out / "checkpoints").iterdir())[-1].write_bytes(b"")
+        with self.assertWarnsRegex(UserWarning, "^fit: skipped: .*step_00000060"):
+            again = tilegrad.fit(IMAGES, CAMERAS, out=self.out, resume=True, **options)
+        np.testing.assert_array_equal(whole.mesh.positions, again.mesh.positions)
+
     def test_a_finished_fit_goes_on_with_more_steps(self):
         tilegrad.fit(IMAGES, CAMERAS, out=self.out, **SMALL)
         more = tilegrad.fit(IMAGES, CAMERAS, out=self.out, resume=True, **{**SMALL, "steps": 90})

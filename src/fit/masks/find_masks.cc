@@ -13,6 +13,7 @@
 #include "fit/masks/common_hull.h"
 #include "fit/masks/floor.h"
 #include "fit/masks/holes.h"
+#include "fit/quarter_turn.h"
 #include "fit/sphere.h"
 
 namespace tilegrad::train {
@@ -158,6 +159,7 @@ class MaskSearch {
  public:
   MaskSearch(const FitInput& input, glm::vec3 middle, const Workers& workers)
       : full_(input.images),
+        up_(UpOf(HeldCameras(input, input.cameras))),
         workers_(workers),
         factor_(std::max(1, std::max(full_.width, full_.height) / kRoundSide)),
         images_(Reduce(full_, factor_)),
@@ -218,7 +220,7 @@ class MaskSearch {
   // Belief falls with the distance from where all views look; the hull holds all that they see.
   void Start(glm::vec3 middle) {
     hull_->Vote(std::vector<float>(inside_.size(), 1.0f), kFirstTolerance, workers_);
-    floor_.emplace(images_, cameras_, Floor::Region{middle, hull_->reach()}, workers_);
+    floor_.emplace(images_, cameras_, Floor::Region{middle, hull_->reach(), up_}, workers_);
     const float radius = 0.5f * static_cast<float>(std::min(images_.width, images_.height));
     workers_.For(views(), [&](std::size_t v, std::size_t) {
       const auto at = hull_->Project(v, middle);
@@ -333,6 +335,7 @@ class MaskSearch {
   }
 
   const TargetImages& full_;
+  const glm::vec3 up_;
   const Workers& workers_;
   const int factor_;
   const TargetImages images_;

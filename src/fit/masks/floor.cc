@@ -65,7 +65,7 @@ glm::vec3 UpOf(std::span<const Camera> cameras) {
 
 Floor::Floor(const TargetImages& images, std::span<const Camera> cameras, const Region& region,
              const Workers& workers)
-    : images_(images), cameras_(cameras), region_(region), up_(UpOf(cameras)) {
+    : images_(images), cameras_(cameras), region_(region), up_(region.up) {
   const bool leans = std::abs(up_.x) > 0.7f;
   along_ = glm::normalize(glm::cross(up_, leans ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
   across_ = glm::cross(up_, along_);

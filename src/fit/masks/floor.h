@@ -23,7 +23,8 @@ class Floor {
  public:
   struct Region {
     glm::vec3 middle;
-    float reach;  // the floor is below `middle` by up to so much, and looked at so far around it
+    float reach;   // the floor is below `middle` by up to so much, and looked at so far around it
+    glm::vec3 up;  // of length 1
   };
   // Cameras and images must outlive it.
   Floor(const TargetImages& images, std::span<const Camera> cameras, const Region& region,
@@ -36,7 +37,7 @@ class Floor {
 
   // Whether one height stands out; else nothing is known of a floor.
   bool found() const { return found_; }
-  // Along UpOf, from the region's middle.
+  // Along the region's up, from its middle.
   float height() const { return height_; }
   // [H,W] in [-1, 1]: 1 where a view's pixel has the colour that most views see where it meets the
   // floor; -1 where it has another, so that something stands before it; 0 where nothing is known;

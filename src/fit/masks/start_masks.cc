@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "fit/masks/find_masks.h"
+#include "fit/quarter_turn.h"
 #include "fit/undistort.h"
 #include "io/image_file.h"
 
@@ -102,6 +103,7 @@ Status WriteMasks(const Path& folder, const FitInput& input) {
     const auto alpha = std::span(all.alpha).subspan(v * all.pixels(), all.pixels());
     std::ranges::transform(alpha, mask.pixels.begin(),
                            [](float a) { return static_cast<std::uint8_t>(255 * a + 0.5f); });
+    mask = HeldImage(input, v, std::move(mask));
     TILEGRAD_TRY(io::SavePng(folder / (MaskName(input, v) + ".png"), mask));
   }
   return {};
@@ -111,8 +113,12 @@ Status ReadMasks(const Path& folder, FitInput* input) {
   TargetImages& all = input->images;
   for (std::size_t v = 0; v < input->names.size(); ++v) {
     TILEGRAD_ASSIGN(const Path file, FindMask(folder, MaskName(*input, v)));
-    TILEGRAD_TRY(LoadMask(file, {all.width, all.height},
-                          std::span(all.alpha).subspan(v * all.pixels(), all.pixels())));
+    const auto alpha = std::span(all.alpha).subspan(v * all.pixels(), all.pixels());
+    const bool turned = std::ranges::binary_search(input->turned, static_cast<int>(v));
+    const ImageSize size =
+        turned ? ImageSize{all.height, all.width} : ImageSize{all.width, all.height};
+    TILEGRAD_TRY(LoadMask(file, size, alpha));
+    if (turned) std::ranges::copy(TurnedPlanes(alpha, size), alpha.begin());
   }
   return {};
 }

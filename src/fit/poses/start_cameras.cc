@@ -22,6 +22,7 @@
 #include "fit/masks/floor.h"
 #include "fit/masks/start_masks.h"
 #include "fit/poses/find_poses.h"
+#include "fit/quarter_turn.h"
 #include "fit/score.h"
 #include "fit/sphere.h"
 #include "scene/camera.h"
@@ -232,7 +233,7 @@ constexpr double kWideGap = 30;
 void NoteWidestGap(FitInput* input) {
   const auto sphere = GuessSphere(*input);
   if (!sphere.ok()) return;
-  const ViewGap gap = WidestGap(input->cameras, sphere->centre);
+  const ViewGap gap = WidestGap(HeldCameras(*input, input->cameras), sphere->centre);
   input->notes.push_back(
       gap.degrees < kWideGap
           ? fmt::format("views: all around, every direction is within {:.0f} degrees of one",
@@ -295,6 +296,12 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
     return InvalidArgument(
         "cameras cannot be found without masks: give images with alpha, masks, or a plain "
         "background");
+  }
+  if (!input->turned.empty()) {
+    return InvalidArgument(
+        "{}: lies across the first image, but a search for cameras takes images that were all held "
+        "alike: leave it out, give cameras, or install COLMAP",
+        input->names[static_cast<std::size_t>(input->turned[0])]);
   }
   std::vector<int> views = input->training;
   if (!input->posed) {
