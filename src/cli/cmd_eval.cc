@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/ranks.h"
@@ -61,23 +62,34 @@ train::PredictionChange RefineWith(int steps, const train::Predictor& predictor)
 // What is evaluated, and where that is written.
 struct Subject {
   Path run, data;
-  std::vector<Path> files;  // that keep the figures; of the network alone on held-out models
+  std::string scores;   // how the files that keep the figures begin
+  bool is_kept = true;  // the figures, of the network alone on held-out models
   std::optional<train::Predictor> predictor;
   std::optional<train::Evaluation> other;  // of EvalOptions::compare
 };
 
+// On another dataset than the run's own, that is part of the name.
+Result<std::string> ScoresName(const Path& run, const Path& data) {
+  TILEGRAD_ASSIGN(const bool own, train::IsTrainedOn(run, data));
+  if (own) return std::string(train::kOwnScores);
+  std::error_code error;
+  const Path folder = std::filesystem::canonical(data, error);
+  return fmt::format("{}_on_{}", train::kOwnScores, folder.filename().string());
+}
+
 Status Prepare(const EvalOptions& options, const Workers& workers, Subject* out) {
   TILEGRAD_ASSIGN(out->run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
-  if (IsFolder(out->run) && kSplits.at(options.split) == train::Split::kTest &&
-      options.refine == 0 && options.voxels.empty())
-    out->files = {out->run / "eval.md", out->run / "eval.json"};
+  out->is_kept = IsFolder(out->run) && kSplits.at(options.split) == train::Split::kTest &&
+                 options.refine == 0 && options.voxels.empty();
   TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
+  TILEGRAD_ASSIGN(out->scores, ScoresName(out->run, out->data));
   if (options.compare.empty()) return {};
-  TILEGRAD_ASSIGN(out->other, train::ReadEvaluation(options.compare));
+  TILEGRAD_ASSIGN(out->other, train::ReadEvaluation(options.compare, out->scores));
   if (out->other) return {};
-  return InvalidArgument("{0}: there is no eval.json in it; run tilegrad eval --run {0} first",
-                         options.compare);
+  return NotFound("{}: there is no {}.json in it; run tilegrad eval --run {} --data {} first",
+                  options.compare, out->scores, ShellWord(options.compare),
+                  ShellWord(out->data.string()));
 }
 
 // What ranks must have in common.
@@ -110,7 +122,7 @@ Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Su
 Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
   // Files first: printing may fail. Where they cannot be written, the work must not be lost.
   const Status saved =
-      subject.files.empty() ? Status() : train::WriteEvaluation(subject.run, evaluation);
+      subject.is_kept ? train::WriteEvaluation(subject.run, evaluation, subject.scores) : Status();
   Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
   nlohmann::ordered_json json = train::EvaluationJson(evaluation);
   if (subject.other) {
@@ -119,8 +131,8 @@ Status Tell(const train::Evaluation& evaluation, const Subject& subject) {
     json["compared"] = train::ComparisonJson(comparison);
   }
   PrintResult(json);
-  if (!saved.ok() || subject.files.empty()) return saved;
-  Print("written to {} and {}\n", subject.files[0].string(), subject.files[1].string());
+  if (!saved.ok() || !subject.is_kept) return saved;
+  Print("written to {0}.md and {0}.json\n", (subject.run / subject.scores).string());
   return {};
 }
 

@@ -44,11 +44,10 @@ Status RunReport(const ReportOptions& options) {
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: skipped: {}\n", warning);
   Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),
-        Count(static_cast<std::size_t>(summary->models), "model"),
+        Count(static_cast<std::size_t>(summary->models), summary->thing),
         static_cast<double>(summary->bytes) / 1e6);
   if (!summary->sheet_columns.empty())
-    Print("{}: the same models in one image; columns: {}\n", job.sheet.string(),
-          summary->sheet_columns);
+    Print("{}: the same in one image; columns: {}\n", job.sheet.string(), summary->sheet_columns);
   if (!summary->evaluated) Print("no scores yet: run tilegrad eval, then tilegrad report again\n");
   PrintResult({{"page", job.out.string()},
                {"sheet", summary->sheet_columns.empty() ? "" : job.sheet.string()},
@@ -65,7 +64,8 @@ void AddReport(CommandList* list) {
       list, "report", "Report of a run on one page: scores, curves, images, interactive meshes",
       RunReport);
   AddRunOptions(command, &options->on);
-  command->Add("--models", &options->models, "number of held-out models to show", {Range{0, 200}});
+  command->Add("--models", &options->models, "number of held-out models or photographs to show",
+               {Range{0, 200}});
   command->Add("--out", &options->out,
                "output page [RUN/report.html]; the summary image becomes RUN/summary.png, or "
                "PAGE_summary.png beside the page",

@@ -270,7 +270,8 @@ void AddSample(CommandList* list) {
                "folder for sample_001.glb and so on, sheet.png (each from the front and from "
                "behind) and turntable.webp");
   command->Add("--seed", &options->seed,
-               "seed of the latent codes; the same seed gives the same objects, bit for bit");
+               "seed of the latent codes; the same seed gives the same objects, bit for bit",
+               {NotNegative()});
   command->Add("--interpolate", &options->interpolate,
                "interpolation steps from each object to the next, for interpolation.png (a row for "
                "each pair) and interpolation.webp; 0: none",

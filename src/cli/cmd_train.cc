@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/parallel.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/live_option.h"
@@ -33,6 +34,7 @@ struct TrainOptions {
 
 void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
                   const char* score_command) {
+  const std::string run = ShellWord(options.out);
   if (outcome.first_step == outcome.last_step) {
     Print("{}: the run is complete at step {}; nothing to do\n", options.out, outcome.last_step);
     return;
@@ -40,9 +42,9 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
   Print("{}: {} at step {}, {} of training\n", options.out,
         outcome.finished ? "finished" : "stopped", outcome.last_step,
         FormatDuration(outcome.seconds));
-  if (!outcome.finished) Print("resume with: tilegrad train --resume {}\n", options.out);
-  if (outcome.finished) Print("scores: tilegrad {} --run {}\n", score_command, options.out);
-  Print("curves: tensorboard --logdir {}\n", options.out);
+  if (!outcome.finished) Print("resume with: tilegrad train --resume {}\n", run);
+  if (outcome.finished) Print("scores: tilegrad {} --run {}\n", score_command, run);
+  Print("curves: tensorboard --logdir {}\n", run);
 }
 
 void PrintJson(const train::RunOutcome& outcome, const TrainOptions& options) {
@@ -64,9 +66,9 @@ Status TakeFromRun(TrainOptions* options) {
     return NotFound("{}: not a run of tilegrad train: there is no config.toml in it", run.string());
   if (options->data.empty() && !PathExists(run / "run.json"))
     return NotFound(
-        "{0}: there is no run.json in it, which names its dataset; name that: tilegrad train "
-        "--resume {0} --data DATASET",
-        run.string());
+        "{}: there is no run.json in it, which names its dataset; name that: tilegrad train "
+        "--resume {} --data DATASET",
+        run.string(), ShellWord(run.string()));
   options->out = run.string();
   if (options->config.empty()) options->config = (run / "config.toml").string();
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options->data, run));
@@ -115,7 +117,7 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
 Status WithResume(const Status& status, const std::string& run) {
   const auto begun = train::HoldsRun(run);
   if (!begun.ok() || !*begun) return status;
-  return WithCommand(status, "tilegrad train --resume " + run);
+  return WithCommand(status, "tilegrad train --resume " + ShellWord(run));
 }
 
 // Says where sample sheets are, as soon as there is one.

@@ -172,6 +172,27 @@ TEST_F(Outputs, RunsStartAnewOrGoOn) {
   EXPECT_FALSE(Exists("r/eval.json"));  // of other weights
 }
 
+TEST_F(Outputs, ScoresOnOtherDataHaveFilesOfTheirOwn) {
+  MakeData(In("d"));
+  MakeRun(In("d"), In("r"));
+  ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 3 --seed 3 --out other");
+  const std::string eval = "eval --run r --views-per-model 1";
+  ExpectDone(eval);
+  const std::string own = ReadText(folder_ / "r/eval.json").value();
+  ExpectRefused(Run(eval + " --data other --compare r"), 3, "no eval_on_other.json");
+  ExpectDone(eval + " --data other");
+  EXPECT_TRUE(Exists("r/eval_on_other.json") && Exists("r/eval_on_other.md"));
+  EXPECT_EQ(ReadText(folder_ / "r/eval.json").value(), own);
+  ExpectDone(eval + " --data other --compare r");
+  // The run's own dataset, wherever it lies.
+  std::filesystem::rename(folder_ / "d", folder_ / "moved");
+  Write("r/eval.json", std::string("of an earlier call"));
+  ExpectDone(eval + " --data moved");
+  EXPECT_EQ(ReadText(folder_ / "r/eval.json").value(), own);
+  ExpectDone(TrainTiny("moved", "r") + " --force");
+  EXPECT_FALSE(Exists("r/eval_on_other.json"));  // of other weights
+}
+
 TEST_F(Outputs, PredictionsScoresAndReports) {
   MakeData(In("d"));
   MakeRun(In("d"), In("r"));

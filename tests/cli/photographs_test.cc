@@ -33,13 +33,19 @@ TEST_F(Photographs, FromAnnotationsToATableInFourCommands) {
                kSmall);
     const std::string table = ExpectDone("eval --run " + run);
     ExpectIn(table, "PCK@0.1");
-    ExpectDone("report --run " + run);
+    ExpectIn(ExpectDone("report --run " + run), "3 photographs");
     ExpectDone("predict --refine 20 --run " + run + " --out " + In("out_" + std::string(source)) +
                " " + In("cutout.png"));
     EXPECT_TRUE(
         std::filesystem::exists(folder_ / ("out_" + std::string(source)) / "cutout_predicted.glb"));
     EXPECT_TRUE(std::filesystem::exists(Path(run) / "report.html"));
   }
+}
+
+TEST_F(Photographs, AreNoDatasetOfModels) {
+  MakeData(In("d"));
+  ExpectRefused("train --config birds --data " + In("d") + " --out " + In("r") + kSmall, 2,
+                "d: holds a dataset of models");
 }
 
 }  // namespace tilegrad::photographs_test

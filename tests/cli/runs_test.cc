@@ -51,6 +51,8 @@ TEST_F(Runs, GoOnFromTheirFolderAlone) {
   EXPECT_TRUE(std::equal(a.end() - 1000, a.end(), b.end() - 1000));
   const Outcome said = RunProgram("train --resume " + In("run") + " --steps 4");
   ExpectIn(said.output, "tensorboard --logdir " + In("run"));
+  // Commands to type are what a shell reads.
+  ExpectIn(ExpectDone(Start("run") + "\\ 2"), "eval --run '" + In("run 2") + "'");
 }
 
 TEST_F(Runs, AreProfiledBeforeTheyExist) {

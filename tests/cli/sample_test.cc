@@ -126,6 +126,7 @@ TEST_F(Sample, RefusesWhatItCannotDo) {
               "need --score");
   ExpectError("sample --run " + Run("g") + " --score --judge " + Run("t") + " --out " + In("x"),
               "task.kind = \"classify\"");
+  ExpectError("sample --run " + Run("g") + " --seed -1 --out " + In("x"), "--seed: -1");
   Write("y/sheet.png", "mine");
   ExpectError("sample --run " + Run("g") + " --out " + In("y"), "sheet.png");
   ExpectError("eval --run " + Run("g") + " --data " + Run("d"), "tilegrad sample --score");

@@ -185,6 +185,8 @@ TEST_F(RunTest, WhatIsWrongWithAnAssignmentIsSaid) {
   ExpectMessage(error("network.steps=3"), "did you mean schedule.steps?");
   const Status far_off = error("optimizer.lr=3");
   ExpectMessage(far_off, "unknown key \"optimizer.lr\"; [optimizer] has ");
+  ExpectMessage(ParseConfig("zyxwvu = 1", "less").status(),
+                "\"zyxwvu\"; the config.toml of any run");
   ExpectNotIn(far_off.message(), "did you mean");
   ExpectMessage(ParseConfig("[schedule]\nsteps = ten\n", "c.toml").status(), "c.toml", "line 2",
                 "text needs quotes");

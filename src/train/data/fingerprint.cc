@@ -5,7 +5,6 @@
 #include "base/hash.h"
 #include "base/try_all.h"
 #include "train/data/dataset_files.h"
-#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 namespace {
@@ -28,21 +27,6 @@ Status AddFiles(const std::vector<Path>& files, const Workers& workers, Hash* al
   return {};
 }
 
-void AddPhotograph(const Photograph& photo, Hash* all) {
-  const WeakPerspective camera = photo.camera.value_or(WeakPerspective{.scale = 0});
-  const auto& [left, top, right, bottom] = photo.box;
-  const auto split = static_cast<double>(photo.split);
-  std::vector<double> numbers = {split, left, top, right, bottom, camera.scale};
-  numbers.insert(numbers.end(), camera.translation.begin(), camera.translation.end());
-  numbers.insert(numbers.end(), camera.quaternion.begin(), camera.quaternion.end());
-  for (const Keypoint& k : photo.keypoints)
-    if (k.visible) numbers.insert(numbers.end(), {k.x, k.y});
-  const std::vector<std::uint8_t> mask(photo.mask.inside.begin(), photo.mask.inside.end());
-  all->Add(photo.id);
-  all->AddAll(numbers);
-  all->AddBytes(mask.data(), mask.size());
-}
-
 Result<std::string> DatasetFingerprint(const Path& folder, const Workers& workers) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
   std::vector<Path> files = {DatasetInfoPath(folder), ModelsPath(folder)};
@@ -55,14 +39,15 @@ Result<std::string> DatasetFingerprint(const Path& folder, const Workers& worker
 
 Result<std::string> PhotographsFingerprint(const Path& folder, const Workers& workers) {
   TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(folder));
+  std::vector<std::string> hashes(set.photographs.size());
+  const auto read = [&](std::size_t i, std::size_t) -> Status {
+    TILEGRAD_ASSIGN(hashes[i], PhotographFingerprint(set.photographs[i]));
+    return {};
+  };
+  TILEGRAD_TRY(TryAll(workers, hashes.size(), read));
   Hash all;
-  std::vector<Path> files;
-  for (const Photograph& photo : set.photographs) {
-    files.push_back(photo.image);
-    AddPhotograph(photo, &all);
-  }
+  for (const std::string& hash : hashes) all.Add(hash);
   for (const auto& point : set.mean_keypoints) all.AddAll(point);
-  TILEGRAD_TRY(AddFiles(files, workers, &all));
   return all.Text();
 }
 
@@ -71,6 +56,24 @@ Result<std::string> PhotographsFingerprint(const Path& folder, const Workers& wo
 Result<std::string> DataFingerprint(const Path& folder, const Workers& workers) {
   return PathExists(DatasetInfoPath(folder)) ? DatasetFingerprint(folder, workers)
                                              : PhotographsFingerprint(folder, workers);
+}
+
+Result<std::string> PhotographFingerprint(const Photograph& photo) {
+  const WeakPerspective camera = photo.camera.value_or(WeakPerspective{.scale = 0});
+  const auto& [left, top, right, bottom] = photo.box;
+  const auto split = static_cast<double>(photo.split);
+  std::vector<double> numbers = {split, left, top, right, bottom, camera.scale};
+  numbers.insert(numbers.end(), camera.translation.begin(), camera.translation.end());
+  numbers.insert(numbers.end(), camera.quaternion.begin(), camera.quaternion.end());
+  for (const Keypoint& k : photo.keypoints)
+    if (k.visible) numbers.insert(numbers.end(), {k.x, k.y});
+  const std::vector<std::uint8_t> mask(photo.mask.inside.begin(), photo.mask.inside.end());
+  Hash annotations;
+  annotations.Add(photo.id);
+  // Not doubles: the last bits of a camera that was computed may depend on the machine.
+  annotations.AddAll(std::vector<float>(numbers.begin(), numbers.end()));
+  annotations.AddBytes(mask.data(), mask.size());
+  return WithFile(annotations.Text(), photo.image);
 }
 
 Result<std::string> WithFile(const std::string& fingerprint, const Path& file) {

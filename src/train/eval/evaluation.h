@@ -93,17 +93,23 @@ struct Evaluation {
 bool Classifies(const Evaluation& evaluation);
 // Whether they are of photographs.
 bool IsOfPhotographs(const Evaluation& evaluation);
+// "photograph" or "model".
+const char* ScoredThing(const Evaluation& evaluation);
 // Score::main in words: "3D IoU", "accuracy", "keypoints within 0.1" or "2D IoU".
 const char* MainMeasure(const Evaluation& evaluation);
 // The table with methods as rows and classes as columns, each cell "IoU / F-score", or the
 // accuracy, in percent; means with their standard errors.
 std::string FormatTable(const Evaluation& evaluation);
 std::string FormatMarkdown(const Evaluation& evaluation);
-// <run>/eval.json and <run>/eval.md, each whole or not at all.
-// What eval.json holds.
+// The contents of <run>/eval.json.
 nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation);
-Status WriteEvaluation(const Path& run, const Evaluation& evaluation);
-// What WriteEvaluation wrote; nullopt without eval.json.
-Result<std::optional<Evaluation>> ReadEvaluation(const Path& run);
+// How the files of scores on the run's own dataset begin; on others: kOwnScores + "_on_NAME".
+inline constexpr const char* kOwnScores = "eval";
+// <run>/NAME.json and <run>/NAME.md, each whole or not at all.
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation,
+                       const std::string& name = kOwnScores);
+// What WriteEvaluation wrote; nullopt without <run>/NAME.json.
+Result<std::optional<Evaluation>> ReadEvaluation(const Path& run,
+                                                 const std::string& name = kOwnScores);
 
 }  // namespace tilegrad::train

@@ -98,15 +98,16 @@ std::string Join(const std::vector<std::string>& line, const std::vector<std::si
 std::string Caption(const Evaluation& evaluation) {
   int models = 0;
   for (const int n : evaluation.class_models) models += n;
+  const std::string things = Count(models, ScoredThing(evaluation));
   if (IsOfPhotographs(evaluation))
-    return fmt::format("{} (%) on {} of the {} split", MainMeasure(evaluation),
-                       Count(models, "photograph"), evaluation.split);
+    return fmt::format("{} (%) on {} of the {} split", MainMeasure(evaluation), things,
+                       evaluation.split);
   const std::string measures =
       Classifies(evaluation)
           ? "Accuracy (%)"
           : fmt::format("3D IoU at 32^3 (%) / F-score at {} (%)", kFScoreThreshold);
-  return fmt::format("{} on {} of the {} split, {} each", measures, Count(models, "model"),
-                     evaluation.split, Count(evaluation.views_per_model, "view"));
+  return fmt::format("{} on {} of the {} split, {} each", measures, things, evaluation.split,
+                     Count(evaluation.views_per_model, "view"));
 }
 
 std::string ClassifierNotes(const Evaluation& evaluation) {
@@ -276,6 +277,10 @@ bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score
 
 bool IsOfPhotographs(const Evaluation& evaluation) { return HasAny(evaluation, &Score::mask_loss); }
 
+const char* ScoredThing(const Evaluation& evaluation) {
+  return IsOfPhotographs(evaluation) ? "photograph" : "model";
+}
+
 const char* MainMeasure(const Evaluation& evaluation) {
   if (HasAny(evaluation, &Score::pck)) return "keypoints within 0.1";
   if (IsOfPhotographs(evaluation)) return "2D IoU";
@@ -338,14 +343,15 @@ nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
   return json;
 }
 
-Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
-  for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
-  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", JsonText(EvaluationJson(evaluation), 1) + "\n"));
-  return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation, const std::string& name) {
+  const Path numbers = run / (name + ".json"), table = run / (name + ".md");
+  for (const Path& file : {numbers, table}) RemoveTemporariesOf(file);
+  TILEGRAD_TRY(WriteTextAtomic(numbers, JsonText(EvaluationJson(evaluation), 1) + "\n"));
+  return WriteTextAtomic(table, FormatMarkdown(evaluation));
 }
 
-Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
-  const Path file = run / "eval.json";
+Result<std::optional<Evaluation>> ReadEvaluation(const Path& run, const std::string& name) {
+  const Path file = run / (name + ".json");
   if (!PathExists(file)) return std::optional<Evaluation>();
   const std::string place = file.string();
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));

@@ -205,7 +205,7 @@ Result<std::string> Page(const ReportFacts& facts) {
        {"summary", SummaryHtml(facts)},
        {"comparison", ComparisonHtml(facts)},
        {"meshes_title", made ? "Generated meshes, interactive" : "Predicted meshes, interactive"},
-       {"models_title", made ? "Generated objects" : "Held-out models"},
+       {"models_title", (made ? "Generated " : "Held-out ") + facts.showcase.thing + "s"},
        {"models", models},
        {"scores", ScoresHtml(facts)},
        {"commands", CommandsHtml(facts)},
@@ -272,6 +272,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
   ReportSummary summary;
   summary.bytes = page.size();
+  summary.thing = facts.showcase.thing;
   summary.models = static_cast<int>(facts.showcase.examples.size());
   summary.evaluated = facts.evaluation.has_value() || facts.showcase.generated;
   summary.warnings = predictor.warnings();

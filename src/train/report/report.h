@@ -67,7 +67,8 @@ struct ReportJob {
 
 struct ReportSummary {
   std::size_t bytes = 0;              // of the page
-  int models = 0;                     // shown
+  int models = 0;                     // shown, or photographs
+  std::string thing;                  // Showcase::thing, of which `models` are shown
   bool evaluated = false;             // the run has an eval.json
   std::string sheet_columns;          // of ReportJob::sheet, if it was written
   std::vector<std::string> warnings;  // newer checkpoints that could not be read

@@ -47,7 +47,7 @@ function showModel([prediction, truth], index) {
   truth.show(model.truth);
   prediction.canvas.setAttribute('aria-label', `Predicted mesh of ${model.name}; turn it with the arrow keys`);
   truth.canvas.setAttribute('aria-label', `True mesh of ${model.name}; turn it with the arrow keys`);
-  byId('viewer-truth-caption').textContent = model.truth ? 'truth' : 'the dataset has no mesh of this model';
+  byId('viewer-truth-caption').textContent = model.truth ? 'truth' : 'the dataset has no mesh of it';
   byId('viewer-input').src = inputOf(index);
   byId('viewer-input').alt = data.generated ? model.name : `${model.name}: the image that the network sees`;
   byId('viewer-name').textContent = titleOf(model);

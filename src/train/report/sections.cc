@@ -46,11 +46,10 @@ std::string EvaluationSentence(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
-  const char* const thing = IsOfPhotographs(evaluation) ? "photograph" : "model";
   return fmt::format(
       "Mean {} on {} {} of the {} split: <b>{:.1f} %</b>{}", MainMeasure(evaluation),
-      WithCommas(models), Plural(thing, models == 1), EscapeHtml(evaluation.split),
-      100 * evaluation.rows.back().mean.main(),
+      WithCommas(models), Plural(ScoredThing(evaluation), models == 1),
+      EscapeHtml(evaluation.split), 100 * evaluation.rows.back().mean.main(),
       IsOfLight(evaluation) ? ComparisonOfLight(evaluation) : Comparison(evaluation));
 }
 
@@ -58,16 +57,6 @@ std::string HeldOutSentence(const ReportFacts& facts) {
   if (facts.showcase.generated) return "";
   if (facts.listed) return "None of these was seen in training. ";
   return "The run has no list of what it was trained on: these may be among it. ";
-}
-
-// A word as a shell reads it back.
-std::string Quoted(const std::string& word) {
-  constexpr std::string_view kSafe =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
-  if (!word.empty() && word.find_first_not_of(kSafe) == std::string::npos) return word;
-  std::string out = "'";
-  for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
 }
 
 Result<std::string> FigureHtml(const ShownPicture& picture) {
@@ -163,18 +152,19 @@ std::string HeadHtml(const Evaluation& evaluation) {
                              EscapeHtml(evaluation.rows[i].method));
   }
   return fmt::format(
-      "<thead><tr><th rowspan=\"2\" scope=\"col\">class (models)</th>"
+      "<thead><tr><th rowspan=\"2\" scope=\"col\">class ({4}s)</th>"
       "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">{1}, %</th>{2}</tr>\n"
       "<tr>{3}</tr></thead>\n",
       evaluation.rows.size(), f_scores ? "3D IoU at 32³" : MainMeasure(evaluation),
-      f_scores ? FScoreHead(evaluation) : "", methods);
+      f_scores ? FScoreHead(evaluation) : "", methods, ScoredThing(evaluation));
 }
 
 std::string NotesHtml(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::string out = fmt::format(
-      "{} split, {} of each model; the mean is over classes; the best of each measure is bold.",
-      EscapeHtml(evaluation.split), Count(evaluation.views_per_model, "view"));
+      "{} split, {} of each {}; the mean is over classes; the best of each measure is bold.",
+      EscapeHtml(evaluation.split), Count(evaluation.views_per_model, "view"),
+      ScoredThing(evaluation));
   out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
   if (evaluation.shape_threshold > 0)
     out += fmt::format(
@@ -287,13 +277,13 @@ std::string ComparisonHtml(const ReportFacts& facts) {
       light    ? ", mean colour difference in the input view, on a scale of 0 to 1; lower is better"
       : voxels ? ", 32³ voxels"
                : "";
-  return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out models{}.</p>",
-                           measure, note);
+  return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out {}s{}.</p>",
+                           measure, facts.showcase.thing, note);
 }
 
 Result<std::string> ModelsHtml(const ReportFacts& facts) {
   if (facts.showcase.examples.empty())
-    return std::string("<p>The dataset has no test models to show.</p>");
+    return fmt::format("<p>The dataset has no test {}s to show.</p>", facts.showcase.thing);
   std::string out =
       "<p class=\"note\">" + HeldOutSentence(facts) + EscapeHtml(facts.showcase.note) + "</p>\n";
   for (std::size_t i = 0; i < facts.showcase.examples.size(); ++i) {
@@ -304,8 +294,8 @@ Result<std::string> ModelsHtml(const ReportFacts& facts) {
 }
 
 std::string CommandsHtml(const ReportFacts& facts) {
-  const std::string run = Quoted(facts.run.folder.string()), data = Quoted(facts.data);
-  const std::string config = Quoted((facts.run.folder / "config.toml").string());
+  const std::string run = ShellWord(facts.run.folder.string()), data = ShellWord(facts.data);
+  const std::string config = ShellWord((facts.run.folder / "config.toml").string());
   return EscapeHtml(
       fmt::format("tilegrad train --config {} --data {} --out runs/again\n"
                   "tilegrad {} --run runs/again\n"
@@ -343,12 +333,12 @@ std::string ScoresHtml(const ReportFacts& facts) {
   if (facts.showcase.generated)
     return fmt::format(
         "<p>To compare them with true objects as a set: <code>tilegrad {} --run {}</code>.</p>",
-        facts.run.config.task->ScoreCommand(), EscapeHtml(facts.run.folder.string()));
+        facts.run.config.task->ScoreCommand(), EscapeHtml(ShellWord(facts.run.folder.string())));
   if (!facts.evaluation)
     return fmt::format(
         "<p>It has not been evaluated yet: run <code>tilegrad eval --run {}</code>, then make this "
         "report again.</p>",
-        EscapeHtml(facts.run.folder.string()));
+        EscapeHtml(ShellWord(facts.run.folder.string())));
   const Evaluation& evaluation = *facts.evaluation;
   std::string lines;
   for (std::size_t c = 0; c < evaluation.classes.size(); ++c) {

@@ -40,16 +40,15 @@ std::string NearKeys(const ConfigFields& fields, const std::string& key) {
   return fmt::format(" (did you mean {}?)", fmt::join(elsewhere, " or "));
 }
 
-// What there is where a person has looked for it: in the same table, else the tables.
+// What there is where a person has looked for it, in the same table; else where all keys are.
 std::string KeysBeside(const ConfigFields& fields, const std::string& key) {
   std::vector<std::string_view> beside;
   for (const ConfigField& field : fields) {
     if (TablePart(field.key) == TablePart(key)) beside.push_back(LastPart(field.key));
   }
-  if (beside.empty()) return "";
-  const std::string table(TablePart(key));
-  return fmt::format("; {} {}", table.empty() ? "there are" : "[" + table + "] has",
-                     fmt::join(beside, ", "));
+  const std::string_view table = TablePart(key);
+  if (table.empty() || beside.empty()) return "; the config.toml of any run has all keys";
+  return fmt::format("; [{}] has {}", table, fmt::join(beside, ", "));
 }
 
 Status UnknownKey(const ConfigFields& fields, const std::string& key) {

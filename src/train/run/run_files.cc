@@ -44,9 +44,9 @@ struct Series {
   const char *folder, *begin;
 };
 constexpr std::array kSeries = {
-    Series{kCheckpoints, "step_"},   Series{"samples", "step_"}, Series{"timelapse", "0"},
-    Series{"live", "mesh_"},         Series{"masks", ""},        Series{"live", "state.js"},
-    Series{"tensorboard", "events."}};
+    Series{kCheckpoints, "step_"},    Series{"samples", "step_"}, Series{"timelapse", "0"},
+    Series{"live", "mesh_"},          Series{"masks", ""},        Series{"live", "state.js"},
+    Series{"tensorboard", "events."}, Series{"", "eval_on_"}};
 
 void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
   std::error_code error;

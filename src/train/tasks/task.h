@@ -148,9 +148,10 @@ struct Showcase {
   std::string note;     // sentences: what the pictures are
   std::vector<std::string> credits;
   std::vector<Example> examples;
-  bool generated = false;     // the examples are made from noise: none has an input or a truth
-  ImageU8 sheet;              // all examples in one picture, a row each; empty: none
-  std::string sheet_columns;  // what its columns are
+  std::string thing = "model";  // what an example is of, in the singular
+  bool generated = false;       // the examples are made from noise: none has an input or a truth
+  ImageU8 sheet;                // all examples in one picture, a row each; empty: none
+  std::string sheet_columns;    // what its columns are
   double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the viewer of meshes; degrees
 };
 

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "train/data/dataset_files.h"
 #include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
@@ -83,6 +84,9 @@ std::vector<int> PhotographSet::Select(Split split) const {
 
 Result<PhotographSet> OpenPhotographs(const Path& folder) {
   if (!IsFolder(folder)) return NotFound("{}: no such folder", folder.string());
+  if (PathExists(DatasetInfoPath(folder)))
+    return InvalidArgument("{}: holds a dataset of models; this network learns from photographs",
+                           folder.string());
   TILEGRAD_ASSIGN(std::optional<PhotographSet> set, OpenCmrLayout(folder));
   if (!set) {
     TILEGRAD_ASSIGN(set, OpenPhotoFolder(folder));

@@ -112,6 +112,7 @@ class GanTask : public Task {
     Showcase out = AboutDataset(dataset, request.header);
     out.purpose = "to generate textured objects from noise";
     out.generated = true;
+    out.thing = "object";
     out.data += " Critics saw only pictures of the training models, no 3D data.";
     out.note = "Objects of the first latent codes, not picked by hand.";
     auto& model = *request.predictor.model().generator();

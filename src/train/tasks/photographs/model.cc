@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <set>
-#include <sstream>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -15,15 +13,14 @@
 #include "scene/weak_perspective_ref.h"
 #include "train/data/dataset_files.h"
 #include "train/data/stream/textured_meshes.h"
+#include "train/data/trained_models.h"
 #include "train/eval/scores.h"
 #include "train/eval/statistics.h"
 #include "train/metrics/metrics.h"
 #include "train/models/camera_ops.h"
 #include "train/predictor.h"
 #include "train/ranks/process_group.h"
-#include "train/run/carried_files.h"
 #include "train/run/checkpoint.h"
-#include "train/run/run_files.h"
 #include "train/tasks/photographs/step.h"
 
 namespace tilegrad::train {
@@ -86,13 +83,6 @@ constexpr double kPckThreshold = 0.1;
 enum CameraMethod { kCeiling, kMean, kOwnCamera, kOurs, kMethods };
 constexpr const char* kRowNames[kMethods] = {"true keypoints", "mean shape", "predicted camera",
                                              "tilegrad"};
-
-std::string TextOf(const PhotographSet& set) {
-  std::string text;
-  for (const int i : set.Select(Split::kTrain))
-    text += set.photographs[static_cast<std::size_t>(i)].id + "\n";
-  return text;
-}
 
 // Compares a picture [4][size][size] and the object in a photograph, both over black.
 struct ImageScore {
@@ -374,29 +364,6 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
   auto model = std::make_unique<PhotographModel>(context, config, checkpoint);
   TILEGRAD_TRY(model->Load(checkpoint.tensors));
   return std::unique_ptr<Model>(std::move(model));
-}
-
-Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
-  const std::string now = TextOf(set);
-  if (is_new) return WriteTextAtomic(run / kTrainedPhotographs, now);
-  TILEGRAD_ASSIGN(const std::string then, ReadText(run / kTrainedPhotographs));
-  if (then == now) return {};
-  return InvalidArgument("{}: this run was started with other photographs than those of {}: {}",
-                         run.string(), set.folder.string(), FirstDifference(then, now));
-}
-
-Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
-  TILEGRAD_ASSIGN(const auto list, ReadRunFile(run, kTrainedPhotographs));
-  if (!list) return {};
-  std::set<std::string> trained;
-  std::istringstream lines(std::string(list->bytes.begin(), list->bytes.end()));
-  for (std::string line; std::getline(lines, line);) trained.insert(line);
-  for (const int i : set.Select(split)) {
-    const std::string& id = set.photographs[static_cast<std::size_t>(i)].id;
-    if (trained.count(id) > 0)
-      return InvalidArgument("{}: {} of {} was trained on", run.string(), id, set.folder.string());
-  }
-  return {};
 }
 
 std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int count) {

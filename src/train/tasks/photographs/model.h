@@ -56,11 +56,6 @@ Result<std::unique_ptr<Model>> LoadPhotographModel(nn::Context& context,
 Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
                                        const Watch& watch);
 
-// Records in the run folder which photographs a new run is trained on; a resumed run compares them.
-Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new);
-// InvalidArgument if some of that split were trained on.
-Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split);
-
 // At most `count` of that split, spread over it.
 std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int count);
 

@@ -3,6 +3,7 @@
 #include "base/text.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
+#include "train/data/trained_models.h"
 #include "train/predictor.h"
 #include "train/tasks/network_task.h"
 #include "train/tasks/photographs/model.h"
@@ -71,7 +72,7 @@ class PhotographsTask : public NetworkTask {
   void Settle() override { batches_->Settle(); }
 
   Status Begin(const Path& run, std::int64_t first_step) override {
-    TILEGRAD_TRY(RememberPhotographs(run, set_, first_step == 0));
+    TILEGRAD_TRY(RememberPhotographs(run, set_, first_step, context_->workers()));
     if (first_step > 0 || config_.start.empty()) return {};
     return StartAs(config_.start);
   }
@@ -98,6 +99,7 @@ class PhotographsTask : public NetworkTask {
     TILEGRAD_TRY(CheckHeldOutPhotographs(request.run, set, Split::kTest));
     auto& model = *request.predictor.model().photographs();
     Showcase out;
+    out.thing = "photograph";
     out.purpose = "to predict shape, texture and camera of an object from one photograph";
     out.data =
         fmt::format("It learned from {}, one of each object, with masks{}. It saw no 3D data.",

@@ -81,7 +81,8 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
     EXPECT_EQ((*read)->rows[2].mean.pck, ours.pck);
 
     ExpectIn(Page(texture, "cub", 2), "from one photograph", "10 photographs, one of each object",
-             "2D IoU loss", "Cotangent Laplacian");
+             "2D IoU loss", "Cotangent Laplacian", "Held-out photographs", "class (photographs)",
+             "1 view of each photograph", "held-out photographs.");
   }
 }
 
@@ -164,8 +165,32 @@ TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   ExpectMessage(CheckConfig(rotation), "network.rotation", "euler");
   Ok(TrainPhotographs("d").status());
   WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
-  ExpectMessage(TrainPhotographs("d").status(), "other photographs");
+  ExpectMessage(TrainPhotographs("d").status(), "other training photographs");
   ExpectMessage(Evaluate("d", "cub").status(), "was trained on");
+}
+
+TEST_F(PhotographsTask, PicturesOfTheSameNamesMayBeOthers) {
+  const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
+  const auto expect_refused = [&](const char* id) {
+    ExpectMessage(TrainPhotographs("run").status(), "other training photographs", id);
+  };
+  Ok(TrainPhotographs("run").status());
+  const Bytes picture = ReadFile(set.photographs[1].image).value();
+  std::filesystem::copy_file(set.photographs[0].image, set.photographs[1].image,
+                             std::filesystem::copy_options::overwrite_existing);
+  expect_refused("bar_1.png");
+  Ok(WriteFileAtomic(set.photographs[1].image, picture));
+  Ok(TrainPhotographs("run").status());
+  PhotographSet other = set;
+  other.photographs[2].keypoints[0] = {3, 4, true};
+  ASSERT_TRUE(WriteCmrLayout(folder_ / "cub/cachedir/cub", other).ok());
+  expect_refused("bar_2.png");
+  // A list of earlier versions has names alone, and is completed.
+  const Path list = folder_ / "run/training_photographs.txt";
+  const std::string text = ReadText(list).value();
+  Write("run/training_photographs.txt", text.substr(0, text.find("file ")));
+  Ok(TrainPhotographs("run").status());
+  EXPECT_EQ(ReadText(list).value().size(), text.size());
 }
 
 // Gradients of the whole step in float64, by central differences along random directions of all
