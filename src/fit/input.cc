@@ -118,7 +118,7 @@ class InputReader {
     const auto camera = CameraOfFrame(frame, view.size);
     if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
     Camera straight = Undistort(frame.camera.lens, *camera, &view);
-    if (LiesAcross(view.size)) Turn(&straight, &view);
+    if (IsOtherOrientation(view.size)) Turn(&straight, &view);
     const ReducedView reduced = ReduceView(factor_, straight, view);
     const TargetImages& image = reduced.image;
     input_.cameras.push_back(reduced.camera);
@@ -143,10 +143,10 @@ class InputReader {
     TargetImages& all = input_.images;
     if (input_.names.empty()) SetSize(frame.image, view.size);
     const bool same = view.size.width == size_.width && view.size.height == size_.height;
-    if (!same && !LiesAcross(view.size)) {
+    if (!same && !IsOtherOrientation(view.size)) {
       return DataLoss(
-          "{}: has {} x {} pixels, {} has {} x {}; a fit takes images of one size, upright or "
-          "lying: crop or resize one of them, or leave it out",
+          "{}: has {} x {} pixels, {} has {} x {}; a fit takes images of one size, portrait "
+          "or landscape: crop or resize one of them, or leave it out",
           frame.image.string(), view.size.width, view.size.height, first_.string(), size_.width,
           size_.height);
     }
@@ -155,7 +155,7 @@ class InputReader {
                              frame.image.string(), kMostPixels);
   }
 
-  bool LiesAcross(ImageSize size) const {
+  bool IsOtherOrientation(ImageSize size) const {
     return size.width != size.height && size.width == size_.height && size.height == size_.width;
   }
 

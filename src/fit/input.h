@@ -24,7 +24,7 @@ struct FitInput {
   std::vector<Camera> cameras;
   TargetImages images;                  // straight colours (not multiplied by alpha)
   std::vector<int> training, held_out;  // indices of views; every view is in one of them
-  std::vector<int> turned;  // those whose image and camera lie a quarter turn clockwise, rising
+  std::vector<int> turned;  // views rotated 90 degrees clockwise with their cameras; ascending
   bool masked = false;      // some image says where the object is
   // No image says where the object is, but cameras are known: masks are to be found (masks/).
   bool seeks_masks = false;
@@ -79,7 +79,7 @@ struct InputOptions {
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
 // none). Or a folder of pictures alone, which come without cameras (frames.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
-// images must have one size, upright or lying (quarter_turn.h). Lenses that bend rays are
+// images must have one size, portrait or landscape (quarter_turn.h). Lenses that bend rays are
 // straightened (undistort.h), and large images reduced. Errors name the file.
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
 inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {

@@ -9,12 +9,16 @@
 namespace tilegrad::train {
 namespace {
 
-// Of an image of `width` pixels: three more turns make a whole one, which cancels the heights.
+// Of an image of `width` pixels: three more quarter turns, whose heights cancel.
 Camera TurnedBack(const Camera& camera, int width) {
   return TurnedCamera(TurnedCamera(TurnedCamera(camera, 0), width), 0);
 }
 
 }  // namespace
+
+bool IsTurned(const FitInput& input, std::size_t view) {
+  return std::ranges::binary_search(input.turned, static_cast<int>(view));
+}
 
 std::vector<float> TurnedPlanes(std::span<const float> planes, ImageSize size) {
   const auto width = static_cast<std::size_t>(size.width);
@@ -53,8 +57,7 @@ std::vector<Camera> HeldCameras(const FitInput& input, std::span<const Camera> c
 
 ImageU8 HeldImage(const FitInput& input, std::size_t view, ImageU8 image) {
   constexpr int kCounterclockwise = 8;  // as Exif has it
-  const bool turned = std::ranges::binary_search(input.turned, static_cast<int>(view));
-  return turned ? io::Upright(std::move(image), kCounterclockwise) : image;
+  return IsTurned(input, view) ? io::Upright(std::move(image), kCounterclockwise) : image;
 }
 
 }  // namespace tilegrad::train

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images that were taken with the camera on its side, beside those that were not: turned by 90
-// degrees together with their cameras, which loses nothing, all have one size.
+// Portrait images among landscape ones, or the reverse: rotated by 90 degrees together with their
+// cameras, which is exact, all images have one size.
 #pragma once
 
 #include <span>
@@ -12,13 +12,14 @@
 
 namespace tilegrad::train {
 
-// Planes [N,H,W] of `size`, turned clockwise: [N,W,H].
+bool IsTurned(const FitInput& input, std::size_t view);
+
+// Planes [N,H,W] of `size`, rotated clockwise: [N,W,H].
 std::vector<float> TurnedPlanes(std::span<const float> planes, ImageSize size);
-// The camera of the turned image; `height`: pixels before.
+// The camera of the rotated image; `height`: pixels before.
 Camera TurnedCamera(const Camera& camera, int height);
 
-// Cameras and images of an input's views with those turned back that were turned: as cameras were
-// held, and as people want to see images.
+// Cameras and images of an input's views as they were taken: rotated back where IsTurned.
 std::vector<Camera> HeldCameras(const FitInput& input, std::span<const Camera> cameras);
 ImageU8 HeldImage(const FitInput& input, std::size_t view, ImageU8 image);
 

@@ -327,7 +327,7 @@ TEST_F(Input, ImagesOfSeveralSizesAreRefused) {
                 "0.png has 8 x 6", "crop or resize");
 }
 
-TEST_F(Input, ImagesThatLieAcrossAreTurnedWithTheirCameras) {
+TEST_F(Input, PortraitsAmongLandscapesAreRotatedWithTheirCameras) {
   for (int i = 0; i < 10; ++i)
     Ok(io::SavePng(folder_ / "a/images" / (std::to_string(i) + ".png"), CutOut(4)));
   ImageU8 across(6, 8, 4, 255);

@@ -65,10 +65,11 @@ glm::vec3 UpOf(std::span<const Camera> cameras) {
 
 Floor::Floor(const TargetImages& images, std::span<const Camera> cameras, const Region& region,
              const Workers& workers)
-    : images_(images), cameras_(cameras), region_(region), up_(region.up) {
-  const bool leans = std::abs(up_.x) > 0.7f;
-  along_ = glm::normalize(glm::cross(up_, leans ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
-  across_ = glm::cross(up_, along_);
+    : images_(images), cameras_(cameras), region_(region) {
+  const glm::vec3& up = region_.up;
+  const bool leans = std::abs(up.x) > 0.7f;
+  along_ = glm::normalize(glm::cross(up, leans ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
+  across_ = glm::cross(up, along_);
   Smooth(workers);
   FindHeight(workers);
   texels_.resize(std::size_t{kTexelSide} * kTexelSide);
@@ -117,7 +118,7 @@ glm::vec3 Floor::PointOf(float height, int side, std::size_t texel) const {
   const auto n = static_cast<std::size_t>(side);
   const float u = (static_cast<float>(texel % n) + 0.5f) / static_cast<float>(side) * 2 - 1,
               v = (static_cast<float>(texel / n) + 0.5f) / static_cast<float>(side) * 2 - 1;
-  return region_.middle + height * up_ + region_.reach * (u * along_ + v * across_);
+  return region_.middle + height * region_.up + region_.reach * (u * along_ + v * across_);
 }
 
 glm::vec3 Floor::ColorAt(std::size_t pixel) const {
@@ -208,8 +209,8 @@ float Floor::ScoreAt(float height) const {
 
 // Null where the ray meets nothing of the square.
 const Floor::Texel* Floor::TexelAt(glm::vec3 eye, glm::vec3 ray) const {
-  const float above = glm::dot(eye - region_.middle, up_) - height_;
-  const float t = -above / glm::dot(ray, up_);
+  const float above = glm::dot(eye - region_.middle, region_.up) - height_;
+  const float t = -above / glm::dot(ray, region_.up);
   if (!(t > 0)) return nullptr;
   const glm::vec3 at = (eye + t * ray - region_.middle) / region_.reach;
   const float u = 0.5f * kTexelSide * (glm::dot(at, along_) + 1),

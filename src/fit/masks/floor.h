@@ -65,7 +65,7 @@ class Floor {
   const TargetImages& images_;
   const std::span<const Camera> cameras_;
   const Region region_;
-  glm::vec3 up_, along_, across_;
+  glm::vec3 along_, across_;
   std::vector<float> smooth_;  // [N,H,W,3], means over 3 x 3 pixels
   float height_ = 0;
   bool found_ = false;

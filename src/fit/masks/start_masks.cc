@@ -114,7 +114,7 @@ Status ReadMasks(const Path& folder, FitInput* input) {
   for (std::size_t v = 0; v < input->names.size(); ++v) {
     TILEGRAD_ASSIGN(const Path file, FindMask(folder, MaskName(*input, v)));
     const auto alpha = std::span(all.alpha).subspan(v * all.pixels(), all.pixels());
-    const bool turned = std::ranges::binary_search(input->turned, static_cast<int>(v));
+    const bool turned = IsTurned(*input, v);
     const ImageSize size =
         turned ? ImageSize{all.height, all.width} : ImageSize{all.width, all.height};
     TILEGRAD_TRY(LoadMask(file, size, alpha));

@@ -299,8 +299,8 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
   }
   if (!input->turned.empty()) {
     return InvalidArgument(
-        "{}: lies across the first image, but a search for cameras takes images that were all held "
-        "alike: leave it out, give cameras, or install COLMAP",
+        "{}: is not of the first image's orientation, portrait or landscape, which the search for "
+        "cameras needs: leave it out, give cameras, or install COLMAP",
         input->names[static_cast<std::size_t>(input->turned[0])]);
   }
   std::vector<int> views = input->training;
